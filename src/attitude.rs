@@ -1,0 +1,98 @@
+//! Rotations as direction cosine matrices and rotation vectors.
+//!
+//! Source: Savage, *Strapdown Analytics*, 2nd ed., §3.2.2; Titterton and Weston, *Strapdown
+//! Inertial Navigation Technology*, 2nd ed., §3.6.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// `[v×]`, the matrix for which `skew(v) * a = v × a`.
+#[inline]
+pub fn skew(v: Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
+}
+
+/// The rotation matrix `exp([v×])` of a rotation vector in radians.
+#[inline]
+pub fn exp(v: Vector3<f64>) -> Matrix3<f64> {
+    let angle2 = v.norm_squared();
+    // The series' next terms are below rounding here; most samples at 100 Hz and more end up in it.
+    let (s, c) = if angle2 < 1e-4 {
+        (
+            1.0 - angle2 / 6.0 * (1.0 - angle2 / 20.0 * (1.0 - angle2 / 42.0)),
+            0.5 * (1.0 - angle2 / 12.0 * (1.0 - angle2 / 30.0 * (1.0 - angle2 / 56.0))),
+        )
+    } else {
+        let angle = angle2.sqrt();
+        (angle.sin() / angle, (1.0 - angle.cos()) / angle2)
+    };
+    let diagonal = 1.0 - c * angle2;
+    Matrix3::new(
+        diagonal + c * v.x * v.x,
+        c * v.x * v.y - s * v.z,
+        c * v.x * v.z + s * v.y,
+        c * v.x * v.y + s * v.z,
+        diagonal + c * v.y * v.y,
+        c * v.y * v.z - s * v.x,
+        c * v.x * v.z - s * v.y,
+        c * v.y * v.z + s * v.x,
+        diagonal + c * v.z * v.z,
+    )
+}
+
+/// The rotation vector in radians of a rotation matrix, of length at most π.
+pub fn log(c: &Matrix3<f64>) -> Vector3<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*c)).scaled_axis()
+}
+
+/// The rotation matrix nearest to `c`, which must be one already but for rounding
+/// (one step of Newton's iteration for the polar decomposition).
+#[inline]
+pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {
+    c * (Matrix3::identity() * 1.5 - c.tr_mul(c) * 0.5)
+}
+
+/// `C_b_n = Rz(−heading) Rx(pitch) Ry(roll)`: body right-front-up to East-North-Up, all in radians,
+/// heading clockwise from North.
+pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f64> {
+    exp(Vector3::z() * -heading) * exp(Vector3::x() * pitch) * exp(Vector3::y() * roll)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn exp_and_log_are_inverse_from_nanoradians_to_half_a_turn() {
+        let axis = Vector3::new(0.36, -0.48, 0.8);
+        for angle in [1e-9, 1e-4, 0.0099, 0.0101, 1.0, 3.1] {
+            let v = axis * angle;
+            assert_relative_eq!(log(&exp(v)), v, max_relative = 1e-12, epsilon = 1e-16);
+            assert_relative_eq!(
+                exp(v),
+                Rotation3::from_scaled_axis(v).into_inner(),
+                epsilon = 1e-15
+            );
+        }
+    }
+
+    #[test]
+    fn heading_east_points_the_front_axis_east() {
+        let c = from_pitch_roll_heading(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+        assert_relative_eq!(c * Vector3::y(), Vector3::x(), epsilon = 1e-15);
+    }
+
+    #[test]
+    fn positive_pitch_lifts_the_nose_and_positive_roll_lowers_the_right_side() {
+        let nose = from_pitch_roll_heading(0.1, 0.0, 0.7) * Vector3::y();
+        let right = from_pitch_roll_heading(0.0, 0.1, 0.7) * Vector3::x();
+        assert!(nose.z > 0.0 && right.z < 0.0);
+    }
+
+    #[test]
+    fn orthonormalised_removes_a_drift_to_second_order() {
+        let c = exp(Vector3::new(0.3, 0.2, -0.1));
+        let drifted = c * (1.0 + 1e-7);
+        assert_relative_eq!(orthonormalised(&drifted), c, epsilon = 1e-13);
+    }
+}

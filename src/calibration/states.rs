@@ -1,0 +1,60 @@
+//! The state vector of the filter: where each block lives. No other file knows an index.
+//!
+//! | block | size | meaning |
+//! |---|---|---|
+//! | attitude | 3 | φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad |
+//! | velocity | 3 | δV = computed − true, East-North-Up, m/s |
+//! | position | 3 | δp = computed − true, East-North-Up, m |
+//! | gyro | 12 | δθ = true − estimated, see [`crate::imu::TriadVector`] |
+//! | accel | 12 | the same for the accelerometers |
+//! | table | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad |
+//! | initial attitude | 3 | φ at the first sample, kept as constants, rad |
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
+
+/// Attitude error φ.
+pub const ATTITUDE: usize = 0;
+/// Velocity error δV.
+pub const VELOCITY: usize = 3;
+/// Position error δp.
+pub const POSITION: usize = 6;
+/// Number of navigation states, the only ones that move.
+pub const NAVIGATION: usize = 9;
+/// First parameter state.
+pub const PARAMETER: usize = NAVIGATION;
+/// Number of parameter states of both triads.
+pub const PARAMETERS: usize = 2 * PER_TRIAD;
+/// Error of the current table position τ.
+pub const TABLE: usize = PARAMETER + PARAMETERS;
+/// Initial attitude error φ₀.
+pub const INITIAL_ATTITUDE: usize = TABLE + 3;
+/// Number of states.
+pub const STATES: usize = INITIAL_ATTITUDE + 3;
+
+/// A vector of all states.
+pub type StateVector = SVector<f64, STATES>;
+/// A matrix of all states.
+pub type StateMatrix = SMatrix<f64, STATES, STATES>;
+/// A vector of the parameters of both triads.
+pub type ParameterVector = SVector<f64, PARAMETERS>;
+/// A matrix of the parameters of both triads.
+pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
+
+/// Index of a triad's parameter among the parameters of both.
+pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
+    match sensor {
+        Sensor::Gyro => of_triad,
+        Sensor::Accel => PER_TRIAD + of_triad,
+    }
+}
+
+/// The triad and the parameter of it at an index among the parameters of both.
+pub fn sensor_and_parameter(index: usize) -> (Sensor, usize) {
+    if index < PER_TRIAD {
+        (Sensor::Gyro, index)
+    } else {
+        (Sensor::Accel, index - PER_TRIAD)
+    }
+}

@@ -1,0 +1,181 @@
+//! The installation matrix `C` and its forms.
+
+use nalgebra::{Matrix3, SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+/// Room for the installation angles of any form; a form with fewer leaves the last ones zero.
+pub const ANGLES: usize = 6;
+
+/// How six or three small angles make an installation matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InstallationForm {
+    /// Six off-diagonal direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)`
+    /// (Eqs. 4 and 7).
+    #[default]
+    General,
+    /// Six off-diagonal entries, unit diagonal (Eq. 8).
+    SixAngle,
+    /// `C = I + [e×]`, `e = (E_yz, E_xz, E_xy)` (Eq. 10).
+    ThreeAngle,
+}
+
+/// Off-diagonal places in the order of the parameters.
+const SIX: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
+/// `E_yz`, `E_xz`, `E_xy` are `e` in Eq. 10, and the names say which pair of axes they couple.
+const THREE: [(usize, usize); 3] = [(1, 2), (0, 2), (0, 1)];
+
+impl InstallationForm {
+    /// All forms.
+    pub const ALL: [Self; 3] = [Self::General, Self::SixAngle, Self::ThreeAngle];
+
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::General => "general",
+            Self::SixAngle => "six-angle",
+            Self::ThreeAngle => "three-angle",
+        }
+    }
+
+    /// Row and column that name each angle (`gyro.installation.xy` is row x, column y).
+    pub fn angle_names(self) -> &'static [(usize, usize)] {
+        match self {
+            Self::General | Self::SixAngle => &SIX,
+            Self::ThreeAngle => &THREE,
+        }
+    }
+
+    /// The installation matrix of these angles (pure numbers, direction cosines or radians).
+    pub fn matrix(self, angles: &SVector<f64, ANGLES>) -> Matrix3<f64> {
+        match self {
+            Self::General | Self::SixAngle => {
+                let mut c = Matrix3::identity();
+                for (angle, &(row, column)) in angles.iter().zip(&SIX) {
+                    c[(row, column)] = *angle;
+                }
+                if self == Self::General {
+                    for row in 0..3 {
+                        let off: f64 = (0..3)
+                            .filter(|&column| column != row)
+                            .map(|column| c[(row, column)].powi(2))
+                            .sum();
+                        // Beyond a right angle no row of unit norm exists; a filter's step that
+                        // far is caught by its merit, not here.
+                        c[(row, row)] = (1.0 - off).max(0.0).sqrt();
+                    }
+                }
+                c
+            }
+            Self::ThreeAngle => {
+                let (yz, xz, xy) = (angles[0], angles[1], angles[2]);
+                Matrix3::new(1.0, -xy, xz, xy, 1.0, -yz, -xz, yz, 1.0)
+            }
+        }
+    }
+
+    /// `∂C/∂angle` for one angle of [`Self::angle_names`].
+    pub fn derivative(self, angles: &SVector<f64, ANGLES>, angle: usize) -> Matrix3<f64> {
+        let (row, column) = self.angle_names()[angle];
+        let mut d = Matrix3::zeros();
+        match self {
+            Self::General => {
+                d[(row, column)] = 1.0;
+                d[(row, row)] = -angles[angle] / self.matrix(angles)[(row, row)];
+            }
+            Self::SixAngle => d[(row, column)] = 1.0,
+            Self::ThreeAngle => {
+                // [e×] has +e_x at (z, y), +e_y at (x, z), +e_z at (y, x).
+                let (plus, minus) = [((2, 1), (1, 2)), ((0, 2), (2, 0)), ((1, 0), (0, 1))][angle];
+                d[plus] = 1.0;
+                d[minus] = -1.0;
+            }
+        }
+        d
+    }
+
+    /// Splits a sensitivity matrix `A = K C` into scale factors and installation angles (design §4).
+    ///
+    /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and the half
+    /// difference of the two entries of a pair, and is wrong by the pair's half sum.
+    pub fn split(self, a: &Matrix3<f64>) -> (SVector<f64, 3>, SVector<f64, ANGLES>) {
+        let scale = match self {
+            Self::General => SVector::from_fn(|i, _| a.row(i).norm()),
+            Self::SixAngle | Self::ThreeAngle => a.diagonal(),
+        };
+        let c = SMatrix::<f64, 3, 3>::from_fn(|i, j| a[(i, j)] / scale[i]);
+        let mut angles = SVector::<f64, ANGLES>::zeros();
+        match self {
+            Self::General | Self::SixAngle => {
+                for (angle, &place) in angles.iter_mut().zip(&SIX) {
+                    *angle = c[place];
+                }
+            }
+            Self::ThreeAngle => {
+                angles[0] = 0.5 * (c[(2, 1)] - c[(1, 2)]);
+                angles[1] = 0.5 * (c[(0, 2)] - c[(2, 0)]);
+                angles[2] = 0.5 * (c[(1, 0)] - c[(0, 1)]);
+            }
+        }
+        (scale, angles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::Vector6;
+
+    fn angles(form: InstallationForm) -> Vector6<f64> {
+        let mut angles = Vector6::new(0.02, -0.03, 0.01, 0.04, -0.05, 0.06);
+        for unused in form.angle_names().len()..ANGLES {
+            angles[unused] = 0.0;
+        }
+        angles
+    }
+
+    #[test]
+    fn general_rows_have_unit_norm() {
+        let c = InstallationForm::General.matrix(&angles(InstallationForm::General));
+        for row in c.row_iter() {
+            assert_relative_eq!(row.norm(), 1.0, epsilon = 1e-15);
+        }
+    }
+
+    #[test]
+    fn three_angle_is_identity_plus_the_cross_product_matrix() {
+        let e = angles(InstallationForm::ThreeAngle);
+        let c = InstallationForm::ThreeAngle.matrix(&e);
+        let expected =
+            Matrix3::identity() + crate::attitude::skew(nalgebra::Vector3::new(e[0], e[1], e[2]));
+        assert_relative_eq!(c, expected);
+    }
+
+    #[test]
+    fn derivatives_match_finite_differences_in_every_form() {
+        let step = 1e-6;
+        for form in InstallationForm::ALL {
+            let at = angles(form);
+            for angle in 0..form.angle_names().len() {
+                let mut plus = at;
+                let mut minus = at;
+                plus[angle] += step;
+                minus[angle] -= step;
+                let difference = (form.matrix(&plus) - form.matrix(&minus)) / (2.0 * step);
+                assert_relative_eq!(form.derivative(&at, angle), difference, epsilon = 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn split_inverts_the_product_in_every_form() {
+        for form in InstallationForm::ALL {
+            let at = angles(form);
+            let k = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.1, 0.9, 1.3));
+            let (scale, found) = form.split(&(k * form.matrix(&at)));
+            assert_relative_eq!(scale, k.diagonal(), epsilon = 1e-14);
+            assert_relative_eq!(found, at, epsilon = 1e-14);
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The instrument: what a triad of gyros or accelerometers makes of its input.
+//!
+//! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; the second line of the printed Eq. 6 says `N_g`
+//! where the accelerometer is meant). `u` is the angular rate in rad/s or the specific force in
+//! m/s² along the body axes, `K` diagonal, `C` the installation matrix, `N` the output per second.
+//! Inside the crate `N` is divided by the nominal scale of its axis, so that `K ≈ 1` and `D` is in
+//! rad/s or m/s²; [`Nominal`] undoes it at the edges.
+
+mod installation;
+mod signal;
+mod triad;
+
+pub use installation::{ANGLES, InstallationForm};
+pub use signal::{Instability, Noise, NoiseSource, Output, Pulses};
+pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
+
+/// Names of the body axes, in order.
+pub const AXES: [char; 3] = ['x', 'y', 'z'];
+
+/// Which of the two triads of an IMU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Sensor {
+    /// Angular rate in rad/s.
+    Gyro,
+    /// Specific force in m/s².
+    Accel,
+}
+
+impl Sensor {
+    /// Both, in the order of every file and state vector.
+    pub const ALL: [Self; 2] = [Self::Gyro, Self::Accel];
+
+    /// The name that files and parameter names use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gyro => "gyro",
+            Self::Accel => "accel",
+        }
+    }
+}
+
+/// One value for the gyros and one for the accelerometers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PerSensor<T> {
+    /// The gyros' value.
+    pub gyro: T,
+    /// The accelerometers' value.
+    pub accel: T,
+}
+
+impl<T> PerSensor<T> {
+    /// The value of one triad.
+    pub fn get(&self, sensor: Sensor) -> &T {
+        match sensor {
+            Sensor::Gyro => &self.gyro,
+            Sensor::Accel => &self.accel,
+        }
+    }
+
+    /// The value of one triad, to be changed.
+    pub fn get_mut(&mut self, sensor: Sensor) -> &mut T {
+        match sensor {
+            Sensor::Gyro => &mut self.gyro,
+            Sensor::Accel => &mut self.accel,
+        }
+    }
+
+    /// Builds both values from a function of the triad.
+    pub fn from_fn(mut f: impl FnMut(Sensor) -> T) -> Self {
+        Self {
+            gyro: f(Sensor::Gyro),
+            accel: f(Sensor::Accel),
+        }
+    }
+}

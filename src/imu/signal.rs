@@ -1,0 +1,149 @@
+//! From an ideal output to what a sample of the instrument holds: noise, instability, pulses.
+
+use nalgebra::Vector3;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// What one sample holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Output {
+    /// Whole pulses counted during the sample.
+    Pulse,
+    /// The integral of the output over the sample.
+    Increment,
+    /// The mean output over the sample.
+    Rate,
+}
+
+/// Noise of one triad, alike on its three axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Noise {
+    /// Angle random walk in rad/√s, or velocity random walk in (m/s)/√s.
+    pub random_walk: f64,
+    /// Slow wandering of the bias.
+    pub instability: Option<Instability>,
+}
+
+/// A bias that wanders as a stationary first-order Gauss–Markov process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instability {
+    /// Stationary 1σ in rad/s or m/s².
+    pub sigma: f64,
+    /// Correlation time in s.
+    pub correlation_time: f64,
+}
+
+/// Draws a triad's noise, sample by sample.
+#[derive(Debug, Clone)]
+pub struct NoiseSource {
+    noise: Noise,
+    period: f64,
+    wander: Vector3<f64>,
+}
+
+fn normal(rng: &mut impl Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| StandardNormal.sample(rng))
+}
+
+impl NoiseSource {
+    /// A source for samples of this period in s; the wandering bias starts from its stationary
+    /// distribution.
+    pub fn new(noise: Noise, period: f64, rng: &mut impl Rng) -> Self {
+        let wander = noise
+            .instability
+            .map_or_else(Vector3::zeros, |instability| {
+                normal(rng) * instability.sigma
+            });
+        Self {
+            noise,
+            period,
+            wander,
+        }
+    }
+
+    /// The noise in the integral of the next sample's output, rad or m/s.
+    pub fn draw(&mut self, rng: &mut impl Rng) -> Vector3<f64> {
+        let white = normal(rng) * (self.noise.random_walk * self.period.sqrt());
+        if let Some(instability) = self.noise.instability {
+            let keep = (-self.period / instability.correlation_time).exp();
+            self.wander =
+                self.wander * keep + normal(rng) * (instability.sigma * (1.0 - keep * keep).sqrt());
+        }
+        white + self.wander * self.period
+    }
+}
+
+/// A pulse counter: what is left over from one sample is carried into the next, so the sum of all
+/// pulses stays within half a count of the integral.
+#[derive(Debug, Clone, Default)]
+pub struct Pulses {
+    carry: Vector3<f64>,
+}
+
+impl Pulses {
+    /// The whole pulses of a sample whose integral is `counts`.
+    pub fn count(&mut self, counts: Vector3<f64>) -> Vector3<f64> {
+        let total = self.carry + counts;
+        let whole = total.map(f64::round);
+        self.carry = total - whole;
+        whole
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_sum_of_pulses_stays_within_half_a_count_of_the_integral() {
+        let mut pulses = Pulses::default();
+        let mut sum = Vector3::zeros();
+        let rate = Vector3::new(0.3, -7.77, 1e-3);
+        for k in 1..=10_000 {
+            sum += pulses.count(rate);
+            let lag = sum - rate * f64::from(k);
+            assert!(lag.amax() <= 0.5 + 1e-9);
+        }
+    }
+
+    #[test]
+    fn white_noise_integrates_to_the_stated_random_walk() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let noise = Noise {
+            random_walk: 2.0,
+            instability: None,
+        };
+        let runs = 2000;
+        let mut sum_of_squares = 0.0;
+        for _ in 0..runs {
+            let mut source = NoiseSource::new(noise, 0.25, &mut rng);
+            let walk: Vector3<f64> = (0..16).map(|_| source.draw(&mut rng)).sum();
+            sum_of_squares += walk.norm_squared();
+        }
+        // After 4 s the variance of each axis is 4 · 2²; 6000 draws give it to 1/√3000.
+        let variance = sum_of_squares / f64::from(3 * runs);
+        assert!((variance / 16.0 - 1.0).abs() < 4.0 / 3000f64.sqrt());
+    }
+
+    #[test]
+    fn instability_keeps_its_stationary_sigma() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let instability = Instability {
+            sigma: 3.0,
+            correlation_time: 1.0,
+        };
+        let noise = Noise {
+            random_walk: 0.0,
+            instability: Some(instability),
+        };
+        let mut source = NoiseSource::new(noise, 0.5, &mut rng);
+        let draws = 40_000;
+        let mean_square = (0..draws)
+            .map(|_| (source.draw(&mut rng) / 0.5).norm_squared() / 3.0)
+            .sum::<f64>()
+            / f64::from(draws);
+        assert!((mean_square / 9.0 - 1.0).abs() < 0.05);
+    }
+}

@@ -1,0 +1,19 @@
+//! Calibration of an inertial measurement unit on a turntable.
+//!
+//! # Frames, signs, units
+//! * Navigation frame `n`: East-North-Up. Body frame `b`: right-front-up. `C_b_n` takes body to
+//!   navigation; heading is clockwise from North.
+//! * Instrument: `N = K C u + D`, with `u` the angular rate in rad/s or the specific force in m/s².
+//! * Navigation errors are computed − true, parameter errors true − estimated.
+//! * SI and radians everywhere; [`units`] at the edges.
+//!
+//! # Rooms
+//! [`earth`], [`attitude`], [`imu`] and `turntable` know nobody. Data flow one way: [`run`] →
+//! [`calibration`] → `report`.
+
+pub mod attitude;
+pub mod calibration;
+pub mod earth;
+pub mod imu;
+pub mod run;
+pub mod units;

@@ -1,0 +1,3 @@
+//! The `turncal` command.
+
+fn main() {}

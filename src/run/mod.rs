@@ -1,0 +1,121 @@
+//! Runs: what a laboratory recorded, read from files and written to files.
+//!
+//! A [`Run`] is in SI, on right-front-up body axes and in normalised outputs (see
+//! [`crate::imu::Nominal`]); the files' units and axes end at this door.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::earth::Site;
+use crate::imu::{Noise, Nominal, PerSensor, Prior};
+
+/// Everything that a calibration needs to know of one record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// A short name for titles and file names.
+    pub name: String,
+    /// Where the turntable stands.
+    pub site: Site,
+    /// Instrument, serial, operator and the like, carried into calibration and report.
+    pub meta: BTreeMap<String, String>,
+    /// The instrument's samples.
+    pub imu: ImuRecord,
+    /// Noise of each triad.
+    pub noise: PerSensor<Noise>,
+    /// Knowledge of each triad before calibration.
+    pub prior: PerSensor<Prior>,
+    /// Nominal scale of each triad: the file's quantity per second for one rad/s or m/s².
+    pub nominal: PerSensor<Nominal>,
+    /// The file's quantity, such as `count`.
+    pub unit: PerSensor<String>,
+    /// How still the IMU is while the table stands.
+    pub standstill: Standstill,
+    /// The turntable's log, if there is one.
+    pub table: Option<TableRecord>,
+    /// Labelled sections, if there are any.
+    pub segments: Vec<Segment>,
+}
+
+/// The samples of both triads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImuRecord {
+    /// Time at which the first sample begins, s.
+    pub start: f64,
+    /// Length of every sample, s.
+    pub period: f64,
+    /// Whether each sample begins where the one before ended.
+    pub continuous: bool,
+    /// Integrals of the normalised gyro output over each sample, rad.
+    pub gyro: Vec<Vector3<f64>>,
+    /// Integrals of the normalised accelerometer output over each sample, m/s.
+    pub accel: Vec<Vector3<f64>>,
+    /// Size of one pulse, rad and m/s, where samples are whole pulses; zero otherwise.
+    pub pulse: PerSensor<f64>,
+}
+
+impl ImuRecord {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.gyro.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.gyro.is_empty()
+    }
+
+    /// Time in s at which sample `k` begins (and sample `k − 1` ends).
+    pub fn time(&self, k: usize) -> f64 {
+        self.start + k as f64 * self.period
+    }
+
+    /// Length of the record, s.
+    pub fn duration(&self) -> f64 {
+        self.len() as f64 * self.period
+    }
+}
+
+/// What the turntable says of the attitude of its mounting face, which is the body frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableRecord {
+    /// Time of each reading, s.
+    pub time: Vec<f64>,
+    /// Reading `C_b_n`, body to East-North-Up.
+    pub attitude: Vec<Matrix3<f64>>,
+    /// 1σ per axis of the position error, constant while the table stands and new at every position,
+    /// rad.
+    pub position_sigma: f64,
+    /// 1σ per axis of the white error of each reading, rad.
+    pub reading_sigma: f64,
+}
+
+/// How still the IMU is while the table stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standstill {
+    /// White 1σ of the velocity at standstill, m/s; found from the dwells if not given.
+    pub velocity_sigma: Option<f64>,
+    /// 1σ of the IMU's position while the table stands, m. Never below the IMU's distance from the
+    /// table's centre, for that is how far it moves between positions.
+    pub position_sigma: f64,
+}
+
+impl Default for Standstill {
+    fn default() -> Self {
+        Self {
+            velocity_sigma: None,
+            position_sigma: 1.0,
+        }
+    }
+}
+
+/// A labelled section of the record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segment {
+    /// Begin, s.
+    pub start: f64,
+    /// End, s.
+    pub end: f64,
+    /// `x_up` … `z_down`, `rot_x+360` and the like.
+    pub label: String,
+}
