@@ -15,5 +15,6 @@ pub mod attitude;
 pub mod calibration;
 pub mod earth;
 pub mod imu;
+pub mod navigation;
 pub mod run;
 pub mod units;

@@ -1,0 +1,197 @@
+//! What navigation hands to a filter: the error model over a stretch of samples.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::site_fixed::State;
+use crate::attitude::skew;
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
+
+/// Attitude, velocity and position error.
+pub const NAVIGATION: usize = 9;
+/// Navigation errors against navigation errors.
+pub type BlockMatrix = SMatrix<f64, NAVIGATION, NAVIGATION>;
+/// Navigation errors against the parameters of one triad.
+pub type ParameterBlock = SMatrix<f64, NAVIGATION, PER_TRIAD>;
+
+/// The error model over a stretch of samples: the rows of the transition matrix that differ from
+/// identity, the process noise, and the computed state at the end.
+///
+/// Errors: φ in `C_computed = (I − [φ×]) C_true` (rad), δV and δp computed − true (m/s, m), all
+/// East-North-Up; parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`].
+/// With these signs (Eq. 13 at a standing site)
+///
+/// `φ̇ = −ω_ie × φ − C_b_n B_g δθ_g`, `δV̇ = f_n × φ − 2ω_ie × δV + C_b_n B_a δθ_a`, `δṗ = δV`,
+/// `B = (K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Computed state at the end.
+    pub state: State,
+    /// Length in s.
+    pub duration: f64,
+    /// Transition of the navigation errors.
+    pub navigation: BlockMatrix,
+    /// Transition from the parameter errors of each triad.
+    pub parameters: PerSensor<ParameterBlock>,
+    /// Covariance that noise adds to the navigation errors.
+    pub noise: BlockMatrix,
+}
+
+/// Integrals over a stretch of samples from which its [`Block`] follows.
+///
+/// The output of a triad is linear in `b = [u; 1]` (see [`Triad::response`]), so the integrals of
+/// `C_b_n b_k` hold the derivative with respect to every parameter of any installation form.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Moments {
+    /// ∫C_b_n b_k dt with the gyros' input in b.
+    gyro: [Matrix3<f64>; 4],
+    /// ∫[f_n×] (∫C_b_n b_k dt) dt: what tilts from the gyros make of specific force.
+    tilt: [Matrix3<f64>; 4],
+    /// ∫C_b_n b_k dt with the accelerometers' input in b.
+    accel: [Matrix3<f64>; 4],
+    /// ∫f_n dt.
+    force: Vector3<f64>,
+    duration: f64,
+}
+
+impl Moments {
+    /// Adds a sample: attitude at its middle, increments along body axes, velocity change in `n`.
+    #[inline]
+    pub(super) fn add(
+        &mut self,
+        attitude: &Matrix3<f64>,
+        angle: &Vector3<f64>,
+        velocity: &Vector3<f64>,
+        force: &Vector3<f64>,
+        period: f64,
+    ) {
+        for k in 0..4 {
+            let weight = if k < 3 { angle[k] } else { period };
+            let step = attitude * weight;
+            // The tilt at the middle of the sample acts on the force of the whole sample.
+            let middle = self.gyro[k] + step * 0.5;
+            for column in 0..3 {
+                let tilt = force.cross(&middle.column(column));
+                let mut sum = self.tilt[k].column_mut(column);
+                sum += tilt;
+            }
+            self.gyro[k] += step;
+            self.accel[k] += attitude * if k < 3 { velocity[k] } else { period };
+        }
+        self.force += force;
+        self.duration += period;
+    }
+
+    /// The block of these integrals. `random_walk` are the noise densities of both triads, rad/√s
+    /// and (m/s)/√s.
+    pub(super) fn block(
+        &self,
+        state: State,
+        earth_rate: &Vector3<f64>,
+        responses: PerSensor<&CorrectedResponse>,
+        random_walk: &PerSensor<f64>,
+    ) -> Block {
+        let t = self.duration;
+        let force = skew(self.force);
+        let earth = skew(*earth_rate);
+        let identity = Matrix3::identity();
+
+        let mut navigation = BlockMatrix::identity();
+        let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
+            navigation
+                .fixed_view_mut::<3, 3>(3 * row, 3 * column)
+                .copy_from(&m);
+        };
+        set(0, 0, identity - earth * t);
+        set(1, 0, force);
+        set(1, 1, identity - earth * (2.0 * t));
+        set(2, 0, force * (0.5 * t));
+        set(2, 1, identity * t);
+
+        let mut parameters: PerSensor<ParameterBlock> =
+            PerSensor::from_fn(|_| ParameterBlock::zeros());
+        for p in 0..PER_TRIAD {
+            let attitude = -product(&self.gyro, &responses.gyro.0[p]);
+            let tilt = -product(&self.tilt, &responses.gyro.0[p]);
+            let velocity = product(&self.accel, &responses.accel.0[p]);
+            let mut gyro = parameters.gyro.column_mut(p);
+            gyro.fixed_rows_mut::<3>(0).copy_from(&attitude);
+            gyro.fixed_rows_mut::<3>(3).copy_from(&tilt);
+            // A tilt that grows with time moves velocity with t² and position with t³.
+            gyro.fixed_rows_mut::<3>(6).copy_from(&(tilt * (t / 3.0)));
+            let mut accel = parameters.accel.column_mut(p);
+            accel.fixed_rows_mut::<3>(3).copy_from(&velocity);
+            accel
+                .fixed_rows_mut::<3>(6)
+                .copy_from(&(velocity * (t / 2.0)));
+        }
+
+        Block {
+            state,
+            duration: t,
+            navigation,
+            parameters,
+            noise: self.noise(random_walk),
+        }
+    }
+
+    /// White noise through the chain attitude → velocity → position over the stretch, with the mean
+    /// specific force (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).
+    fn noise(&self, random_walk: &PerSensor<f64>) -> BlockMatrix {
+        let t = self.duration;
+        let mut noise = BlockMatrix::zeros();
+        if t == 0.0 {
+            return noise;
+        }
+        let force = skew(self.force / t);
+        let force2 = force * force.transpose();
+        let identity = Matrix3::identity();
+        let gyro = random_walk.gyro.powi(2);
+        let accel = random_walk.accel.powi(2);
+        let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
+            noise
+                .fixed_view_mut::<3, 3>(3 * row, 3 * column)
+                .copy_from(&m);
+            if row != column {
+                noise
+                    .fixed_view_mut::<3, 3>(3 * column, 3 * row)
+                    .copy_from(&m.transpose());
+            }
+        };
+        let (t2, t3) = (t * t, t * t * t);
+        set(0, 0, identity * (gyro * t));
+        set(1, 0, force * (gyro * t2 / 2.0));
+        set(2, 0, force * (gyro * t3 / 6.0));
+        set(1, 1, identity * (accel * t) + force2 * (gyro * t3 / 3.0));
+        set(
+            2,
+            1,
+            identity * (accel * t2 / 2.0) + force2 * (gyro * t3 * t / 8.0),
+        );
+        set(
+            2,
+            2,
+            identity * (accel * t3 / 3.0) + force2 * (gyro * t3 * t2 / 20.0),
+        );
+        noise
+    }
+}
+
+/// Σ_k M_k v_k over the columns of a triad's corrected response.
+#[inline]
+fn product(moments: &[Matrix3<f64>; 4], response: &SMatrix<f64, 3, 4>) -> Vector3<f64> {
+    moments
+        .iter()
+        .zip(response.column_iter())
+        .map(|(moment, column)| moment * column)
+        .sum()
+}
+
+/// `(K̂Ĉ)⁻¹ W_p` for every parameter: the error of the computed input is this times `[u; 1]`.
+#[derive(Debug, Clone)]
+pub(super) struct CorrectedResponse([SMatrix<f64, 3, 4>; PER_TRIAD]);
+
+impl CorrectedResponse {
+    pub(super) fn new(triad: &Triad, correction: &Matrix3<f64>) -> Self {
+        Self(triad.response().map(|w| correction * w))
+    }
+}

@@ -1,0 +1,327 @@
+//! Strapdown navigation in a frame fixed to the site.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::block::{Block, CorrectedResponse, Moments};
+use super::increments::Increments;
+use crate::attitude::{exp, orthonormalised};
+use crate::earth::Site;
+use crate::imu::{PerSensor, Triad};
+use crate::run::ImuRecord;
+
+/// Computed attitude, velocity and position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// `C_b_n`, body to East-North-Up.
+    pub attitude: Matrix3<f64>,
+    /// Velocity relative to the Earth, East-North-Up, m/s.
+    pub velocity: Vector3<f64>,
+    /// Position relative to the site, East-North-Up, m.
+    pub position: Vector3<f64>,
+}
+
+impl State {
+    /// At rest at the site.
+    pub fn at_rest(attitude: Matrix3<f64>) -> Self {
+        Self {
+            attitude,
+            velocity: Vector3::zeros(),
+            position: Vector3::zeros(),
+        }
+    }
+}
+
+/// Navigates through a record with given triads and accumulates the error model as it goes.
+#[derive(Debug, Clone)]
+pub struct Navigator<'a> {
+    imu: &'a ImuRecord,
+    random_walk: PerSensor<f64>,
+    gravity: Vector3<f64>,
+    earth_rate: Vector3<f64>,
+    earth_turn: Matrix3<f64>,
+    instrument: PerSensor<Instrument>,
+    /// Where navigation stands.
+    pub state: State,
+}
+
+/// A triad, ready for use sample by sample.
+#[derive(Debug, Clone)]
+struct Instrument {
+    correction: Matrix3<f64>,
+    /// Corrected bias over one sample.
+    bias: Vector3<f64>,
+    response: CorrectedResponse,
+}
+
+impl<'a> Navigator<'a> {
+    /// Starts at a state with these triads; `None` if the sensitivity of one is singular.
+    /// `random_walk` are the noise densities in rad/√s and (m/s)/√s.
+    pub fn new(
+        imu: &'a ImuRecord,
+        site: &Site,
+        random_walk: PerSensor<f64>,
+        triads: &PerSensor<Triad>,
+        state: State,
+    ) -> Option<Self> {
+        let earth_rate = site.earth_rate_n();
+        Some(Self {
+            imu,
+            random_walk,
+            gravity: site.gravity_n(),
+            earth_rate,
+            earth_turn: exp(-earth_rate * imu.period),
+            instrument: instruments(triads, imu.period)?,
+            state,
+        })
+    }
+
+    /// Goes on with other triads; `None` if the sensitivity of one is singular.
+    pub fn set_triads(&mut self, triads: &PerSensor<Triad>) -> Option<()> {
+        self.instrument = instruments(triads, self.imu.period)?;
+        Some(())
+    }
+
+    /// Increments along body axes of sample `k`, corrected by the triads (Eq. 11).
+    #[inline]
+    fn increments(&self, k: usize) -> Increments {
+        let PerSensor { gyro, accel } = &self.instrument;
+        Increments {
+            angle: gyro.correction * self.imu.gyro[k] - gyro.bias,
+            velocity: accel.correction * self.imu.accel[k] - accel.bias,
+        }
+    }
+
+    /// Navigates through these samples of the record and gives their block. Where the record has a
+    /// sample before the first of them, coning and sculling take it into account.
+    pub fn advance(&mut self, samples: Range<usize>) -> Block {
+        let period = self.imu.period;
+        let mut moments = Moments::default();
+        let mut state = self.state;
+        let mut before = samples
+            .start
+            .checked_sub(1)
+            .map_or_else(Increments::default, |k| self.increments(k));
+        let half_turn = self.earth_rate * (0.5 * period);
+        for k in samples {
+            let increments = self.increments(k);
+            let motion = increments.motion(&before);
+            before = increments;
+
+            let in_start_frame = state.attitude * motion.velocity;
+            // The frame turns with the Earth while the sample lasts.
+            let change = in_start_frame - half_turn.cross(&in_start_frame);
+            let attitude = self.earth_turn * (state.attitude * exp(motion.rotation));
+            let coriolis = self.earth_rate.cross(&state.velocity) * 2.0;
+            let velocity = state.velocity + change + (self.gravity - coriolis) * period;
+            moments.add(
+                &((state.attitude + attitude) * 0.5),
+                &increments.angle,
+                &increments.velocity,
+                &change,
+                period,
+            );
+            state.position += (state.velocity + velocity) * (0.5 * period);
+            state.velocity = velocity;
+            state.attitude = attitude;
+        }
+        state.attitude = orthonormalised(&state.attitude);
+        self.state = state;
+        let responses = PerSensor::from_fn(|sensor| &self.instrument.get(sensor).response);
+        moments.block(state, &self.earth_rate, responses, &self.random_walk)
+    }
+}
+
+fn instruments(triads: &PerSensor<Triad>, period: f64) -> Option<PerSensor<Instrument>> {
+    let one = |triad: &Triad| {
+        let correction = triad.correction()?;
+        Some(Instrument {
+            correction,
+            bias: correction * triad.bias * period,
+            response: CorrectedResponse::new(triad, &correction),
+        })
+    };
+    Some(PerSensor {
+        gyro: one(&triads.gyro)?,
+        accel: one(&triads.accel)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attitude::log;
+    use crate::imu::{InstallationForm, PARAMETERS, TriadVector};
+    use approx::assert_relative_eq;
+    use nalgebra::SVector;
+
+    const PERIOD: f64 = 0.01;
+    /// As many as the filter takes into a block.
+    const SAMPLES: usize = 10;
+
+    /// Turning about a wandering axis at about 30°/s while gravity is sensed.
+    fn record() -> ImuRecord {
+        let t = |k: usize| k as f64 * PERIOD;
+        ImuRecord {
+            start: 0.0,
+            period: PERIOD,
+            continuous: true,
+            gyro: (0..SAMPLES)
+                .map(|k| Vector3::new(0.5, 0.3 * t(k), -0.2) * PERIOD)
+                .collect(),
+            accel: (0..SAMPLES)
+                .map(|k| Vector3::new(1.0, -2.0 * t(k), 9.6) * PERIOD)
+                .collect(),
+            pulse: PerSensor::default(),
+        }
+    }
+
+    fn site() -> Site {
+        Site::with_normal_gravity(0.6, 0.0, 0.0)
+    }
+
+    fn triads() -> PerSensor<Triad> {
+        let v = TriadVector::from_fn(|i, _| f64::from(i < 3) + 0.002 * (i as f64 - 5.0));
+        PerSensor::from_fn(|_| Triad::from_vector(InstallationForm::General, &v))
+    }
+
+    fn start() -> State {
+        State {
+            attitude: exp(Vector3::new(0.4, -0.3, 1.0)),
+            velocity: Vector3::new(0.1, -0.2, 0.05),
+            position: Vector3::zeros(),
+        }
+    }
+
+    fn navigate(triads: &PerSensor<Triad>, state: State) -> Block {
+        let walk = PerSensor {
+            gyro: 3e-7,
+            accel: 5e-5,
+        };
+        Navigator::new(&record(), &site(), walk, triads, state)
+            .unwrap()
+            .advance(0..SAMPLES)
+    }
+
+    /// φ, δV, δp of one computed state against another taken as the truth.
+    fn error(computed: &State, truth: &State) -> SVector<f64, 9> {
+        let mut e = SVector::<f64, 9>::zeros();
+        e.fixed_rows_mut::<3>(0)
+            .copy_from(&-log(&(computed.attitude * truth.attitude.transpose())));
+        e.fixed_rows_mut::<3>(3)
+            .copy_from(&(computed.velocity - truth.velocity));
+        e.fixed_rows_mut::<3>(6)
+            .copy_from(&(computed.position - truth.position));
+        e
+    }
+
+    #[test]
+    fn transition_of_navigation_errors_is_the_derivative_of_navigation() {
+        let nominal = navigate(&triads(), start());
+        let step = 1e-6;
+        for column in 0..9 {
+            let mut e = Vector3::zeros();
+            e[column % 3] = step;
+            let shifted = |sign: f64| {
+                let mut state = start();
+                match column / 3 {
+                    0 => state.attitude = exp(-e * sign) * state.attitude,
+                    1 => state.velocity += e * sign,
+                    _ => state.position += e * sign,
+                }
+                error(&navigate(&triads(), state).state, &nominal.state)
+            };
+            let difference = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            // What the Earth turns during half a block is left out of the couplings: 4e-6 of each.
+            assert_relative_eq!(
+                nominal.navigation.column(column).rows(0, 6).into_owned(),
+                difference.rows(0, 6).into_owned(),
+                epsilon = 1e-5
+            );
+            assert_relative_eq!(
+                nominal.navigation.column(column).rows(6, 3).into_owned(),
+                difference.rows(6, 3).into_owned(),
+                epsilon = 5e-3
+            );
+        }
+    }
+
+    #[test]
+    fn transition_of_parameter_errors_is_the_derivative_of_navigation() {
+        let nominal = navigate(&triads(), start());
+        let step = 1e-6;
+        for sensor in crate::imu::Sensor::ALL {
+            for parameter in 0..PARAMETERS {
+                // δθ is true − estimated, so the computed triad goes the other way.
+                let shifted = |sign: f64| {
+                    let mut changed = triads();
+                    let mut v = changed.get(sensor).to_vector();
+                    v[parameter] -= sign * step;
+                    *changed.get_mut(sensor) = Triad::from_vector(InstallationForm::General, &v);
+                    error(&navigate(&changed, start()).state, &nominal.state)
+                };
+                let difference = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+                let column = nominal.parameters.get(sensor).column(parameter);
+                assert_relative_eq!(
+                    column.rows(0, 6).into_owned(),
+                    difference.rows(0, 6).into_owned(),
+                    epsilon = 1e-5
+                );
+                assert_relative_eq!(
+                    column.rows(6, 3).into_owned(),
+                    difference.rows(6, 3).into_owned(),
+                    epsilon = 5e-3
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn an_ideal_instrument_at_rest_stays_at_rest() {
+        let site = site();
+        let attitude = exp(Vector3::new(0.4, -0.3, 1.0));
+        let samples = 6000;
+        let record = ImuRecord {
+            gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; samples],
+            accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; samples],
+            ..record()
+        };
+        let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+        let mut navigator = Navigator::new(
+            &record,
+            &site,
+            PerSensor::default(),
+            &ideal,
+            State::at_rest(attitude),
+        )
+        .unwrap();
+        let end = navigator.advance(0..samples).state;
+        assert_relative_eq!(end.attitude, attitude, epsilon = 1e-12);
+        assert!(end.velocity.norm() < 1e-9 && end.position.norm() < 1e-7);
+    }
+
+    #[test]
+    fn noise_of_a_long_block_equals_that_of_its_parts() {
+        // At rest the mean force is exact, so noise must compose: Q(0,2) = Φ Q(0,1) Φᵀ + Q(1,2).
+        let site = site();
+        let record = ImuRecord {
+            gyro: vec![Vector3::zeros(); SAMPLES],
+            accel: vec![-site.gravity_n() * PERIOD; SAMPLES],
+            ..record()
+        };
+        let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+        let walk = PerSensor {
+            gyro: 0.1,
+            accel: 1.0,
+        };
+        let start = State::at_rest(Matrix3::identity());
+        let mut navigator = Navigator::new(&record, &site, walk, &ideal, start).unwrap();
+        let whole = navigator.clone().advance(0..SAMPLES).noise;
+        let first = navigator.advance(0..SAMPLES / 2);
+        let second = navigator.advance(SAMPLES / 2..SAMPLES);
+        let composed =
+            second.navigation * first.noise * second.navigation.transpose() + second.noise;
+        assert_relative_eq!(whole, composed, max_relative = 1e-6, epsilon = 1e-12);
+    }
+}
