@@ -1,4 +1,21 @@
 //! Calibration: closed form, coarse start, filter and passes.
+//!
+//! Each takes a [`crate::run::Run`] and gives an [`Estimate`]; none prints, reads files or draws.
 
+mod closed_form;
+mod coarse;
+mod consistency;
+mod error;
+mod estimator;
+mod filter;
 pub mod outcome;
+mod pass;
+mod schedule;
+mod standstill;
 pub mod states;
+
+pub use closed_form::{ClosedForm, Position, six_position, six_position_triad};
+pub use coarse::coarse_start;
+pub use error::CalibrationError;
+pub use estimator::{Progress, estimate};
+pub use outcome::{Estimate, Outcome};

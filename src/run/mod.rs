@@ -3,6 +3,11 @@
 //! A [`Run`] is in SI, on right-front-up body axes and in normalised outputs (see
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
+mod dwells;
+
+pub use dwells::Dwell;
+pub(crate) use dwells::mean_attitude;
+
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};

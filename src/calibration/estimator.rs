@@ -1,0 +1,224 @@
+//! The estimator: coarse start, a live pass, and held passes until nothing moves.
+
+use nalgebra::Vector3;
+
+use super::coarse::coarse_start;
+use super::consistency::consistency;
+use super::error::CalibrationError;
+use super::filter::Start;
+use super::outcome::{Estimate, Outcome, Pass, parameter_name, to_vector};
+use super::pass::{Linearisation, Mode, PassResult, Problem, Variance, gate, pass};
+use super::schedule::Schedule;
+use super::standstill::velocity_sigma;
+use super::states::ParameterVector;
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::run::Run;
+use crate::units::ARCSEC;
+
+/// Told after each pass; the command line draws it.
+pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
+
+/// Passes have converged when no parameter moves by more than this many of its σ.
+const CONVERGED: f64 = 0.02;
+/// At most this many passes.
+const PASSES: usize = 10;
+/// A merit that rises by more than this, in χ², means that the step was too long.
+const MERIT_RISE: f64 = 1.0;
+/// 1σ of the initial attitude before anything is known of it but one reading, rad.
+const INITIAL_ATTITUDE: f64 = 60.0 * ARCSEC;
+/// 1σ of the initial velocity: a table at rest, m/s.
+const INITIAL_VELOCITY: f64 = 1e-3;
+/// A parameter whose σ a run does not even halve was not observed by it.
+const OBSERVED: f64 = 0.5;
+
+/// Estimates both triads of a run with table aiding.
+///
+/// Source: design of the passes after Maybeck, *Stochastic Models, Estimation and Control*, vol. 2,
+/// §9.7 (iterated, linearised filters): each held pass is a Gauss–Newton step of the whole record.
+///
+/// # Errors
+/// [`CalibrationError`] where the run cannot give a calibration. A run that gives one without
+/// convergence is an [`Outcome`] with `converged = false` and a warning.
+pub fn estimate(
+    run: &Run,
+    form: InstallationForm,
+    progress: Progress,
+) -> Result<Outcome, CalibrationError> {
+    if !run.imu.continuous {
+        return Err(CalibrationError::NotContinuous);
+    }
+    let dwells = run.dwells();
+    let schedule = Schedule::new(run, &dwells)?;
+    let coarse = coarse_start(run, &dwells, form)?;
+    let start = Linearisation {
+        triads: coarse,
+        initial_attitude: schedule.initial_attitude,
+    };
+    let velocity_sigma = velocity_sigma(run, &dwells);
+    let problem = problem(run, schedule, form, velocity_sigma);
+
+    let live = pass(&problem, &start, Mode::Live)?;
+    let mut passes = vec![summary(&live, &start, true)];
+    passes.iter().for_each(progress);
+
+    let held = iterate(&problem, live.estimate, &mut passes, progress)?;
+    let converged = passes
+        .last()
+        .is_some_and(|pass| !pass.live && pass.largest_step <= CONVERGED);
+    let estimate = Estimate {
+        triads: held.estimate.triads,
+        covariance: held.covariance,
+    };
+    let warnings = warnings(&problem, &estimate, &passes, converged);
+    Ok(Outcome {
+        estimate,
+        prior_sigma: problem.prior_sigma,
+        prior_mean: problem.prior_mean,
+        converged,
+        consistency: consistency(&held.innovations),
+        history: held.history,
+        live_history: live.history,
+        innovations: held.innovations,
+        velocity_sigma,
+        passes,
+        warnings,
+    })
+}
+
+/// Held passes from a first point on, each linearised at the estimate of the one before.
+fn iterate(
+    problem: &Problem,
+    from: Linearisation,
+    passes: &mut Vec<Pass>,
+    progress: Progress,
+) -> Result<PassResult, CalibrationError> {
+    let mut at = from;
+    let mut rejected = Vec::new();
+    let mut best: Option<(Linearisation, PassResult)> = None;
+    loop {
+        let result = pass(
+            problem,
+            &at,
+            Mode::Held {
+                rejected: &rejected,
+            },
+        )?;
+        let summary = summary(&result, &at, false);
+        progress(&summary);
+        passes.push(summary);
+        let exhausted = passes.len() >= PASSES;
+        if let Some((before, kept)) = &best
+            && result.merit > kept.merit + MERIT_RISE
+        {
+            if exhausted {
+                return Ok(result);
+            }
+            at = before.towards(&at, 0.5);
+            continue;
+        }
+        let outliers: Vec<bool> = result
+            .innovations
+            .iter()
+            .map(|i| Vector3::from(i.whitened).norm_squared() > problem.gate)
+            .collect();
+        let same_gate = outliers.iter().any(|&o| o) == rejected.iter().any(|&o| o)
+            && (rejected.is_empty() || outliers == rejected);
+        if exhausted || (summary.largest_step <= CONVERGED && same_gate) {
+            return Ok(result);
+        }
+        rejected = outliers;
+        let next = result.estimate;
+        best = Some((at, result));
+        at = next;
+    }
+}
+
+fn problem<'a>(
+    run: &'a Run,
+    schedule: Schedule,
+    form: InstallationForm,
+    velocity_sigma: f64,
+) -> Problem<'a> {
+    let (position_sigma, reading_sigma) = run.table.as_ref().map_or((0.0, 0.0), |table| {
+        (table.position_sigma, table.reading_sigma)
+    });
+    let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
+    let mut prior_sigma = ParameterVector::zeros();
+    for sensor in Sensor::ALL {
+        prior_sigma
+            .fixed_rows_mut::<PER_TRIAD>(super::states::parameter(sensor, 0))
+            .copy_from(&run.prior.get(sensor).sigma(form));
+    }
+    Problem {
+        run,
+        schedule,
+        form,
+        prior_mean: to_vector(&prior_mean(run, form)),
+        prior_sigma,
+        start: Start {
+            attitude: INITIAL_ATTITUDE.max(10.0 * position_sigma),
+            velocity: INITIAL_VELOCITY,
+            position: run.standstill.position_sigma,
+            table: position_sigma,
+        },
+        variance: Variance {
+            velocity: velocity_sigma.powi(2) + quantisation(run.imu.pulse.accel),
+            position: run.standstill.position_sigma.powi(2),
+            reading: reading_sigma.powi(2),
+            attitude: quantisation(run.imu.pulse.gyro),
+            table: position_sigma.powi(2),
+        },
+        gate: gate(),
+    }
+}
+
+/// The prior's mean of both triads.
+pub(super) fn prior_mean(run: &Run, form: InstallationForm) -> PerSensor<Triad> {
+    PerSensor::from_fn(|sensor| run.prior.get(sensor).mean(form))
+}
+
+fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
+    let sigma = result.covariance.diagonal().map(f64::sqrt);
+    let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
+    Pass {
+        live,
+        largest_step: step
+            .iter()
+            .zip(&sigma)
+            .filter(|&(_, &sigma)| sigma > 0.0)
+            .map(|(step, sigma)| (step / sigma).abs())
+            .fold(0.0, f64::max),
+        merit: result.merit,
+        observations: 3 * result.innovations.len(),
+        rejected: result.innovations.iter().filter(|i| !i.accepted).count(),
+    }
+}
+
+fn warnings(
+    problem: &Problem,
+    estimate: &Estimate,
+    passes: &[Pass],
+    converged: bool,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !converged {
+        warnings.push(format!(
+            "not converged after {} passes: the last one still moved a parameter by {:.2} σ; \
+             neither values nor σ are to be trusted",
+            passes.len(),
+            passes.last().map_or(f64::NAN, |pass| pass.largest_step),
+        ));
+    }
+    let sigma = estimate.sigma();
+    let unobserved: Vec<String> = (0..sigma.len())
+        .filter(|&i| problem.prior_sigma[i] > 0.0 && sigma[i] > OBSERVED * problem.prior_sigma[i])
+        .filter_map(|i| parameter_name(problem.form, i))
+        .collect();
+    if !unobserved.is_empty() {
+        warnings.push(format!(
+            "not observed by this path (σ not even halved): {}",
+            unobserved.join(", ")
+        ));
+    }
+    warnings
+}

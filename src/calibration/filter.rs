@@ -1,0 +1,346 @@
+//! The Kalman filter: covariance in block form, observations one scalar at a time.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::states::{
+    ATTITUDE, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS, POSITION, ParameterMatrix,
+    ParameterVector, STATES, StateMatrix, StateVector, TABLE, VELOCITY,
+};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor};
+use crate::navigation::Block;
+
+const GYRO: usize = PARAMETER;
+const ACCEL: usize = PARAMETER + PER_TRIAD;
+/// States that do not move.
+const CONSTANT: usize = STATES - NAVIGATION;
+
+/// Three states that an observation sees, and three that it sees with the opposite sign.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sight {
+    plus: usize,
+    minus: Option<usize>,
+}
+
+impl Sight {
+    /// δV: computed minus zero velocity.
+    pub const VELOCITY: Self = Self {
+        plus: VELOCITY,
+        minus: None,
+    };
+    /// δp: computed minus the site's position.
+    pub const POSITION: Self = Self {
+        plus: POSITION,
+        minus: None,
+    };
+    /// φ − τ: computed attitude against the table's.
+    pub const TABLE: Self = Self {
+        plus: ATTITUDE,
+        minus: Some(TABLE),
+    };
+
+    fn of(self, x: &StateVector) -> Vector3<f64> {
+        let plus = x.fixed_rows::<3>(self.plus).into_owned();
+        self.minus
+            .map_or(plus, |minus| plus - x.fixed_rows::<3>(minus))
+    }
+}
+
+/// Mean and covariance of the errors.
+#[derive(Debug, Clone)]
+pub(super) struct Filter {
+    x: StateVector,
+    p: StateMatrix,
+}
+
+/// Uncertainty at the first sample, 1σ.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub attitude: f64,
+    pub velocity: f64,
+    pub position: f64,
+    pub table: f64,
+}
+
+impl Filter {
+    /// Before the first sample: `parameters` and `attitude` are the means of δθ and φ₀.
+    pub fn new(
+        start: Start,
+        parameters: &ParameterVector,
+        parameter_sigma: &ParameterVector,
+        attitude: Vector3<f64>,
+    ) -> Self {
+        let mut x = StateVector::zeros();
+        x.fixed_rows_mut::<PARAMETERS>(PARAMETER)
+            .copy_from(parameters);
+        x.fixed_rows_mut::<3>(ATTITUDE).copy_from(&attitude);
+        x.fixed_rows_mut::<3>(INITIAL_ATTITUDE).copy_from(&attitude);
+
+        let mut p = StateMatrix::zeros();
+        for (index, sigma) in parameter_sigma.iter().enumerate() {
+            p[(PARAMETER + index, PARAMETER + index)] = sigma.powi(2);
+        }
+        for axis in 0..3 {
+            let mut set = |row: usize, column: usize, sigma: f64| {
+                p[(row + axis, column + axis)] = sigma.powi(2);
+            };
+            // φ starts as φ₀: fully correlated.
+            set(ATTITUDE, ATTITUDE, start.attitude);
+            set(ATTITUDE, INITIAL_ATTITUDE, start.attitude);
+            set(INITIAL_ATTITUDE, ATTITUDE, start.attitude);
+            set(INITIAL_ATTITUDE, INITIAL_ATTITUDE, start.attitude);
+            set(VELOCITY, VELOCITY, start.velocity);
+            set(POSITION, POSITION, start.position);
+            set(TABLE, TABLE, start.table);
+        }
+        Self { x, p }
+    }
+
+    /// Carries mean and covariance over a block. Only its top rows differ from identity, so of
+    /// `Φ P Φᵀ + Q` only the rows and columns of the navigation errors change.
+    pub fn propagate(&mut self, block: &Block) {
+        let PerSensor { gyro, accel } = &block.parameters;
+        let x = block.navigation * self.x.fixed_rows::<NAVIGATION>(0)
+            + gyro * self.x.fixed_rows::<PER_TRIAD>(GYRO)
+            + accel * self.x.fixed_rows::<PER_TRIAD>(ACCEL);
+        self.x.fixed_rows_mut::<NAVIGATION>(0).copy_from(&x);
+
+        let rows = block.navigation * self.p.fixed_view::<NAVIGATION, STATES>(0, 0)
+            + gyro * self.p.fixed_view::<PER_TRIAD, STATES>(GYRO, 0)
+            + accel * self.p.fixed_view::<PER_TRIAD, STATES>(ACCEL, 0);
+        let corner = rows.fixed_view::<NAVIGATION, NAVIGATION>(0, 0) * block.navigation.transpose()
+            + rows.fixed_view::<NAVIGATION, PER_TRIAD>(0, GYRO) * gyro.transpose()
+            + rows.fixed_view::<NAVIGATION, PER_TRIAD>(0, ACCEL) * accel.transpose()
+            + block.noise;
+        let corner = (corner + corner.transpose()) * 0.5;
+        self.p
+            .fixed_view_mut::<NAVIGATION, NAVIGATION>(0, 0)
+            .copy_from(&corner);
+        let side = rows.fixed_view::<NAVIGATION, CONSTANT>(0, NAVIGATION);
+        self.p
+            .fixed_view_mut::<NAVIGATION, CONSTANT>(0, NAVIGATION)
+            .copy_from(&side);
+        self.p
+            .fixed_view_mut::<CONSTANT, NAVIGATION>(NAVIGATION, 0)
+            .copy_from(&side.transpose());
+    }
+
+    /// The innovation of an observed difference in units of its own σ, its components independent:
+    /// `L⁻¹ (z − H x)` with `L Lᵀ = H P Hᵀ + R`, `R` the same variance on all axes.
+    /// `None` if that is not positive definite.
+    pub fn whitened(&self, sight: Sight, z: &Vector3<f64>, variance: f64) -> Option<Vector3<f64>> {
+        let corner = |row: usize, column: usize| self.p.fixed_view::<3, 3>(row, column);
+        let mut s = corner(sight.plus, sight.plus) + Matrix3::identity() * variance;
+        if let Some(minus) = sight.minus {
+            s += corner(minus, minus) - corner(sight.plus, minus) - corner(minus, sight.plus);
+        }
+        s.cholesky()?
+            .l()
+            .solve_lower_triangular(&(z - sight.of(&self.x)))
+    }
+
+    /// Takes in an observed difference, one scalar after the other, in Joseph's form, which keeps
+    /// the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
+    /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
+    pub fn observe(&mut self, sight: Sight, z: &Vector3<f64>, variance: f64) {
+        for axis in 0..3 {
+            let plus = sight.plus + axis;
+            let minus = sight.minus.map(|minus| minus + axis);
+            let across = |p: &StateMatrix| -> StateVector {
+                let column = p.column(plus).into_owned();
+                minus.map_or(column, |minus| column - p.column(minus))
+            };
+            let along = |v: &StateVector| v[plus] - minus.map_or(0.0, |minus| v[minus]);
+
+            let ph = across(&self.p);
+            let gain = ph / (along(&ph) + variance);
+            self.x += gain * (z[axis] - along(&self.x));
+            // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ.
+            self.p.ger(-1.0, &gain, &ph, 1.0);
+            let rest = gain * variance - across(&self.p);
+            self.p.ger(1.0, &rest, &gain, 1.0);
+        }
+    }
+
+    /// The table has left its position: its error is drawn anew.
+    pub fn redraw_table(&mut self, sigma: f64) {
+        self.x.fixed_rows_mut::<3>(TABLE).fill(0.0);
+        self.p.fixed_rows_mut::<3>(TABLE).fill(0.0);
+        self.p.fixed_columns_mut::<3>(TABLE).fill(0.0);
+        for axis in TABLE..TABLE + 3 {
+            self.p[(axis, axis)] = sigma.powi(2);
+        }
+    }
+
+    /// Estimated errors that a live pass feeds back, taken out of the mean.
+    pub fn take_feedback(&mut self) -> Feedback {
+        let mut take = |index: usize| {
+            let v = self.x.fixed_rows::<3>(index).into_owned();
+            self.x.fixed_rows_mut::<3>(index).fill(0.0);
+            v
+        };
+        let feedback = Feedback {
+            attitude: take(ATTITUDE),
+            velocity: take(VELOCITY),
+            position: take(POSITION),
+            initial_attitude: take(INITIAL_ATTITUDE),
+            parameters: self.parameters(),
+        };
+        self.x.fixed_rows_mut::<PARAMETERS>(PARAMETER).fill(0.0);
+        feedback
+    }
+
+    /// Mean of the parameter errors δθ.
+    pub fn parameters(&self) -> ParameterVector {
+        self.x.fixed_rows::<PARAMETERS>(PARAMETER).into_owned()
+    }
+
+    /// Covariance of the parameter errors.
+    pub fn parameter_covariance(&self) -> ParameterMatrix {
+        self.p
+            .fixed_view::<PARAMETERS, PARAMETERS>(PARAMETER, PARAMETER)
+            .into_owned()
+    }
+
+    /// 1σ of the parameter errors.
+    pub fn parameter_sigma(&self) -> ParameterVector {
+        ParameterVector::from_fn(|i, _| self.p[(PARAMETER + i, PARAMETER + i)].max(0.0).sqrt())
+    }
+
+    /// Mean of the initial attitude error φ₀.
+    pub fn initial_attitude(&self) -> Vector3<f64> {
+        self.x.fixed_rows::<3>(INITIAL_ATTITUDE).into_owned()
+    }
+}
+
+/// What a live pass feeds back.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Feedback {
+    pub attitude: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+    pub position: Vector3<f64>,
+    pub initial_attitude: Vector3<f64>,
+    pub parameters: ParameterVector,
+}
+
+const _: () = assert!(GYRO + PER_TRIAD == ACCEL && NAVIGATION == crate::navigation::NAVIGATION);
+
+#[cfg(test)]
+mod tests {
+    use super::super::states::parameter;
+    use super::*;
+    use crate::imu::Sensor;
+    use crate::navigation::{BlockMatrix, ParameterBlock, State};
+    use approx::assert_relative_eq;
+
+    fn filter() -> Filter {
+        let start = Start {
+            attitude: 3e-4,
+            velocity: 1e-3,
+            position: 1.0,
+            table: 5e-6,
+        };
+        Filter::new(
+            start,
+            &ParameterVector::from_element(1e-4),
+            &ParameterVector::from_element(7e-3),
+            Vector3::new(1e-5, 2e-5, 3e-5),
+        )
+    }
+
+    /// A block with nothing special about it.
+    fn block(seed: f64) -> Block {
+        let wave = |row: usize, column: usize| {
+            (seed + 1.7 * row as f64 + 0.9 * (column * column) as f64).sin()
+        };
+        let noise = BlockMatrix::from_fn(|r, c| 1e-4 * wave(r, c));
+        Block {
+            state: State::at_rest(Matrix3::identity()),
+            duration: 0.1,
+            navigation: BlockMatrix::identity() + BlockMatrix::from_fn(|r, c| 0.1 * wave(r, c)),
+            parameters: PerSensor {
+                gyro: ParameterBlock::from_fn(wave),
+                accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
+            },
+            noise: noise * noise.transpose(),
+        }
+    }
+
+    fn dense_transition(block: &Block) -> StateMatrix {
+        let mut phi = StateMatrix::identity();
+        phi.fixed_view_mut::<9, 9>(0, 0)
+            .copy_from(&block.navigation);
+        for sensor in Sensor::ALL {
+            phi.fixed_view_mut::<9, PER_TRIAD>(0, PARAMETER + parameter(sensor, 0))
+                .copy_from(block.parameters.get(sensor));
+        }
+        phi
+    }
+
+    #[test]
+    fn block_propagation_equals_the_dense_product() {
+        let mut filter = filter();
+        for k in 0..5 {
+            let block = block(f64::from(k));
+            let phi = dense_transition(&block);
+            let mut p = phi * filter.p * phi.transpose();
+            let mut corner = p.fixed_view_mut::<9, 9>(0, 0);
+            corner += block.noise;
+            let x = phi * filter.x;
+            filter.propagate(&block);
+            assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-18);
+            assert_relative_eq!(filter.x, x, max_relative = 1e-12);
+            filter.observe(Sight::TABLE, &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+        }
+    }
+
+    #[test]
+    fn scalar_observations_equal_the_dense_update_with_the_full_gain() {
+        let mut filter = filter();
+        filter.propagate(&block(0.3));
+        let variance = 1e-9;
+        let z = Vector3::new(1e-3, -2e-3, 5e-4);
+        for sight in [Sight::VELOCITY, Sight::TABLE] {
+            let mut h = nalgebra::SMatrix::<f64, 3, STATES>::zeros();
+            for axis in 0..3 {
+                h[(axis, sight.plus + axis)] = 1.0;
+                if let Some(minus) = sight.minus {
+                    h[(axis, minus + axis)] = -1.0;
+                }
+            }
+            let s = h * filter.p * h.transpose() + Matrix3::identity() * variance;
+            let gain = filter.p * h.transpose() * s.try_inverse().unwrap();
+            let x = filter.x + gain * (z - h * filter.x);
+            let p = (StateMatrix::identity() - gain * h) * filter.p;
+            let whitened = filter.whitened(sight, &z, variance).unwrap();
+            let innovation = z - h * filter.x;
+            assert_relative_eq!(
+                whitened.norm_squared(),
+                innovation.dot(&(s.try_inverse().unwrap() * innovation)),
+                max_relative = 1e-9
+            );
+            filter.observe(sight, &z, variance);
+            assert_relative_eq!(filter.x, x, max_relative = 1e-6, epsilon = 1e-12);
+            assert_relative_eq!(filter.p, p, max_relative = 1e-6, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
+        let mut filter = filter();
+        for k in 0..4000 {
+            filter.propagate(&block(f64::from(k) * 0.37));
+            filter.observe(Sight::VELOCITY, &Vector3::zeros(), 1e-12);
+            filter.observe(Sight::TABLE, &Vector3::zeros(), 1e-12);
+            if k % 50 == 0 {
+                filter.redraw_table(5e-6);
+            }
+        }
+        let sigma = filter.parameter_sigma();
+        assert!(sigma.amax() < 1e-5 && sigma.amin() > 0.0, "{sigma}");
+        let scale = filter.p.map_diagonal(|v| 1.0 / v.sqrt());
+        let correlation = StateMatrix::from_fn(|i, j| filter.p[(i, j)] * scale[i] * scale[j]);
+        assert!((correlation - correlation.transpose()).amax() < 1e-9);
+        let smallest = correlation.symmetric_eigenvalues().min();
+        assert!(smallest > 0.0, "smallest eigenvalue {smallest}");
+    }
+}

@@ -1,0 +1,99 @@
+//! What is observed when: the record cut into stretches, each with what its end shows.
+
+use std::ops::Range;
+
+use nalgebra::Matrix3;
+
+use super::CalibrationError;
+use crate::run::{Dwell, Run, TableRecord, mean_attitude};
+
+/// A stretch of samples that one block of the error model covers.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    pub samples: Range<usize>,
+    /// Set where the stretch lies within a dwell.
+    pub standing: Option<Standing>,
+}
+
+/// What is known at the end of a stretch within a dwell.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Standing {
+    /// Whether it is the dwell's first.
+    pub first: bool,
+    /// Mean of the table's readings during the stretch, and how many they were.
+    pub reading: Option<(Matrix3<f64>, usize)>,
+}
+
+/// The whole record from its first dwell to the end of its last.
+#[derive(Debug, Clone)]
+pub(super) struct Schedule {
+    pub steps: Vec<Step>,
+    /// Attitude that the first reading gives; that reading is not used again.
+    pub initial_attitude: Matrix3<f64>,
+}
+
+/// Length of a stretch, s: covariance is propagated and observations are taken at 10 Hz.
+const STRETCH: f64 = 0.1;
+
+impl Schedule {
+    pub fn new(run: &Run, dwells: &[Dwell]) -> Result<Self, CalibrationError> {
+        let table = run.table.as_ref().ok_or(CalibrationError::NoTable)?;
+        let (Some(first), true) = (dwells.first(), dwells.len() > 1) else {
+            return Err(CalibrationError::TooFewDwells {
+                found: dwells.len(),
+                needed: 2,
+            });
+        };
+        let initial = first.readings.start;
+        let mut steps = Vec::new();
+        let mut at = first.samples.start;
+        let stretch = ((STRETCH / run.imu.period).round() as usize).max(1);
+        for dwell in dwells {
+            cut(at..dwell.samples.start, stretch, |samples| {
+                steps.push(Step {
+                    samples,
+                    standing: None,
+                });
+            });
+            let mut unread = dwell.readings.clone();
+            if unread.start == initial {
+                unread.start += 1;
+            }
+            let mut first = true;
+            cut(dwell.samples.clone(), stretch, |samples| {
+                let until = run.imu.time(samples.end) + 1e-3 * run.imu.period;
+                let readings = take_until(&mut unread, table, until);
+                let reading = mean_attitude(&table.attitude[readings.clone()])
+                    .map(|attitude| (attitude, readings.len()));
+                steps.push(Step {
+                    samples,
+                    standing: Some(Standing { first, reading }),
+                });
+                first = false;
+            });
+            at = dwell.samples.end;
+        }
+        Ok(Self {
+            steps,
+            initial_attitude: table.attitude[initial],
+        })
+    }
+}
+
+/// Cuts a range into stretches of this length; the last may be shorter.
+fn cut(range: Range<usize>, stretch: usize, mut each: impl FnMut(Range<usize>)) {
+    let mut start = range.start;
+    while start < range.end {
+        let end = (start + stretch).min(range.end);
+        each(start..end);
+        start = end;
+    }
+}
+
+/// Takes the readings up to a time off the front of those not yet used.
+fn take_until(unread: &mut Range<usize>, table: &TableRecord, until: f64) -> Range<usize> {
+    let taken = table.time[unread.clone()].partition_point(|&t| t <= until);
+    let readings = unread.start..unread.start + taken;
+    unread.start = readings.end;
+    readings
+}
