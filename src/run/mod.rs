@@ -3,6 +3,23 @@
 //! A [`Run`] is in SI, on right-front-up body axes and in normalised outputs (see
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
+mod axes;
+mod csv_file;
+mod error;
+mod fields;
+mod imu_log;
+mod instrument;
+mod quantity;
+mod read;
+pub mod record;
+mod segments;
+mod table_log;
+mod whole;
+
+pub use error::{Place, RunError};
+pub use record::CalibrationRecord;
+pub use whole::{WholeDirectory, write_whole};
+
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
@@ -35,6 +52,8 @@ pub struct Run {
     pub table: Option<TableRecord>,
     /// Labelled sections, if there are any.
     pub segments: Vec<Segment>,
+    /// What the files say that has no effect yet, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// The samples of both triads.
