@@ -287,7 +287,7 @@ mod tests {
             corner += block.noise;
             let x = phi * filter.x;
             filter.propagate(&block);
-            assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-18);
+            assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
             assert_relative_eq!(filter.x, x, max_relative = 1e-12);
             filter.observe(Sight::TABLE, &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
         }

@@ -6,6 +6,8 @@
 //! Inside the crate `N` is divided by the nominal scale of its axis, so that `K ≈ 1` and `D` is in
 //! rad/s or m/s²; [`Nominal`] undoes it at the edges.
 
+use serde::{Deserialize, Serialize};
+
 mod installation;
 mod signal;
 mod triad;
@@ -40,7 +42,7 @@ impl Sensor {
 }
 
 /// One value for the gyros and one for the accelerometers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct PerSensor<T> {
     /// The gyros' value.
     pub gyro: T,

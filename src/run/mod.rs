@@ -3,10 +3,25 @@
 //! A [`Run`] is in SI, on right-front-up body axes and in normalised outputs (see
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
+mod axes;
+mod csv_file;
 mod dwells;
+mod error;
+mod fields;
+mod imu_log;
+mod instrument;
+mod quantity;
+mod read;
+pub mod record;
+mod segments;
+mod table_log;
+mod whole;
 
 pub use dwells::Dwell;
 pub(crate) use dwells::mean_attitude;
+pub use error::{Place, RunError};
+pub use record::CalibrationRecord;
+pub use whole::{WholeDirectory, write_whole};
 
 use std::collections::BTreeMap;
 
@@ -40,6 +55,8 @@ pub struct Run {
     pub table: Option<TableRecord>,
     /// Labelled sections, if there are any.
     pub segments: Vec<Segment>,
+    /// What the files say that has no effect yet, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// The samples of both triads.

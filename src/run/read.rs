@@ -1,0 +1,155 @@
+//! `run.toml` and the files that it names, as one [`Run`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::error::RunError;
+use super::fields::{Document, Fields};
+use super::instrument::Instrument;
+use super::table_log::TableLog;
+use super::{Run, Standstill, segments};
+use crate::earth::Site;
+use crate::units::DEGREE;
+
+/// The version of the format of `run.toml`.
+pub(super) const FORMAT: &str = "turncal-run/1";
+
+/// Fields of `[meta]`.
+const META: [&str; 8] = [
+    "instrument",
+    "serial",
+    "operator",
+    "date",
+    "temperature_degc",
+    "laboratory",
+    "table",
+    "notes",
+];
+
+impl Run {
+    /// Reads `run.toml` and the files that it names, relative to itself.
+    ///
+    /// Everything is checked: every field is known, every number finite and possible, time uniform,
+    /// the files overlap. Samples, nominal scales and priors come back along right-front-up
+    /// whatever `body_axes` says. A bias without a prior mean has the mean zero; no σ has a default.
+    pub fn read(path: &Path) -> Result<Self, RunError> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            RunError::io(path, "read the run", &error, "Give the path of a run.toml.")
+        })?;
+        let document = Document {
+            file: path,
+            text: &text,
+        };
+        let table = document.parse()?;
+        let top = Fields::top(
+            document,
+            &table,
+            &[
+                "format",
+                "site",
+                "meta",
+                "imu",
+                "standstill",
+                "turntable",
+                "segments",
+            ],
+        )?;
+        top.need("format", "the format of this file")?
+            .choice(&[(FORMAT, ())])?;
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let mut notes = Vec::new();
+
+        let site = site(&top)?;
+        let meta = meta(&top)?;
+        let instrument = Instrument::of_fields(&top, directory, &mut notes)?;
+        let standstill = standstill(&top)?;
+        let table_log = TableLog::of_fields(&top, directory, &mut notes)?;
+        let segments_file = match top.table("segments", &["file"])? {
+            Some(fields) => Some(directory.join(fields.need("file", "a file name")?.text()?)),
+            None => None,
+        };
+
+        // The small files' fields are checked before the large files are read.
+        let imu = instrument.log.read()?;
+        let table = table_log.map(|log| log.read(&imu)).transpose()?;
+        let segments = match segments_file {
+            Some(file) => segments::read(&file, &imu)?,
+            None => Vec::new(),
+        };
+        Ok(Self {
+            name: name(path),
+            site,
+            meta,
+            imu,
+            noise: instrument.noise,
+            prior: instrument.prior,
+            nominal: instrument.log.nominal,
+            unit: instrument.unit,
+            standstill,
+            table,
+            segments,
+            notes,
+        })
+    }
+}
+
+/// The name of the directory of a `run.toml`, else the file's own.
+fn name(path: &Path) -> String {
+    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let named = match full.file_name() {
+        Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),
+        _ => full.file_stem(),
+    };
+    named.map_or_else(
+        || "run".to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+fn site(top: &Fields) -> Result<Site, RunError> {
+    let fields = top.need_table(
+        "site",
+        &["latitude_deg", "longitude_deg", "height_m", "gravity_m_s2"],
+        "the place of the turntable",
+    )?;
+    let latitude = fields
+        .need("latitude_deg", "a latitude, north positive")?
+        .within(-90.0, 90.0)?
+        * DEGREE;
+    let longitude = match fields.get("longitude_deg") {
+        Some(field) => field.within(-180.0, 360.0)? * DEGREE,
+        None => 0.0,
+    };
+    // From the shore of the Dead Sea to above any laboratory.
+    let height = fields
+        .need("height_m", "a height above the ellipsoid")?
+        .within(-500.0, 9000.0)?;
+    let mut site = Site::with_normal_gravity(latitude, longitude, height);
+    if let Some(field) = fields.get("gravity_m_s2") {
+        site.gravity = field.within(9.7, 9.9)?;
+    }
+    Ok(site)
+}
+
+fn meta(top: &Fields) -> Result<BTreeMap<String, String>, RunError> {
+    match top.table("meta", &META)? {
+        Some(fields) => fields
+            .all()
+            .map(|(name, field)| Ok((name.to_owned(), field.as_written()?)))
+            .collect(),
+        None => Ok(BTreeMap::new()),
+    }
+}
+
+fn standstill(top: &Fields) -> Result<Standstill, RunError> {
+    let mut standstill = Standstill::default();
+    if let Some(fields) = top.table("standstill", &["velocity_sigma_m_s", "position_sigma_m"])? {
+        if let Some(field) = fields.get("velocity_sigma_m_s") {
+            standstill.velocity_sigma = Some(field.positive()?);
+        }
+        if let Some(field) = fields.get("position_sigma_m") {
+            standstill.position_sigma = field.positive()?;
+        }
+    }
+    Ok(standstill)
+}

@@ -1,0 +1,349 @@
+//! A calibration as a file: `calibration.json` and `truth.json`.
+//!
+//! Values are in the file's quantity (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u)
+//! + bias`, with `u` in rad/s or m/s² along right-front-up.
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{Place, RunError, suggestion};
+use super::whole::write_whole;
+use crate::imu::{InstallationForm, PARAMETERS, PerSensor, Sensor, Triad};
+
+/// The version of the format.
+pub const FORMAT: &str = "turncal-calibration/1";
+
+/// The equation that every record states.
+pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
+
+/// A calibration with its accuracy and how it was reached, or a known truth.
+///
+/// Only the two triads are always there. Unknown fields are ignored when reading.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationRecord {
+    /// Always [`FORMAT`].
+    pub format: String,
+    /// How it was found; none for a truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Method>,
+    /// How angles make the installation matrix.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub installation_form: Option<InstallationForm>,
+    /// What the filter observed; none for a method without filter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aiding: Option<Aiding>,
+    /// What fixes the body axes.
+    #[serde(default)]
+    pub body_frame: BodyFrame,
+    /// The gyros.
+    pub gyro: TriadRecord,
+    /// The accelerometers.
+    pub accel: TriadRecord,
+    /// The file's quantity, such as `count`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<PerSensor<String>>,
+    /// 1σ of every value, zero where fixed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<PerSensor<TriadRecord>>,
+    /// Names of the estimated parameters, such as `gyro.installation.xy`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<String>,
+    /// Covariance of the estimated parameters, in their units.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub covariance: Vec<Vec<f64>>,
+    /// Number of passes over the record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passes: Option<usize>,
+    /// Whether the last pass moved nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converged: Option<bool>,
+    /// Whether the innovations agree with their covariance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<ConsistencyRecord>,
+    /// What must be known before using the values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+    /// Names of parameters that were not estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<String>,
+    /// The model in words, [`EQUATION`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equation: Option<String>,
+    /// The matrix of `u = correction (N − bias)`, ready to use.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<PerSensor<[[f64; 3]; 3]>>,
+    /// Raw outputs with what they are calibrated, to check a user's own code.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub test_vectors: Vec<TestVector>,
+    /// `[meta]` of the run.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub meta: BTreeMap<String, String>,
+}
+
+/// How a calibration was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Extended Kalman filter.
+    Ekf,
+    /// Closed form from static positions.
+    SixPosition,
+}
+
+/// What the filter observed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Aiding {
+    /// Standstill and the table's attitude.
+    Table,
+    /// Standstill only.
+    Velocity,
+}
+
+/// What fixes the body axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BodyFrame {
+    /// The table's mounting face.
+    #[default]
+    Table,
+    /// Accelerometer x along body x, accelerometer y in the xy plane.
+    Accelerometer,
+}
+
+/// Values of one triad.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TriadRecord {
+    /// The file's quantity per second for one rad/s or m/s².
+    pub scale: [f64; 3],
+    /// Row by row, pure numbers.
+    pub installation: [[f64; 3]; 3],
+    /// The file's quantity per second.
+    pub bias: [f64; 3],
+}
+
+/// Normalised innovation squared of all observations, and of each kind apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ConsistencyRecord {
+    /// Of all observations.
+    #[serde(flatten)]
+    pub all: NisRecord,
+    /// Of zero velocity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<NisRecord>,
+    /// Of the table's attitude.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<NisRecord>,
+}
+
+/// Mean of normalised innovations squared with its 95 % interval; one if σ are true.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NisRecord {
+    /// Mean per scalar observation.
+    pub nis: f64,
+    /// 95 % interval (χ²).
+    pub nis_interval: [f64; 2],
+}
+
+/// A raw output of both triads and what it becomes, gyro first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TestVector {
+    /// `N`, in the file's quantity per second.
+    pub raw: [f64; 6],
+    /// `u`, in rad/s and m/s².
+    pub calibrated: [f64; 6],
+}
+
+impl CalibrationRecord {
+    /// A record of the two triads and nothing else, as a truth is.
+    pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            method: None,
+            installation_form: None,
+            aiding: None,
+            body_frame: BodyFrame::default(),
+            gyro,
+            accel,
+            unit: None,
+            sigma: None,
+            parameters: Vec::new(),
+            covariance: Vec::new(),
+            passes: None,
+            converged: None,
+            consistency: None,
+            warnings: Vec::new(),
+            fixed: Vec::new(),
+            equation: None,
+            correction: None,
+            test_vectors: Vec::new(),
+            meta: BTreeMap::new(),
+        }
+    }
+
+    /// Reads and checks a record.
+    pub fn read(path: &Path) -> Result<Self, RunError> {
+        let bytes = std::fs::read(path).map_err(|error| {
+            RunError::io(
+                path,
+                "read the calibration",
+                &error,
+                "Give the path of a calibration.json or truth.json.",
+            )
+        })?;
+        let record: Self = serde_json::from_slice(&bytes).map_err(|error| {
+            let place = Place::Character {
+                line: error.line() as u64,
+                column: error.column() as u64,
+            };
+            RunError::new(
+                path,
+                place,
+                error,
+                format_args!("a calibration in the format {FORMAT}"),
+                "Correct the file or write it again.",
+            )
+        })?;
+        record.check(path)?;
+        Ok(record)
+    }
+
+    /// The record as the bytes of its file, `path` being named in errors.
+    pub fn to_json(&self, path: &Path) -> Result<Vec<u8>, RunError> {
+        self.check(path)?;
+        let mut bytes = serde_json::to_vec_pretty(self).map_err(|error| {
+            RunError::new(
+                path,
+                Place::File,
+                error,
+                "values that JSON can hold",
+                "Nothing was written.",
+            )
+        })?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    /// Writes the record whole or not at all; an existing file only with `force`.
+    pub fn write(&self, path: &Path, force: bool) -> Result<(), RunError> {
+        write_whole(path, &self.to_json(path)?, force)
+    }
+
+    fn check(&self, path: &Path) -> Result<(), RunError> {
+        let error = |found: String, expected: &str, advice: &str| {
+            Err(RunError::new(path, Place::File, found, expected, advice))
+        };
+        if self.format != FORMAT {
+            return error(
+                format!("format = {:?}", self.format),
+                &format!("{FORMAT:?}"),
+                "Give a file that turncal wrote, or convert this one.",
+            );
+        }
+        for (name, triad) in [("gyro", &self.gyro), ("accel", &self.accel)] {
+            if !triad.values().all(f64::is_finite) {
+                return error(
+                    format!("a value in {name} that is not finite"),
+                    "finite numbers",
+                    "The calibration failed; nothing can be done with it.",
+                );
+            }
+            if triad.scale.contains(&0.0) {
+                return error(
+                    format!("{name}.scale with a zero"),
+                    "three scale factors, none of them zero",
+                    "Correct the file.",
+                );
+            }
+        }
+        if let Some(sigma) = &self.sigma {
+            for sensor in Sensor::ALL {
+                if !sigma
+                    .get(sensor)
+                    .values()
+                    .all(|s| s.is_finite() && s >= 0.0)
+                {
+                    return error(
+                        format!("sigma.{} with a value below zero", sensor.name()),
+                        "finite numbers that are zero or above",
+                        "Correct the file.",
+                    );
+                }
+            }
+        }
+        self.check_parameters(path)?;
+        self.check_covariance(path)
+    }
+
+    fn check_parameters(&self, path: &Path) -> Result<(), RunError> {
+        let form = self.installation_form.unwrap_or_default();
+        let known: Vec<String> = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| {
+                (0..PARAMETERS).filter_map(move |p| Triad::parameter_name(sensor, form, p))
+            })
+            .collect();
+        let mut seen = HashSet::new();
+        for (field, names) in [("parameters", &self.parameters), ("fixed", &self.fixed)] {
+            for name in names {
+                let (found, advice) = if !known.contains(name) {
+                    (
+                        format!("`{name}` in {field}"),
+                        suggestion(name, known.iter().map(String::as_str)),
+                    )
+                } else if !seen.insert(name) {
+                    (
+                        format!("`{name}` twice"),
+                        "Name every parameter once.".to_owned(),
+                    )
+                } else {
+                    continue;
+                };
+                let expected =
+                    format!("names of parameters of the {} form, once each", form.name());
+                return Err(RunError::new(path, Place::File, found, expected, advice));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_covariance(&self, path: &Path) -> Result<(), RunError> {
+        let error = |found: String, expected: String| {
+            let advice = "Correct the file, or write the calibration again.";
+            Err(RunError::new(path, Place::File, found, expected, advice))
+        };
+        let size = self.parameters.len();
+        if self.covariance.len() != size {
+            return error(
+                format!("{} rows in covariance", self.covariance.len()),
+                format!("{size}, one for each entry of parameters"),
+            );
+        }
+        for (i, row) in self.covariance.iter().enumerate() {
+            if row.len() != size {
+                return error(
+                    format!("{} values in row {} of covariance", row.len(), i + 1),
+                    format!("{size}, for covariance is square"),
+                );
+            }
+            if !row.iter().all(|value| value.is_finite()) || row[i] < 0.0 {
+                return error(
+                    format!("a value in row {} of covariance that cannot be", i + 1),
+                    "finite numbers, none below zero on the diagonal".to_owned(),
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+impl TriadRecord {
+    fn values(&self) -> impl Iterator<Item = f64> {
+        self.scale
+            .into_iter()
+            .chain(self.installation.into_iter().flatten())
+            .chain(self.bias)
+    }
+}

@@ -1,0 +1,251 @@
+//! The turntable's log: readings of the attitude of its mounting face.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+use super::csv_file::CsvFile;
+use super::error::RunError;
+use super::fields::Fields;
+use super::{ImuRecord, TableRecord};
+use crate::attitude;
+use crate::units::{ARCSEC, DEGREE};
+
+/// Four components printed to four decimals meet it. What is off by more is no quaternion.
+const NORM_TOLERANCE: f64 = 1e-4;
+
+/// How a row gives `C_b_n`; `C` is a column's name or its index.
+pub(super) enum AttitudeColumns<C> {
+    /// `[w, x, y, z]`, body right-front-up to East-North-Up.
+    Quaternion([C; 4]),
+    /// Angles in degrees about the axes of the table, outermost first:
+    /// `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃, inner)`.
+    Angles(Vec<(C, Vector3<f64>)>),
+}
+
+impl<'a> AttitudeColumns<&'a str> {
+    fn of_fields(table: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, RunError> {
+        let axes = table.get("axes").or_else(|| columns.get("axes"));
+        match (columns.get("quaternion"), columns.get("angles"), axes) {
+            (Some(quaternion), None, None) => {
+                let names = quaternion.texts()?.try_into().map_err(|names: Vec<_>| {
+                    quaternion.error(
+                        format_args!("{} columns", names.len()),
+                        "four, in the order w, x, y, z",
+                        "Name all four.",
+                    )
+                })?;
+                Ok(Self::Quaternion(names))
+            }
+            (None, Some(angles), Some(axes)) => {
+                let names = angles.texts()?;
+                let letters = axes.texts()?;
+                if names.is_empty() || names.len() != letters.len() {
+                    return Err(angles.error(
+                        format_args!("{} angles for {} axes", names.len(), letters.len()),
+                        "one angle for each axis, outermost first",
+                        "Complete `angles` or `axes`.",
+                    ));
+                }
+                let pairs = names.into_iter().zip(letters).map(|(name, letter)| {
+                    let axis = match letter {
+                        "x" => Vector3::x(),
+                        "y" => Vector3::y(),
+                        "z" => Vector3::z(),
+                        _ => {
+                            return Err(axes.error(
+                            format_args!("`{letter}`"),
+                            "`x`, `y` or `z` for each axis",
+                            "Name the axis about which the table turns when all angles are zero.",
+                        ));
+                        }
+                    };
+                    Ok((name, axis))
+                });
+                Ok(Self::Angles(pairs.collect::<Result<_, RunError>>()?))
+            }
+            (None, Some(_), None) => Err(table.missing("axes", "the axes of the angles")),
+            (Some(quaternion), _, _) => Err(quaternion.error(
+                "columns beside `angles` or `axes`",
+                "either a quaternion or angles with their axes",
+                "Remove one of them.",
+            )),
+            (None, None, _) => {
+                Err(columns.missing("quaternion", "the columns of a quaternion or of `angles`"))
+            }
+        }
+    }
+
+    fn find(&self, csv: &CsvFile) -> Result<AttitudeColumns<usize>, RunError> {
+        Ok(match self {
+            Self::Quaternion([w, x, y, z]) => AttitudeColumns::Quaternion([
+                csv.column(w)?,
+                csv.column(x)?,
+                csv.column(y)?,
+                csv.column(z)?,
+            ]),
+            Self::Angles(angles) => AttitudeColumns::Angles(
+                angles
+                    .iter()
+                    .map(|&(name, axis)| Ok((csv.column(name)?, axis)))
+                    .collect::<Result<_, RunError>>()?,
+            ),
+        })
+    }
+}
+
+impl AttitudeColumns<usize> {
+    fn reading(&self, csv: &CsvFile) -> Result<Matrix3<f64>, RunError> {
+        match self {
+            &Self::Quaternion([w, x, y, z]) => {
+                let quaternion = Quaternion::new(
+                    csv.number(w)?,
+                    csv.number(x)?,
+                    csv.number(y)?,
+                    csv.number(z)?,
+                );
+                let norm = quaternion.norm();
+                if (norm - 1.0).abs() > NORM_TOLERANCE {
+                    return Err(csv.error_here(
+                        format_args!("a quaternion of norm {norm:.6}"),
+                        format_args!("1 within {NORM_TOLERANCE}"),
+                        "Correct the row, or the order of columns in run.toml: w, x, y, z.",
+                    ));
+                }
+                Ok(UnitQuaternion::from_quaternion(quaternion)
+                    .to_rotation_matrix()
+                    .into_inner())
+            }
+            Self::Angles(angles) => {
+                let mut c_b_n = Matrix3::identity();
+                for &(column, axis) in angles {
+                    c_b_n *= attitude::exp(axis * (csv.number(column)? * DEGREE));
+                }
+                Ok(c_b_n)
+            }
+        }
+    }
+}
+
+/// What `run.toml` says of the file.
+pub(super) struct TableLog<'a> {
+    pub file: PathBuf,
+    pub time: &'a str,
+    pub attitude: AttitudeColumns<&'a str>,
+    /// rad
+    pub position_sigma: f64,
+    /// rad
+    pub reading_sigma: f64,
+}
+
+impl<'a> TableLog<'a> {
+    /// Reads the fields of `[turntable]`, if it is there; remarks on those without effect go to
+    /// `notes`.
+    pub fn of_fields(
+        top: &Fields<'a>,
+        directory: &Path,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Self>, RunError> {
+        let without_effect = [
+            "level_sigma_arcsec",
+            "north_sigma_arcsec",
+            "nonorthogonality_sigma_arcsec",
+            "time_sigma_ms",
+        ];
+        let mut known = vec![
+            "file",
+            "columns",
+            "axes",
+            "position_sigma_arcsec",
+            "reading_sigma_arcsec",
+        ];
+        known.extend(without_effect);
+        let Some(fields) = top.table("turntable", &known)? else {
+            return Ok(None);
+        };
+        let columns = fields.need_table(
+            "columns",
+            &["time", "quaternion", "angles", "axes"],
+            "the names of the columns",
+        )?;
+        let attitude = AttitudeColumns::of_fields(&fields, &columns)?;
+        for name in without_effect {
+            let Some(field) = fields.get(name) else {
+                continue;
+            };
+            let sigma = field.positive()?;
+            if name == "nonorthogonality_sigma_arcsec"
+                && matches!(attitude, AttitudeColumns::Quaternion(_))
+            {
+                return Err(field.error(
+                    sigma,
+                    "it with `angles` only, for a quaternion does not tell the axes apart",
+                    "Remove it, or give the angles of the table's axes.",
+                ));
+            }
+            notes.push(format!("turntable.{name} is read but has no effect yet."));
+        }
+        let sigma = |name| -> Result<f64, RunError> {
+            Ok(fields.need(name, "a 1σ in seconds of arc")?.positive()? * ARCSEC)
+        };
+        Ok(Some(Self {
+            file: directory.join(fields.need("file", "a file name")?.text()?),
+            time: columns.need("time", "the name of a column")?.text()?,
+            attitude,
+            position_sigma: sigma("position_sigma_arcsec")?,
+            reading_sigma: sigma("reading_sigma_arcsec")?,
+        }))
+    }
+
+    /// Reads the log of a run with these samples.
+    pub fn read(&self, imu: &ImuRecord) -> Result<TableRecord, RunError> {
+        let mut csv = CsvFile::open(&self.file)?;
+        let time_column = csv.column(self.time)?;
+        let columns = self.attitude.find(&csv)?;
+
+        let mut time: Vec<f64> = Vec::new();
+        let mut attitude = Vec::new();
+        while csv.advance()? {
+            let now = csv.number(time_column)?;
+            if let Some(&before) = time.last()
+                && now <= before
+            {
+                return Err(csv.error_here(
+                    if now == before {
+                        format!("time {now} s again, a duplicate of the row before")
+                    } else {
+                        format!("time going back from {before} s to {now} s")
+                    },
+                    "times that increase",
+                    "Remove the row or put the rows in order.",
+                ));
+            }
+            time.push(now);
+            attitude.push(columns.reading(&csv)?);
+        }
+        let (first, last) = match time.as_slice() {
+            [first, .., last] => (*first, *last),
+            _ => {
+                return Err(csv.error(
+                    format_args!("{} rows of readings", time.len()),
+                    "at least 2",
+                    "Log the table over the whole run, or remove [turntable].",
+                ));
+            }
+        };
+        let (start, end) = (imu.start, imu.time(imu.len()));
+        if last < start || first > end {
+            return Err(csv.error(
+                format_args!("readings from {first} s to {last} s"),
+                format_args!("times that overlap the IMU record, {start} s to {end} s"),
+                "Bring both files to one clock.",
+            ));
+        }
+        Ok(TableRecord {
+            time,
+            attitude,
+            position_sigma: self.position_sigma,
+            reading_sigma: self.reading_sigma,
+        })
+    }
+}

@@ -1,0 +1,194 @@
+//! Output that appears whole or not at all: written beside its place, then renamed into it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use super::error::{Place, RunError};
+
+/// A place that something new is going to take.
+struct Stage {
+    /// Holds the new thing and, while they change places, the old one. Goes away on drop.
+    beside: TempDir,
+    target: PathBuf,
+    force: bool,
+}
+
+impl Stage {
+    fn new(target: &Path, force: bool) -> Result<Self, RunError> {
+        if target.file_name().is_none() {
+            return Err(RunError::new(
+                target,
+                Place::File,
+                "a path without a name of its own",
+                "the name of something to be written",
+                "Give a name that does not end in `..` or `/`.",
+            ));
+        }
+        let parent = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        let beside = fs::create_dir_all(parent)
+            .and_then(|()| {
+                tempfile::Builder::new()
+                    .prefix(".turncal-")
+                    .tempdir_in(parent)
+            })
+            .map_err(|error| {
+                RunError::io(
+                    target,
+                    "write here",
+                    &error,
+                    "Choose a directory that can be written.",
+                )
+            })?;
+        Ok(Self {
+            beside,
+            target: target.to_owned(),
+            force,
+        })
+    }
+
+    fn new_path(&self) -> PathBuf {
+        self.beside.path().join("new")
+    }
+
+    /// Puts the new thing in its place.
+    fn commit(self) -> Result<(), RunError> {
+        let old = self.beside.path().join("old");
+        let exists = fs::symlink_metadata(&self.target).is_ok();
+        if exists && !self.force {
+            return Err(taken(&self.target));
+        }
+        let refused = |error| {
+            let advice = "Choose a directory that can be written.";
+            RunError::io(&self.target, "put the output in place", &error, advice)
+        };
+        if exists {
+            fs::rename(&self.target, &old).map_err(refused)?;
+        }
+        let Err(error) = fs::rename(self.new_path(), &self.target) else {
+            return Ok(());
+        };
+        if exists && fs::rename(&old, &self.target).is_err() {
+            let kept = self.beside.keep();
+            let doing = format!(
+                "put the output in place; the old one is in {}",
+                kept.display()
+            );
+            return Err(RunError::io(
+                &self.target,
+                &doing,
+                &error,
+                "Move it back by hand.",
+            ));
+        }
+        Err(refused(error))
+    }
+}
+
+fn taken(target: &Path) -> RunError {
+    RunError::new(
+        target,
+        Place::File,
+        "something of this name already",
+        "a name that is free",
+        "Choose another name, or give --force to replace it.",
+    )
+}
+
+/// A directory in the making. Dropped without [`Self::commit`] it leaves nothing behind.
+pub struct WholeDirectory {
+    stage: Stage,
+}
+
+impl WholeDirectory {
+    /// Begins a directory that will appear at `target`.
+    ///
+    /// An existing directory is replaced only with `force`, a file never, and never a directory that
+    /// holds one of `inputs` or the current directory: replacing it would delete them.
+    pub fn create(target: &Path, force: bool, inputs: &[&Path]) -> Result<Self, RunError> {
+        if let Ok(existing) = fs::symlink_metadata(target) {
+            if !force {
+                return Err(taken(target));
+            }
+            if !existing.is_dir() {
+                return Err(RunError::new(
+                    target,
+                    Place::File,
+                    "a file of this name",
+                    "a directory or nothing",
+                    "Choose another name or remove the file.",
+                ));
+            }
+            let inside = |path: &Path| match (path.canonicalize(), target.canonicalize()) {
+                (Ok(path), Ok(target)) => path.starts_with(target),
+                _ => false,
+            };
+            let held = inputs
+                .iter()
+                .copied()
+                .chain([Path::new(".")])
+                .find(|path| inside(path));
+            if let Some(held) = held {
+                return Err(RunError::new(
+                    target,
+                    Place::File,
+                    format_args!("a directory that holds {}", held.display()),
+                    "one that can be replaced",
+                    "Choose another name; replacing this one would delete what is still needed.",
+                ));
+            }
+        }
+        let stage = Stage::new(target, force)?;
+        fs::create_dir(stage.new_path()).map_err(|error| {
+            RunError::io(
+                target,
+                "write here",
+                &error,
+                "Choose a directory that can be written.",
+            )
+        })?;
+        Ok(Self { stage })
+    }
+
+    /// Where to write until then.
+    pub fn path(&self) -> PathBuf {
+        self.stage.new_path()
+    }
+
+    /// Puts the directory in its place.
+    pub fn commit(self) -> Result<(), RunError> {
+        self.stage.commit()
+    }
+}
+
+/// Writes a file whole or not at all; an existing one is replaced only with `force`, a directory
+/// never.
+pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), RunError> {
+    match fs::symlink_metadata(path) {
+        Ok(_) if !force => return Err(taken(path)),
+        Ok(existing) if existing.is_dir() => {
+            return Err(RunError::new(
+                path,
+                Place::File,
+                "a directory of this name",
+                "a file or nothing",
+                "Choose another name.",
+            ));
+        }
+        _ => {}
+    }
+    let stage = Stage::new(path, force)?;
+    fs::write(stage.new_path(), bytes).map_err(|error| {
+        RunError::io(
+            path,
+            "write the file",
+            &error,
+            "Make room or choose another place.",
+        )
+    })?;
+    stage.commit()
+}
