@@ -15,5 +15,8 @@ pub mod attitude;
 pub mod calibration;
 pub mod earth;
 pub mod imu;
+pub mod models;
 pub mod run;
+pub mod simulation;
+pub mod turntable;
 pub mod units;

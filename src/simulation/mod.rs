@@ -1,0 +1,196 @@
+//! Simulated runs with known truth: an instrument on a table that is driven along a path.
+//!
+//! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its
+//! readings draw from generators of their own, so that changing one leaves the others as they were.
+
+mod increments;
+mod scenario;
+
+use nalgebra::{Matrix3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+pub use increments::{Integrator, true_increments};
+pub use scenario::{Given, Scenario};
+
+use crate::attitude::exp;
+use crate::imu::{NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
+use crate::run::{ImuRecord, Run, Standstill, TableRecord};
+use crate::turntable::{Imperfection, Motion, TableError};
+
+/// A run and what it was made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// What a laboratory would have recorded.
+    pub run: Run,
+    /// The instrument's true parameters.
+    pub truth: PerSensor<Triad>,
+    /// What a sample holds when the run is written to a file.
+    pub output: Output,
+}
+
+/// What draws random numbers, each from a stream of its own.
+#[derive(Clone, Copy)]
+enum Draws {
+    GyroTruth,
+    AccelTruth,
+    GyroNoise,
+    AccelNoise,
+    Imperfection,
+    Positions,
+    Readings,
+}
+
+impl Draws {
+    const COUNT: u64 = 8;
+
+    fn generator(self, seed: u64, stream: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream.wrapping_mul(Self::COUNT) + self as u64);
+        rng
+    }
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| StandardNormal.sample(rng))
+}
+
+impl Scenario {
+    /// Simulates one run. The same seed and stream give the same bits; a Monte Carlo keeps the seed
+    /// and counts the stream.
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
+        let mut rng = Draws::Imperfection.generator(seed, stream);
+        let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
+        let motion = Motion::new(&self.table, &self.path, &imperfection)?;
+        let read = Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))?;
+        let ideal = true_increments(&motion, &self.site, &self.integrator);
+
+        let truth = PerSensor::from_fn(|sensor| {
+            let draws = match sensor {
+                Sensor::Gyro => Draws::GyroTruth,
+                Sensor::Accel => Draws::AccelTruth,
+            };
+            self.draw_truth(sensor, &mut draws.generator(seed, stream))
+        });
+        let nominal = PerSensor::from_fn(|sensor| {
+            let per_unit = match self.output {
+                Output::Pulse => 1.0 / self.instrument.pulse.get(sensor),
+                Output::Increment | Output::Rate => 1.0,
+            };
+            Nominal(Vector3::repeat(per_unit))
+        });
+        let pulse = match self.output {
+            Output::Pulse => self.instrument.pulse,
+            Output::Increment | Output::Rate => PerSensor::default(),
+        };
+        let unit = PerSensor::from_fn(|sensor| {
+            match (self.output, sensor) {
+                (Output::Pulse, _) => "count",
+                (Output::Increment, Sensor::Gyro) => "rad",
+                (Output::Increment, Sensor::Accel) => "m/s",
+                (Output::Rate, Sensor::Gyro) => "rad/s",
+                (Output::Rate, Sensor::Accel) => "m/s^2",
+            }
+            .to_owned()
+        });
+        let sensed = |sensor: Sensor, draws: Draws, ideal: &[Vector3<f64>]| {
+            self.sensed(
+                truth.get(sensor),
+                sensor,
+                ideal,
+                draws.generator(seed, stream),
+            )
+        };
+        let run = Run {
+            name: self.name.clone(),
+            site: self.site,
+            meta: [
+                ("instrument", &self.instrument.name),
+                ("table", &self.table_name),
+            ]
+            .map(|(key, value)| (key.to_owned(), value.clone()))
+            .into(),
+            imu: ImuRecord {
+                start: 0.0,
+                period: self.integrator.period,
+                continuous: true,
+                gyro: sensed(Sensor::Gyro, Draws::GyroNoise, &ideal.gyro),
+                accel: sensed(Sensor::Accel, Draws::AccelNoise, &ideal.accel),
+                pulse,
+            },
+            noise: self.instrument.noise,
+            prior: PerSensor::from_fn(|sensor| self.instrument.prior(sensor, &self.installation)),
+            nominal,
+            unit,
+            standstill: Standstill {
+                velocity_sigma: None,
+                position_sigma: Standstill::default()
+                    .position_sigma
+                    .max(self.integrator.lever_arm.norm()),
+            },
+            table: Some(self.readings(&read, seed, stream)),
+            segments: Vec::new(),
+        };
+        Ok(Simulated {
+            run,
+            truth,
+            output: self.output,
+        })
+    }
+
+    fn sensed(
+        &self,
+        triad: &Triad,
+        sensor: Sensor,
+        ideal: &[Vector3<f64>],
+        mut rng: ChaCha8Rng,
+    ) -> Vec<Vector3<f64>> {
+        let period = self.integrator.period;
+        let sensitivity = triad.sensitivity();
+        let bias = triad.bias * period;
+        let pulse = *self.instrument.pulse.get(sensor);
+        let mut noise = NoiseSource::new(*self.instrument.noise.get(sensor), period, &mut rng);
+        let mut pulses = Pulses::default();
+        ideal
+            .iter()
+            .map(|u| {
+                let increment = sensitivity * u + bias + noise.draw(&mut rng);
+                match self.output {
+                    Output::Pulse => pulses.count(increment / pulse) * pulse,
+                    Output::Increment | Output::Rate => increment,
+                }
+            })
+            .collect()
+    }
+
+    /// The table's log: `exp(−[τ×]) C_b_n`, τ the error of the position in force and white noise.
+    fn readings(&self, motion: &Motion, seed: u64, stream: u64) -> TableRecord {
+        let errors = &self.table.errors;
+        let mut positions = Draws::Positions.generator(seed, stream);
+        let mut readings = Draws::Readings.generator(seed, stream);
+        let mut position = 0;
+        let mut of_position = normal(&mut positions) * errors.position;
+        let count = (motion.duration() * self.reading_rate + 1e-6) as usize;
+        let (time, attitude): (Vec<f64>, Vec<Matrix3<f64>>) = (0..=count)
+            .map(|k| k as f64 / self.reading_rate)
+            .map(|time| {
+                while position < motion.position(time) {
+                    position += 1;
+                    of_position = normal(&mut positions) * errors.position;
+                }
+                let tau = of_position + normal(&mut readings) * errors.reading;
+                (time, exp(-tau) * motion.at(time).attitude)
+            })
+            .unzip();
+        TableRecord {
+            time,
+            attitude,
+            position_sigma: errors.position,
+            reading_sigma: errors.reading,
+        }
+    }
+}
