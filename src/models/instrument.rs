@@ -1,0 +1,253 @@
+//! Instruments and installations: what a grade of instrument is before it is calibrated.
+
+use nalgebra::{SVector, Vector3};
+use serde::Deserialize;
+
+use super::{Finite, ModelError, NonNegative, Positive, Room, read};
+use crate::imu::{ANGLES, Instability, InstallationForm, Noise, PerSensor, Prior, Sensor};
+use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
+
+/// A grade of instrument.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instrument {
+    /// Its name.
+    pub name: String,
+    /// Size of one pulse, rad and m/s.
+    pub pulse: PerSensor<f64>,
+    /// Noise.
+    pub noise: PerSensor<Noise>,
+    /// How one instrument of the grade differs from the next before calibration.
+    pub variation: PerSensor<Variation>,
+}
+
+/// How a triad's scale factors and biases differ between instruments of a grade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variation {
+    /// Scale factor − 1.
+    pub scale: Spread,
+    /// Bias, rad/s or m/s².
+    pub bias: Spread,
+}
+
+/// How a quantity is distributed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    mean: f64,
+    shape: Shape,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Shape {
+    /// Uniform within ± this.
+    Uniform(f64),
+    /// Normal with this 1σ.
+    Normal(f64),
+}
+
+impl Spread {
+    /// Its mean.
+    pub fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// Its standard deviation; a uniform ±a has a/√3.
+    pub fn sigma(&self) -> f64 {
+        match self.shape {
+            Shape::Uniform(half_width) => half_width / 3f64.sqrt(),
+            Shape::Normal(sigma) => sigma,
+        }
+    }
+
+    /// One draw.
+    pub fn draw(&self, rng: &mut impl rand::Rng) -> f64 {
+        use rand_distr::{Distribution, StandardNormal, StandardUniform};
+        self.mean
+            + match self.shape {
+                Shape::Uniform(half_width) => {
+                    let unit: f64 = StandardUniform.sample(rng);
+                    half_width * (2.0 * unit - 1.0)
+                }
+                Shape::Normal(sigma) => {
+                    let unit: f64 = StandardNormal.sample(rng);
+                    sigma * unit
+                }
+            }
+    }
+}
+
+/// An installation form and how large its angles are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InstallationModel {
+    /// The form.
+    pub form: InstallationForm,
+    /// Each angle, rad.
+    pub angles: Spread,
+}
+
+impl InstallationModel {
+    /// Reads one by embedded name or path.
+    ///
+    /// # Errors
+    /// If there is none of that name or it is malformed.
+    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
+        let (file, _): (InstallationFile, _) = read(Room::Installation, name_or_path)?;
+        Ok(Self {
+            form: file.form,
+            angles: file.angles_deg.times(DEGREE),
+        })
+    }
+
+    /// One draw of as many angles as any form has, so that what is drawn after them does not depend
+    /// on the form.
+    pub fn draw(&self, rng: &mut impl rand::Rng) -> SVector<f64, ANGLES> {
+        let mut angles = SVector::<f64, ANGLES>::from_fn(|_, _| self.angles.draw(rng));
+        angles
+            .rows_range_mut(self.form.angle_names().len()..)
+            .fill(0.0);
+        angles
+    }
+}
+
+impl Instrument {
+    /// Reads one by embedded name or path.
+    ///
+    /// # Errors
+    /// If there is none of that name or it is malformed.
+    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
+        let (file, name): (InstrumentFile, _) = read(Room::Imu, name_or_path)?;
+        let InstrumentFile { gyro, accel, .. } = file;
+        Ok(Self {
+            name,
+            pulse: PerSensor {
+                gyro: gyro.pulse_arcsec.0 * ARCSEC,
+                accel: accel.pulse_um_per_s.0 * 1e-6,
+            },
+            noise: PerSensor {
+                gyro: Noise {
+                    random_walk: gyro.angle_random_walk_deg_per_sqrt_h.0 * DEG_PER_SQRT_H,
+                    instability: gyro.instability.map(|i| Instability {
+                        sigma: i.sigma_deg_per_h.0 * DEG_PER_H,
+                        correlation_time: i.correlation_time_s.0,
+                    }),
+                },
+                accel: Noise {
+                    random_walk: accel.velocity_random_walk_ug_per_sqrt_hz.0 * MICRO_G_PER_SQRT_HZ,
+                    instability: accel.instability.map(|i| Instability {
+                        sigma: i.sigma_ug.0 * MICRO_G,
+                        correlation_time: i.correlation_time_s.0,
+                    }),
+                },
+            },
+            variation: PerSensor {
+                gyro: Variation {
+                    scale: gyro.scale_ppm.times(PPM),
+                    bias: gyro.bias_deg_per_h.times(DEG_PER_H),
+                },
+                accel: Variation {
+                    scale: accel.scale_ppm.times(PPM),
+                    bias: accel.bias_ug.times(MICRO_G),
+                },
+            },
+        })
+    }
+
+    /// What is known of a triad of this grade before calibration.
+    pub fn prior(&self, sensor: Sensor, installation: &InstallationModel) -> Prior {
+        let Variation { scale, bias } = self.variation.get(sensor);
+        Prior {
+            scale_sigma: Vector3::repeat(scale.sigma()),
+            installation_sigma: Vector3::repeat(installation.angles.sigma()),
+            bias: Vector3::repeat(bias.mean()),
+            bias_sigma: Vector3::repeat(bias.sigma()),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InstallationFile {
+    form: InstallationForm,
+    angles_deg: SpreadFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InstrumentFile {
+    gyro: GyroFile,
+    accel: AccelFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GyroFile {
+    pulse_arcsec: Positive,
+    angle_random_walk_deg_per_sqrt_h: NonNegative,
+    instability: Option<GyroInstabilityFile>,
+    scale_ppm: SpreadFile,
+    bias_deg_per_h: SpreadFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AccelFile {
+    pulse_um_per_s: Positive,
+    velocity_random_walk_ug_per_sqrt_hz: NonNegative,
+    instability: Option<AccelInstabilityFile>,
+    scale_ppm: SpreadFile,
+    bias_ug: SpreadFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GyroInstabilityFile {
+    sigma_deg_per_h: NonNegative,
+    correlation_time_s: Positive,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AccelInstabilityFile {
+    sigma_ug: NonNegative,
+    correlation_time_s: Positive,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "SpreadFields")]
+struct SpreadFile(Spread);
+
+impl SpreadFile {
+    fn times(self, unit: f64) -> Spread {
+        let Spread { mean, shape } = self.0;
+        Spread {
+            mean: mean * unit,
+            shape: match shape {
+                Shape::Uniform(half_width) => Shape::Uniform(half_width * unit),
+                Shape::Normal(sigma) => Shape::Normal(sigma * unit),
+            },
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SpreadFields {
+    mean: Option<Finite>,
+    uniform: Option<Positive>,
+    sigma: Option<Positive>,
+}
+
+impl TryFrom<SpreadFields> for SpreadFile {
+    type Error = &'static str;
+
+    fn try_from(fields: SpreadFields) -> Result<Self, Self::Error> {
+        let shape = match (fields.uniform, fields.sigma) {
+            (Some(half_width), None) => Shape::Uniform(half_width.0),
+            (None, Some(sigma)) => Shape::Normal(sigma.0),
+            _ => return Err("expected either uniform = (half width) or sigma = (1σ)"),
+        };
+        Ok(Self(Spread {
+            mean: fields.mean.map_or(0.0, |mean| mean.0),
+            shape,
+        }))
+    }
+}

@@ -1,0 +1,289 @@
+//! Turntables and their paths.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
+
+use super::{Finite, ModelError, NonNegative, Positive, Room, read};
+use crate::attitude::from_pitch_roll_heading;
+use crate::earth::Site;
+use crate::turntable::{AxesStep, Axis, BodyStep, Moves, Path, Rotation, Table, TableErrors};
+use crate::units::{ARCSEC, DEGREE};
+
+/// Reads a turntable by embedded name or path; returns the name to show beside it.
+///
+/// # Errors
+/// If there is none of that name or it is malformed.
+pub fn turntable(name_or_path: &str) -> Result<(Table, String), ModelError> {
+    let (file, name): (TableFile, _) = read(Room::Turntable, name_or_path)?;
+    let axes = file.axis.into_iter().map(|axis| Axis {
+        name: axis.name,
+        direction: axis.direction.0,
+        max_rate: axis.max_rate_deg_per_s.0 * DEGREE,
+        max_acceleration: axis.max_acceleration_deg_per_s2.0 * DEGREE,
+    });
+    let errors = file.errors;
+    let table = Table {
+        axes: axes.collect(),
+        mount: attitude(file.mount_deg),
+        errors: TableErrors {
+            position: errors.position_arcsec.0 * ARCSEC,
+            reading: errors.reading_arcsec.0 * ARCSEC,
+            level: errors.level_arcsec.0 * ARCSEC,
+            north: errors.north_arcsec.0 * ARCSEC,
+            nonorthogonality: errors.nonorthogonality_arcsec.0 * ARCSEC,
+            wobble: errors.wobble_arcsec.0 * ARCSEC,
+        },
+    };
+    if table.axes.is_empty() {
+        return Err(ModelError::Inconsistent {
+            file: name,
+            message: "a table without axes; give one [[axis]] each, outermost first".into(),
+        });
+    }
+    Ok((table, name))
+}
+
+/// Reads a path by embedded name or path of its file; returns the name to show beside it. Directions
+/// such as `earth-rate` are those of the site.
+///
+/// # Errors
+/// If there is none of that name or it is malformed.
+pub fn path(name_or_path: &str, site: &Site) -> Result<(Path, String), ModelError> {
+    let (file, name): (PathFile, _) = read(Room::Path, name_or_path)?;
+    let moves = match (file.axes, file.body) {
+        (Some(moves), None) => moves.in_radians(),
+        (None, Some(moves)) => moves.in_radians(site),
+        _ => {
+            return Err(ModelError::Inconsistent {
+                file: name,
+                message: "expected either [axes] or [body], whichever the path turns about".into(),
+            });
+        }
+    };
+    Ok((
+        Path {
+            first_dwell: file.first_dwell_s.0,
+            moves,
+        },
+        name,
+    ))
+}
+
+fn radians(degrees: &[Finite]) -> Vec<f64> {
+    degrees.iter().map(|angle| angle.0 * DEGREE).collect()
+}
+
+fn attitude(pitch_roll_heading: [Finite; 3]) -> Matrix3<f64> {
+    let [pitch, roll, heading] = pitch_roll_heading.map(|angle| angle.0 * DEGREE);
+    from_pitch_roll_heading(pitch, roll, heading)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TableFile {
+    #[serde(default)]
+    mount_deg: [Finite; 3],
+    #[serde(default)]
+    errors: ErrorsFile,
+    axis: Vec<AxisFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisFile {
+    name: String,
+    direction: DirectionFile,
+    max_rate_deg_per_s: Positive,
+    max_acceleration_deg_per_s2: Positive,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct ErrorsFile {
+    position_arcsec: NonNegative,
+    reading_arcsec: NonNegative,
+    level_arcsec: NonNegative,
+    north_arcsec: NonNegative,
+    nonorthogonality_arcsec: NonNegative,
+    wobble_arcsec: NonNegative,
+}
+
+/// A coordinate axis or any other direction, as a unit vector.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "[f64; 3]")]
+struct DirectionFile(Vector3<f64>);
+
+impl TryFrom<[f64; 3]> for DirectionFile {
+    type Error = &'static str;
+
+    fn try_from(components: [f64; 3]) -> Result<Self, Self::Error> {
+        Vector3::from(components)
+            .try_normalize(1e-6)
+            .filter(|unit| unit.iter().all(|component| component.is_finite()))
+            .map(Self)
+            .ok_or("expected three components, not all zero")
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathFile {
+    first_dwell_s: NonNegative,
+    axes: Option<AxesFile>,
+    body: Option<BodyFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxesFile {
+    start_deg: Vec<Finite>,
+    rate_deg_per_s: Positive,
+    acceleration_deg_per_s2: Positive,
+    dwell_s: NonNegative,
+    steps: Vec<AxesStepFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxesStepFile {
+    turn_deg: Vec<Finite>,
+    rate_deg_per_s: Option<Positive>,
+    dwell_s: Option<NonNegative>,
+}
+
+impl AxesFile {
+    fn in_radians(&self) -> Moves {
+        let step = |step: &AxesStepFile| AxesStep {
+            angles: radians(&step.turn_deg),
+            rate: step.rate_deg_per_s.unwrap_or(self.rate_deg_per_s).0 * DEGREE,
+            acceleration: self.acceleration_deg_per_s2.0 * DEGREE,
+            dwell: step.dwell_s.unwrap_or(self.dwell_s).0,
+        };
+        Moves::Axes {
+            start: radians(&self.start_deg),
+            steps: self.steps.iter().map(step).collect(),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BodyFile {
+    start_pitch_roll_heading_deg: [Finite; 3],
+    acceleration_deg_per_s2: Positive,
+    move_s: Positive,
+    dwell_s: NonNegative,
+    steps: Vec<BodyStepFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(try_from = "BodyStepFields")]
+struct BodyStepFile {
+    rotation: RotationFile,
+    move_s: Option<Positive>,
+    dwell_s: Option<NonNegative>,
+}
+
+enum RotationFile {
+    By([Finite; 3]),
+    Point(BodyAxis, Direction),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BodyStepFields {
+    turn_deg: Option<[Finite; 3]>,
+    point: Option<BodyAxis>,
+    along: Option<Direction>,
+    move_s: Option<Positive>,
+    dwell_s: Option<NonNegative>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+enum BodyAxis {
+    #[serde(rename = "x")]
+    X,
+    #[serde(rename = "y")]
+    Y,
+    #[serde(rename = "z")]
+    Z,
+    #[serde(rename = "-x")]
+    MinusX,
+    #[serde(rename = "-y")]
+    MinusY,
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Direction {
+    East,
+    North,
+    Up,
+    EarthRate,
+}
+
+impl TryFrom<BodyStepFields> for BodyStepFile {
+    type Error = &'static str;
+
+    fn try_from(fields: BodyStepFields) -> Result<Self, Self::Error> {
+        let rotation = match (fields.turn_deg, fields.point, fields.along) {
+            (Some(vector), None, None) => RotationFile::By(vector),
+            (None, Some(axis), Some(direction)) => RotationFile::Point(axis, direction),
+            _ => return Err("expected either turn_deg, or point and along"),
+        };
+        Ok(Self {
+            rotation,
+            move_s: fields.move_s,
+            dwell_s: fields.dwell_s,
+        })
+    }
+}
+
+impl BodyFile {
+    fn in_radians(&self, site: &Site) -> Moves {
+        let step = |step: &BodyStepFile| BodyStep {
+            rotation: match step.rotation {
+                RotationFile::By(vector) => {
+                    Rotation::By(Vector3::from(vector.map(|angle| angle.0 * DEGREE)))
+                }
+                RotationFile::Point(axis, direction) => Rotation::Point {
+                    axis: axis.unit_vector(),
+                    along: direction.unit_vector(site),
+                },
+            },
+            duration: step.move_s.unwrap_or(self.move_s).0,
+            acceleration: self.acceleration_deg_per_s2.0 * DEGREE,
+            dwell: step.dwell_s.unwrap_or(self.dwell_s).0,
+        };
+        Moves::Body {
+            start: attitude(self.start_pitch_roll_heading_deg),
+            steps: self.steps.iter().map(step).collect(),
+        }
+    }
+}
+
+impl BodyAxis {
+    fn unit_vector(self) -> Vector3<f64> {
+        match self {
+            Self::X => Vector3::x(),
+            Self::Y => Vector3::y(),
+            Self::Z => Vector3::z(),
+            Self::MinusX => -Vector3::x(),
+            Self::MinusY => -Vector3::y(),
+            Self::MinusZ => -Vector3::z(),
+        }
+    }
+}
+
+impl Direction {
+    fn unit_vector(self, site: &Site) -> Vector3<f64> {
+        match self {
+            Self::East => Vector3::x(),
+            Self::North => Vector3::y(),
+            Self::Up => Vector3::z(),
+            Self::EarthRate => site.earth_rate_n().normalize(),
+        }
+    }
+}

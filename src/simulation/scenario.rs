@@ -1,0 +1,330 @@
+//! What is simulated, read from a TOML file.
+
+use nalgebra::{SVector, Vector3};
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+
+use super::Integrator;
+use crate::earth::Site;
+use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, Triad};
+use crate::models::{
+    self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Positive, Room,
+};
+use crate::turntable::{Imperfection, Motion, Path, Table};
+use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
+
+/// Steps of the true motion in one sample of the IMU.
+const STEPS: u32 = 4;
+
+/// Everything that makes a simulated run but its random numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// A short name for titles and file names.
+    pub name: String,
+    /// Where the table stands.
+    pub site: Site,
+    /// The grade of instrument.
+    pub instrument: Instrument,
+    /// Its installation.
+    pub installation: InstallationModel,
+    /// True values that are given, not drawn.
+    pub given: PerSensor<Given>,
+    /// The table.
+    pub table: Table,
+    /// The table's name.
+    pub table_name: String,
+    /// How the table is driven.
+    pub path: Path,
+    /// The path's name.
+    pub path_name: String,
+    /// What a sample holds.
+    pub output: Output,
+    /// Sample period, lever arm and step of the truth.
+    pub integrator: Integrator,
+    /// Readings of the table per second.
+    pub reading_rate: f64,
+    /// Seed to use where none is asked for.
+    pub seed: u64,
+}
+
+/// True values of a triad that a scenario gives; the others are drawn. The prior stays that of the
+/// grade.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Given {
+    /// Scale factors − 1.
+    pub scale: Option<Vector3<f64>>,
+    /// Installation angles, rad.
+    pub angles: Option<SVector<f64, ANGLES>>,
+    /// Biases, rad/s or m/s².
+    pub bias: Option<Vector3<f64>>,
+}
+
+impl Scenario {
+    /// Reads a scenario and the models that it names, by embedded name or path.
+    ///
+    /// # Errors
+    /// If one of them does not exist or is malformed, or the path is beyond the table.
+    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
+        let (file, display): (ScenarioFile, _) = models::read(Room::Scenario, name_or_path)?;
+        let site = file.site.in_si();
+        let installation = InstallationModel::load(&file.imu.installation)?;
+        let (table, table_name) = models::turntable(&file.turntable.model)?;
+        let (path, path_name) = models::path(&file.turntable.path, &site)?;
+        let name = std::path::Path::new(&display)
+            .file_stem()
+            .map_or_else(|| display.clone(), |stem| stem.to_string_lossy().into());
+        let given =
+            file.truth
+                .in_si(installation.form)
+                .map_err(|message| ModelError::Inconsistent {
+                    file: display.clone(),
+                    message,
+                })?;
+        let scenario = Self {
+            name,
+            site,
+            instrument: Instrument::load(&file.imu.model)?,
+            installation,
+            given,
+            table,
+            table_name,
+            path,
+            path_name,
+            output: file.imu.output.into(),
+            integrator: Integrator {
+                period: 1.0 / file.imu.sample_rate_hz.0,
+                lever_arm: Vector3::from(file.imu.lever_arm_m.map(|component| component.0)),
+                steps: STEPS,
+            },
+            reading_rate: file.turntable.reading_rate_hz.0,
+            seed: file.seed,
+        };
+        scenario.checked()
+    }
+
+    /// The same scenario along another path, by embedded name or path of its file.
+    ///
+    /// # Errors
+    /// If it does not exist, is malformed, or is beyond the table.
+    pub fn with_path(mut self, name_or_path: &str) -> Result<Self, ModelError> {
+        (self.path, self.path_name) = models::path(name_or_path, &self.site)?;
+        self.checked()
+    }
+
+    /// How long a run takes, s.
+    pub fn duration(&self) -> f64 {
+        Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))
+            .map_or(0.0, |motion| motion.duration())
+    }
+
+    fn checked(self) -> Result<Self, ModelError> {
+        // With the errors of a real table, so that a path that cannot have them is found here.
+        Motion::new(
+            &self.table,
+            &self.path,
+            &Imperfection::draw(&self.table, || 1.0),
+        )
+        .map_err(|source| ModelError::Path {
+            file: self.path_name.clone(),
+            source,
+        })?;
+        Ok(self)
+    }
+
+    /// One triad's true parameters.
+    pub(super) fn draw_truth(&self, sensor: Sensor, rng: &mut ChaCha8Rng) -> Triad {
+        let variation = self.instrument.variation.get(sensor);
+        // All are drawn, given or not, so that giving one leaves the others as they were.
+        let scale = Vector3::from_fn(|_, _| variation.scale.draw(rng));
+        let bias = Vector3::from_fn(|_, _| variation.bias.draw(rng));
+        let angles = self.installation.draw(rng);
+        let given = self.given.get(sensor);
+        Triad {
+            form: self.installation.form,
+            scale: given.scale.unwrap_or(scale).add_scalar(1.0),
+            angles: given.angles.unwrap_or(angles),
+            bias: given.bias.unwrap_or(bias),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScenarioFile {
+    seed: u64,
+    site: SiteFile,
+    imu: ImuFile,
+    turntable: TurntableFile,
+    #[serde(default)]
+    truth: TruthFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SiteFile {
+    latitude_deg: Latitude,
+    #[serde(default)]
+    longitude_deg: Finite,
+    #[serde(default)]
+    height_m: Finite,
+    gravity_m_s2: Option<Positive>,
+}
+
+#[derive(Deserialize)]
+#[serde(try_from = "f64")]
+struct Latitude(f64);
+
+impl TryFrom<f64> for Latitude {
+    type Error = String;
+
+    fn try_from(degrees: f64) -> Result<Self, String> {
+        if degrees.abs() <= 90.0 {
+            Ok(Self(degrees))
+        } else {
+            Err(format!(
+                "found {degrees}, expected a latitude from -90 to 90"
+            ))
+        }
+    }
+}
+
+impl SiteFile {
+    fn in_si(&self) -> Site {
+        let site = Site::with_normal_gravity(
+            self.latitude_deg.0 * DEGREE,
+            self.longitude_deg.0 * DEGREE,
+            self.height_m.0,
+        );
+        Site {
+            gravity: self.gravity_m_s2.map_or(site.gravity, |g| g.0),
+            ..site
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImuFile {
+    model: String,
+    installation: String,
+    output: OutputFile,
+    sample_rate_hz: Positive,
+    #[serde(default)]
+    lever_arm_m: [Finite; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum OutputFile {
+    Pulse,
+    Increment,
+    Rate,
+}
+
+impl From<OutputFile> for Output {
+    fn from(file: OutputFile) -> Self {
+        match file {
+            OutputFile::Pulse => Self::Pulse,
+            OutputFile::Increment => Self::Increment,
+            OutputFile::Rate => Self::Rate,
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TurntableFile {
+    model: String,
+    path: String,
+    #[serde(default = "ten_hertz")]
+    reading_rate_hz: Positive,
+}
+
+fn ten_hertz() -> Positive {
+    Positive(10.0)
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct TruthFile {
+    gyro: GivenGyroFile,
+    accel: GivenAccelFile,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct GivenGyroFile {
+    scale_ppm: Option<OneOrThree>,
+    installation_arcsec: Option<Vec<Finite>>,
+    bias_deg_per_h: Option<OneOrThree>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct GivenAccelFile {
+    scale_ppm: Option<OneOrThree>,
+    installation_arcsec: Option<Vec<Finite>>,
+    bias_ug: Option<OneOrThree>,
+}
+
+impl TruthFile {
+    fn in_si(self, form: InstallationForm) -> Result<PerSensor<Given>, String> {
+        let Self { gyro, accel } = self;
+        Ok(PerSensor {
+            gyro: Given {
+                scale: scaled(gyro.scale_ppm, PPM),
+                angles: angles(gyro.installation_arcsec, form)?,
+                bias: scaled(gyro.bias_deg_per_h, DEG_PER_H),
+            },
+            accel: Given {
+                scale: scaled(accel.scale_ppm, PPM),
+                angles: angles(accel.installation_arcsec, form)?,
+                bias: scaled(accel.bias_ug, MICRO_G),
+            },
+        })
+    }
+}
+
+fn scaled(values: Option<OneOrThree>, unit: f64) -> Option<Vector3<f64>> {
+    values.map(|values| values.vector() * unit)
+}
+
+fn angles(
+    given: Option<Vec<Finite>>,
+    form: InstallationForm,
+) -> Result<Option<SVector<f64, ANGLES>>, String> {
+    let Some(given) = given else { return Ok(None) };
+    let expected = form.angle_names().len();
+    if given.len() != expected {
+        return Err(format!(
+            "installation_arcsec has {} values, expected the {expected} of the {} form",
+            given.len(),
+            form.name()
+        ));
+    }
+    let mut angles = SVector::<f64, ANGLES>::zeros();
+    for (angle, value) in angles.iter_mut().zip(&given) {
+        *angle = value.0 * ARCSEC;
+    }
+    Ok(Some(angles))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_embedded_scenario_can_be_simulated() {
+        for name in models::names(Room::Scenario) {
+            let scenario = Scenario::load(name).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let duration = scenario.duration();
+            let start = std::time::Instant::now();
+            let simulated = scenario.simulate(1, 0).unwrap();
+            println!(
+                "{name}: {duration} s, {} samples, {:?}",
+                simulated.run.imu.len(),
+                start.elapsed()
+            );
+        }
+    }
+}

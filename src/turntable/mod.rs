@@ -1,0 +1,68 @@
+//! The machine: a turntable, the path it is driven along, and where it then is at any time.
+//!
+//! `C_b_n = C_base R(axis₁, a₁) R(axis₂, a₂) … C_mount`, axes from the outermost to the innermost.
+//! The machine's errors are of two kinds. What it does not know (level, north, non-orthogonality,
+//! wobble) moves the true attitude but not the reading, see [`Imperfection`]; what it reads wrongly
+//! (position error and reading noise) is left to whoever makes the readings.
+
+mod motion;
+mod path;
+mod profile;
+mod table;
+
+pub use motion::{Kinematics, Motion};
+pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
+pub use profile::{Profile, Turned};
+pub use table::{Axis, Imperfection, Table, TableErrors};
+
+/// Why a table cannot be driven along a path.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// A list of angles that does not fit the table.
+    #[error("{place}: {found} angles for a table of {expected} axes; give one angle per axis")]
+    AxisCount {
+        /// Where in the path.
+        place: String,
+        /// Number of angles.
+        found: usize,
+        /// Number of axes.
+        expected: usize,
+    },
+    /// A move faster than an axis allows.
+    #[error(
+        "step {step}: {what} of {found:.4} {unit} is above the {limit:.4} {unit} of the {axis} axis; slow the step down"
+    )]
+    Limit {
+        /// Step, counted from one.
+        step: usize,
+        /// `rate` or `acceleration`.
+        what: &'static str,
+        /// Asked for.
+        found: f64,
+        /// Allowed.
+        limit: f64,
+        /// Unit of both.
+        unit: &'static str,
+        /// Name of the axis.
+        axis: String,
+    },
+    /// A rotation that cannot be made in its time.
+    #[error(
+        "step {step}: {angle_deg:.3}° in {duration} s needs more than its acceleration; allow {needed:.2} s or more"
+    )]
+    Hurried {
+        /// Step, counted from one.
+        step: usize,
+        /// Angle in degrees.
+        angle_deg: f64,
+        /// Time given, s.
+        duration: f64,
+        /// Time needed, s.
+        needed: f64,
+    },
+    /// Errors of axes on a path that does not say how the axes turn.
+    #[error(
+        "the path turns about body axes, which does not say how the table's axes turn; take a table without non-orthogonality and wobble, or a path in table axes"
+    )]
+    AxesUnknown,
+}

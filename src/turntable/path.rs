@@ -1,0 +1,92 @@
+//! What a table is told to do.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// A sequence of positions, with the attitude that it starts from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// How long the table stands before the first step, s.
+    pub first_dwell: f64,
+    /// The moves, in axes of one kind.
+    pub moves: Moves,
+}
+
+/// Moves in the table's own axes or in the body's.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Moves {
+    /// Turns of the table's axes.
+    Axes {
+        /// Angle of each axis at the start, outermost first, rad.
+        start: Vec<f64>,
+        /// The moves in order.
+        steps: Vec<AxesStep>,
+    },
+    /// Rotations about body axes, as multi-position sequences are published.
+    Body {
+        /// `C_b_n` at the start.
+        start: Matrix3<f64>,
+        /// The rotations in order.
+        steps: Vec<BodyStep>,
+    },
+}
+
+/// All named axes turn at once, then the table stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxesStep {
+    /// By how much each axis turns, outermost first, rad.
+    pub angles: Vec<f64>,
+    /// Rate that the turns reach, rad/s.
+    pub rate: f64,
+    /// Peak acceleration, rad/s².
+    pub acceleration: f64,
+    /// How long the table stands afterwards, s.
+    pub dwell: f64,
+}
+
+/// One rotation about a body axis, then the table stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyStep {
+    /// Where to.
+    pub rotation: Rotation,
+    /// How long the rotation takes, s.
+    pub duration: f64,
+    /// Peak acceleration, rad/s².
+    pub acceleration: f64,
+    /// How long the table stands afterwards, s.
+    pub dwell: f64,
+}
+
+/// A rotation in body axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rotation {
+    /// By a rotation vector along body axes, rad.
+    By(Vector3<f64>),
+    /// The shortest way to where a body axis points along a direction.
+    Point {
+        /// Unit vector along body axes.
+        axis: Vector3<f64>,
+        /// Unit vector in East-North-Up.
+        along: Vector3<f64>,
+    },
+}
+
+impl Rotation {
+    /// The rotation vector in body axes, rad, from the attitude `C_b_n` where it begins.
+    pub(super) fn vector(&self, attitude: &Matrix3<f64>) -> Vector3<f64> {
+        match *self {
+            Self::By(vector) => vector,
+            Self::Point { axis, along } => {
+                let target = attitude.tr_mul(&along);
+                let normal = axis.cross(&target);
+                let angle = normal.norm().atan2(axis.dot(&target));
+                // Half a turn goes about any axis across; the one through the next body axis will do.
+                let across = Vector3::new(axis.z, axis.x, axis.y);
+                let direction = normal
+                    .try_normalize(1e-9)
+                    .or_else(|| (across - axis * axis.dot(&across)).try_normalize(1e-9))
+                    .unwrap_or_else(Vector3::zeros);
+                direction * angle
+            }
+        }
+    }
+}
