@@ -77,10 +77,19 @@ impl Axis {
 
     /// An axis to ±`extent` that is linear below `linear` and logarithmic beyond.
     pub(super) fn symlog(linear: f64, extent: f64) -> Self {
-        let linear = if linear.is_finite() && linear > 0.0 { linear } else { 1.0 };
-        let extent = if extent.is_finite() { extent.max(4.0 * linear) } else { 4.0 * linear };
+        let linear = if linear.is_finite() && linear > 0.0 {
+            linear
+        } else {
+            1.0
+        };
+        let extent = if extent.is_finite() {
+            extent.max(4.0 * linear)
+        } else {
+            4.0 * linear
+        };
         let mut ticks = vec![(0.0, "0".to_owned())];
-        let first = linear.log10().ceil() as i32;
+        // A tick nearer to zero would have its label written over the zero.
+        let first = (2.0 * linear).log10().ceil() as i32;
         for k in decades(first, extent.log10().floor() as i32) {
             let label = number::power_of_ten(k);
             ticks.push((-(10f64.powi(k)), format!("−{label}")));

@@ -48,7 +48,8 @@ pub(super) fn svg(
     let (fine_width, fine_height) = (width * FINE as u32, height * FINE as u32);
     let mut text = String::new();
     {
-        let area = SVGBackend::with_string(&mut text, (fine_width, fine_height)).into_drawing_area();
+        let area =
+            SVGBackend::with_string(&mut text, (fine_width, fine_height)).into_drawing_area();
         area.fill(&WHITE)?;
         content(&area)?;
         area.present()?;
@@ -177,7 +178,14 @@ impl<'a, 'b> Panel<'a, 'b> {
         x_title: &str,
         dwells: &[Range<f64>],
     ) -> Result<Self, DrawError> {
-        write(area, title, (margins.left, 6.0), (HPos::Left, VPos::Top), &INK, 1.0)?;
+        write(
+            area,
+            title,
+            (margins.left, 6.0),
+            (HPos::Left, VPos::Top),
+            &INK,
+            1.0,
+        )?;
         let mut chart = ChartBuilder::on(area)
             .margin_top(px(26.0))
             .margin_right(px(margins.right))
@@ -187,7 +195,8 @@ impl<'a, 'b> Panel<'a, 'b> {
             .build_cartesian_2d(x.clone(), y.clone())?;
         chart.draw_series(dwells.iter().filter_map(|dwell| {
             let (start, end) = (dwell.start.max(x.low()), dwell.end.min(x.high()));
-            (end > start).then(|| Rectangle::new([(start, y.low()), (end, y.high())], DWELL.filled()))
+            (end > start)
+                .then(|| Rectangle::new([(start, y.low()), (end, y.high())], DWELL.filled()))
         }))?;
         chart
             .configure_mesh()
@@ -221,17 +230,27 @@ impl<'a, 'b> Panel<'a, 'b> {
     }
 
     /// Fills between two lines given at the same times.
-    pub(super) fn band(&mut self, lower: &[(f64, f64)], upper: &[(f64, f64)]) -> Result<(), DrawError> {
+    pub(super) fn band(
+        &mut self,
+        lower: &[(f64, f64)],
+        upper: &[(f64, f64)],
+    ) -> Result<(), DrawError> {
         let mut outline: Vec<_> = self.visible(lower).collect();
         outline.extend(self.visible(upper).collect::<Vec<_>>().into_iter().rev());
         if outline.len() > 2 {
-            self.chart.draw_series([Polygon::new(outline, BAND.filled())])?;
+            self.chart
+                .draw_series([Polygon::new(outline, BAND.filled())])?;
         }
         Ok(())
     }
 
     /// Draws marks.
-    pub(super) fn marks(&mut self, points: &[(f64, f64)], mark: Mark, pen: Pen) -> Result<(), DrawError> {
+    pub(super) fn marks(
+        &mut self,
+        points: &[(f64, f64)],
+        mark: Mark,
+        pen: Pen,
+    ) -> Result<(), DrawError> {
         let points: Vec<_> = self.visible(points).collect();
         let (thin, small, large) = (pen.style(), px(2.0), px(4.5));
         for point in points {
@@ -240,11 +259,19 @@ impl<'a, 'b> Panel<'a, 'b> {
                 Mark::Dot => self.chart.draw_series(
                     one.map(|p| Circle::new(p, px(pen.width + 1.0), pen.color.filled())),
                 )?,
-                Mark::Ring => self.chart.draw_series(one.map(|p| Circle::new(p, large, thin)))?,
+                Mark::Ring => self
+                    .chart
+                    .draw_series(one.map(|p| Circle::new(p, large, thin)))?,
                 Mark::Cross => self.chart.draw_series(one.map(|p| {
                     EmptyElement::at(p)
-                        + PathElement::new(vec![(-2 * small, -2 * small), (2 * small, 2 * small)], thin)
-                        + PathElement::new(vec![(-2 * small, 2 * small), (2 * small, -2 * small)], thin)
+                        + PathElement::new(
+                            vec![(-2 * small, -2 * small), (2 * small, 2 * small)],
+                            thin,
+                        )
+                        + PathElement::new(
+                            vec![(-2 * small, 2 * small), (2 * small, -2 * small)],
+                            thin,
+                        )
                 }))?,
             };
         }
@@ -262,7 +289,11 @@ impl<'a, 'b> Panel<'a, 'b> {
     pub(super) fn finish(self) -> Result<(), DrawError> {
         let base = self.area.get_base_pixel();
         let frame = self.chart.plotting_area().get_pixel_range();
-        let (right, top, bottom) = (frame.0.end - base.0, frame.1.start - base.1, frame.1.end - base.1);
+        let (right, top, bottom) = (
+            frame.0.end - base.0,
+            frame.1.start - base.1,
+            frame.1.end - base.1,
+        );
         let spacing = px(LETTER);
         let mut labels: Vec<(i32, i32, &str, &RGBColor)> = self
             .labels
@@ -285,10 +316,19 @@ impl<'a, 'b> Panel<'a, 'b> {
         }
         for (at, shown_at, text, color) in labels {
             let leader = vec![(right + px(1.0), at), (right + px(9.0), shown_at)];
-            self.area
-                .draw(&PathElement::new(leader, color.stroke_width(px(0.75) as u32)))?;
+            self.area.draw(&PathElement::new(
+                leader,
+                color.stroke_width(px(0.75) as u32),
+            ))?;
             let place = (f64::from(right) / FINE + 11.0, f64::from(shown_at) / FINE);
-            write(self.area, text, place, (HPos::Left, VPos::Center), color, 0.9)?;
+            write(
+                self.area,
+                text,
+                place,
+                (HPos::Left, VPos::Center),
+                color,
+                0.9,
+            )?;
         }
         Ok(())
     }

@@ -18,10 +18,7 @@ pub(super) fn figure(report: &Report) -> Result<Option<Figure>, ReportError> {
     }
 }
 
-fn errors(
-    methods: &[(&str, &Estimate)],
-    truth: &ParameterVector,
-) -> Result<Figure, ReportError> {
+fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Result<Figure, ReportError> {
     let mut caption = String::from(
         "Magnitude of each parameter's true error, logarithmic. The whisker reaches up to the 1σ that \
          the method claims: about two marks in three should lie below the top of their whisker.",
@@ -29,12 +26,18 @@ fn errors(
     if methods.len() == 2 {
         caption.push_str(" Open rings: closed form; filled dots: EKF.");
     }
-    Figure::draw("comparison.svg", "Errors against the truth", caption, (1200, 700), |area| {
-        for (group, area) in Group::all().zip(area.split_evenly((2, 3))) {
-            error_panel(&area, group, methods, truth)?;
-        }
-        Ok(())
-    })
+    Figure::draw(
+        "comparison.svg",
+        "Errors against the truth",
+        caption,
+        (1200, 700),
+        |area| {
+            for (group, area) in Group::all().zip(area.split_evenly((2, 3))) {
+                error_panel(&area, group, methods, truth)?;
+            }
+            Ok(())
+        },
+    )
 }
 
 fn error_panel(
@@ -53,16 +56,26 @@ fn error_panel(
         .iter()
         .map(|(name, estimate)| {
             let (error, sigma) = (estimate.vector() - truth, estimate.sigma());
-            let points = indices.iter().map(|&i| (error[i].abs() / unit, sigma[i] / unit));
+            let points = indices
+                .iter()
+                .map(|&i| (error[i].abs() / unit, sigma[i] / unit));
             (*name, points.collect())
         })
         .collect();
-    let y = Axis::log(shown.iter().flat_map(|(_, points)| points).flat_map(|&(e, s)| [e, s]));
+    let y = Axis::log(
+        shown
+            .iter()
+            .flat_map(|(_, points)| points)
+            .flat_map(|&(e, s)| [e, s]),
+    );
     let floor = y.low();
     let mut panel = Panel::new(
         area,
         &format!("{}, {}", group.title(), group.unit()),
-        Margins { left: 56.0, right: 84.0 },
+        Margins {
+            left: 56.0,
+            right: 84.0,
+        },
         (Axis::places(indices.iter().map(|&i| axis_name(form, i))), y),
         "",
         &[],
@@ -104,33 +117,42 @@ fn differences(closed: &Estimate, filter: &Estimate) -> Result<Figure, ReportErr
         "Closed form less EKF in units of the σ of their difference, as if they had no data in common. \
          Dashed: ±3. The vertical axis is linear in the middle and logarithmic beyond.",
     );
-    Figure::draw("comparison.svg", "Closed form against EKF", caption, (1200, 420), |area| {
-        let rows = area.split_evenly((2, 1));
-        let halves = points.chunks(points.len().div_ceil(2).max(1));
-        for (half, area) in halves.zip(rows) {
-            let mut panel = Panel::new(
-                &area,
-                "closed form less EKF, σ",
-                Margins { left: 56.0, right: 40.0 },
-                (
-                    Axis::places(half.iter().map(|&(i, _)| short_name(form, i))),
-                    Axis::symlog(1.0, 1.2 * extent),
-                ),
-                "",
-                &[],
-            )?;
-            let ends = (-0.5, half.len() as f64 - 0.5);
-            panel.line(&[(ends.0, 0.0), (ends.1, 0.0)], Pen::solid(QUIET, 0.75))?;
-            for y in [-3.0, 3.0] {
-                panel.line(&[(ends.0, y), (ends.1, y)], Pen::dashed(INK, 1.0))?;
-                panel.label(y, if y < 0.0 { "−3σ" } else { "+3σ" }, INK);
+    Figure::draw(
+        "comparison.svg",
+        "Closed form against EKF",
+        caption,
+        (1200, 420),
+        |area| {
+            let rows = area.split_evenly((2, 1));
+            let halves = points.chunks(points.len().div_ceil(2).max(1));
+            for (half, area) in halves.zip(rows) {
+                let mut panel = Panel::new(
+                    &area,
+                    "closed form less EKF, σ",
+                    Margins {
+                        left: 56.0,
+                        right: 40.0,
+                    },
+                    (
+                        Axis::places(half.iter().map(|&(i, _)| short_name(form, i))),
+                        Axis::symlog(1.0, 1.2 * extent),
+                    ),
+                    "",
+                    &[],
+                )?;
+                let ends = (-0.5, half.len() as f64 - 0.5);
+                panel.line(&[(ends.0, 0.0), (ends.1, 0.0)], Pen::solid(QUIET, 0.75))?;
+                for y in [-3.0, 3.0] {
+                    panel.line(&[(ends.0, y), (ends.1, y)], Pen::dashed(INK, 1.0))?;
+                    panel.label(y, if y < 0.0 { "−3σ" } else { "+3σ" }, INK);
+                }
+                for (place, &(_, y)) in half.iter().enumerate() {
+                    panel.line(&[(place as f64, 0.0), (place as f64, y)], Pen::nth(0, 1.0))?;
+                    panel.marks(&[(place as f64, y)], Mark::Dot, Pen::nth(0, 2.5))?;
+                }
+                panel.finish()?;
             }
-            for (place, &(_, y)) in half.iter().enumerate() {
-                panel.line(&[(place as f64, 0.0), (place as f64, y)], Pen::nth(0, 1.0))?;
-                panel.marks(&[(place as f64, y)], Mark::Dot, Pen::nth(0, 2.5))?;
-            }
-            panel.finish()?;
-        }
-        Ok(())
-    })
+            Ok(())
+        },
+    )
 }

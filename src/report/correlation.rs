@@ -20,8 +20,7 @@ pub(super) fn figure(estimate: &Estimate) -> Result<Option<Figure>, ReportError>
         return Ok(None);
     }
     let sigma = estimate.sigma();
-    let correlation =
-        |i: usize, j: usize| estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
+    let correlation = |i: usize, j: usize| estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
     let cell = 880.0 / indices.len() as f64;
     let side = cell * indices.len() as f64;
     let at = |n: usize, origin: f64| origin + cell * n as f64;
@@ -36,7 +35,14 @@ pub(super) fn figure(estimate: &Estimate) -> Result<Option<Figure>, ReportError>
         for (row, &i) in indices.iter().enumerate() {
             let name = short_name(estimate.form(), i);
             let middle = at(row, 0.5 * cell);
-            write(area, &name, (LEFT - 8.0, TOP + middle), (HPos::Right, VPos::Center), &INK, 0.9)?;
+            write(
+                area,
+                &name,
+                (LEFT - 8.0, TOP + middle),
+                (HPos::Right, VPos::Center),
+                &INK,
+                0.9,
+            )?;
             write_upright(area, &name, (LEFT + middle, TOP - 8.0))?;
             for (column, &j) in indices.iter().enumerate() {
                 let corner = (at(column, LEFT), at(row, TOP));
@@ -56,9 +62,8 @@ pub(super) fn figure(estimate: &Estimate) -> Result<Option<Figure>, ReportError>
         }
         for n in 0..=indices.len() {
             // A strong line between groups, a faint one between parameters.
-            let between = n == 0
-                || n == indices.len()
-                || Group::of(indices[n - 1]) != Group::of(indices[n]);
+            let between =
+                n == 0 || n == indices.len() || Group::of(indices[n - 1]) != Group::of(indices[n]);
             let style = if between {
                 QUIET.stroke_width(px(1.25) as u32)
             } else {
@@ -80,7 +85,11 @@ fn to_px((x, y): (f64, f64)) -> (i32, i32) {
 
 /// Blue for positive, orange for negative, white for none.
 fn tint(r: f64) -> RGBColor {
-    let full = if r < 0.0 { (238.0, 150.0, 80.0) } else { (110.0, 165.0, 215.0) };
+    let full = if r < 0.0 {
+        (238.0, 150.0, 80.0)
+    } else {
+        (110.0, 165.0, 215.0)
+    };
     let weight = r.abs().clamp(0.0, 1.0);
     let mix = |to: f64| (255.0 + (to - 255.0) * weight).round() as u8;
     RGBColor(mix(full.0), mix(full.1), mix(full.2))
@@ -121,7 +130,10 @@ fn write_upright(area: &Area, text: &str, (x, y): (f64, f64)) -> Result<(), Draw
 
 fn scale_bar(area: &Area, (x, y): (f64, f64)) -> Result<(), DrawError> {
     let cell = 34.0;
-    for (n, r) in [1.0, 0.75, 0.5, 0.25, 0.0, -0.25, -0.5, -0.75, -1.0].into_iter().enumerate() {
+    for (n, r) in [1.0, 0.75, 0.5, 0.25, 0.0, -0.25, -0.5, -0.75, -1.0]
+        .into_iter()
+        .enumerate()
+    {
         let corner = (x, y + cell * n as f64);
         let frame = [to_px(corner), to_px((corner.0 + cell, corner.1 + cell))];
         area.draw(&Rectangle::new(frame, tint(r).filled()))?;

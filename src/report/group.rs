@@ -79,7 +79,9 @@ impl Group {
     pub(super) fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
         let values = || indices.iter().map(|&i| (v[i] / self.unit_value()).abs());
         let mean_square = values().map(|x| x * x).sum::<f64>() / indices.len() as f64;
-        values().reduce(f64::max).map(|largest| (largest, mean_square.sqrt()))
+        values()
+            .reduce(f64::max)
+            .map(|largest| (largest, mean_square.sqrt()))
     }
 }
 

@@ -45,7 +45,10 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
                 let mut panel = Panel::new(
                     &area,
                     &format!("{name}, {}, σ", DIRECTIONS[direction]),
-                    Margins { left: 40.0, right: 44.0 },
+                    Margins {
+                        left: 40.0,
+                        right: 44.0,
+                    },
                     (Axis::linear(start, end), Axis::stepped(-EDGE, EDGE, 2.0)),
                     "time, s",
                     report.dwells,
@@ -62,9 +65,9 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
                 if accepted.len() <= DOTS {
                     panel.marks(&accepted, Mark::Dot, blue)?;
                 } else {
-                    // A turn is a gap of many times the usual spacing.
-                    let gap = 20.0 * (end - start) / accepted.len() as f64;
-                    for stretch in accepted.chunk_by(|a, b| b.0 - a.0 < gap) {
+                    // A line across a turn would show what was not observed.
+                    let dwell = |t: f64| report.dwells.partition_point(|dwell| dwell.end < t);
+                    for stretch in accepted.chunk_by(|a, b| dwell(a.0) == dwell(b.0)) {
                         let share = 500 * stretch.len() / accepted.len();
                         panel.line(&envelope(stretch, share), blue)?;
                     }

@@ -140,7 +140,9 @@ impl Report<'_> {
 
     /// Both methods that ran, the closed form first.
     fn methods(&self) -> Vec<(&'static str, &Estimate)> {
-        let closed = self.closed_form.map(|closed| ("closed form", closed.estimate));
+        let closed = self
+            .closed_form
+            .map(|closed| ("closed form", closed.estimate));
         let filter = self.outcome.map(|outcome| ("EKF", &outcome.estimate));
         closed.into_iter().chain(filter).collect()
     }

@@ -59,8 +59,15 @@ fn summary(report: &Report) -> String {
         number::value(report.run.imu.duration(), 1.0)
     );
     if let Some(outcome) = report.outcome {
-        let state = if outcome.converged { "converged" } else { "NOT converged" };
-        text.push_str(&format!("EKF {state} after {} passes. ", outcome.passes.len()));
+        let state = if outcome.converged {
+            "converged"
+        } else {
+            "NOT converged"
+        };
+        text.push_str(&format!(
+            "EKF {state} after {} passes. ",
+            outcome.passes.len()
+        ));
     }
     text.push_str(match (report.truth, report.closed_form) {
         (Some(_), Some(_)) => "Compared with the closed form and the truth.",
@@ -106,7 +113,9 @@ fn outcome_notices(outcome: &Outcome) -> Vec<String> {
 
 fn drawn(figure: &Figure) -> Markup {
     // The namespace is needed in a file of its own only.
-    let svg = figure.svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
+    let svg = figure
+        .svg
+        .replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
     html! {
         figure {
             h2 { (figure.title) }

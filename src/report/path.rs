@@ -12,7 +12,10 @@ use crate::units::DEGREE;
 
 const POINTS: usize = 1200;
 const HEIGHT: u32 = 240;
-const MARGINS: Margins = Margins { left: 52.0, right: 50.0 };
+const MARGINS: Margins = Margins {
+    left: 52.0,
+    right: 50.0,
+};
 /// Nearer to the plumb line than this an axis has no azimuth worth drawing.
 const STEEP: f64 = 80.0 * DEGREE;
 /// Dwells beyond this number would not leave room for theirs.
@@ -39,25 +42,27 @@ pub(super) fn figure(report: &Report) -> Result<Figure, ReportError> {
     if let Some(table) = table {
         panels.push((
             "elevation of the body axes, °",
-            Axis::stepped(-95.0, 95.0, 45.0),
+            Axis::stepped(-95.0, 120.0, 45.0),
             [0, 1, 2].map(|axis| elevation(table, axis)),
         ));
         panels.push((
             "azimuth of the body axes, °",
-            Axis::stepped(-185.0, 185.0, 90.0),
+            Axis::stepped(-190.0, 240.0, 90.0),
             [0, 1, 2].map(|axis| azimuth(table, axis)),
         ));
     }
     let rates = [0, 1, 2].map(|axis| rate(&report.run.imu, axis));
-    let fastest = rates
+    let (low, high) = rates
         .iter()
         .flatten()
         .flatten()
-        .map(|point| point.1.abs())
-        .filter(|y| y.is_finite())
-        .fold(0.0, f64::max);
-    let extent = if fastest > 0.0 { 1.05 * fastest } else { 1.0 };
-    panels.push(("rate about the body axes, °/s", Axis::linear(-extent, extent), rates));
+        .filter(|point| point.1.is_finite())
+        .fold((0.0, 0.0), |(low, high): (f64, f64), point| {
+            (low.min(point.1), high.max(point.1))
+        });
+    let span = high - low;
+    let axis = Axis::linear(low - 0.05 * span, high + 0.15 * span);
+    panels.push(("rate about the body axes, °/s", axis, rates));
 
     let size = (1200, HEIGHT * panels.len() as u32);
     Figure::draw("path.svg", "Path", caption, size, |area| {
@@ -103,9 +108,9 @@ fn number_dwells(report: &Report, area: &Area) -> Result<(), DrawError> {
     for (n, dwell) in report.dwells.iter().enumerate() {
         let middle = (0.5 * (dwell.start + dwell.end) - start) / (end - start);
         if (0.0..=1.0).contains(&middle) {
-            let place = (MARGINS.left + width * middle, 25.0);
+            let place = (MARGINS.left + width * middle, 28.0);
             let number = (n + 1).to_string();
-            write(area, &number, place, (HPos::Center, VPos::Bottom), &QUIET, 0.75)?;
+            write(area, &number, place, (HPos::Center, VPos::Top), &QUIET, 0.8)?;
         }
     }
     Ok(())
@@ -114,7 +119,10 @@ fn number_dwells(report: &Report, area: &Area) -> Result<(), DrawError> {
 /// Elevation of a body axis above the horizon in degrees.
 fn elevation(table: &TableRecord, axis: usize) -> Vec<Line> {
     let line = table.time.iter().zip(&table.attitude);
-    vec![line.map(|(&t, c)| (t, axis_elevation(c, axis) / DEGREE)).collect()]
+    vec![
+        line.map(|(&t, c)| (t, axis_elevation(c, axis) / DEGREE))
+            .collect(),
+    ]
 }
 
 /// Azimuth of a body axis clockwise from North in degrees, in pieces between jumps and steep parts.
@@ -143,7 +151,12 @@ fn rate(imu: &ImuRecord, axis: usize) -> Vec<Line> {
     let samples = imu.gyro.iter().enumerate();
     vec![
         samples
-            .map(|(k, angle)| (imu.time(k) + 0.5 * imu.period, angle[axis] / imu.period / DEGREE))
+            .map(|(k, angle)| {
+                (
+                    imu.time(k) + 0.5 * imu.period,
+                    angle[axis] / imu.period / DEGREE,
+                )
+            })
             .collect(),
     ]
 }
@@ -173,7 +186,10 @@ mod tests {
         for piece in &pieces {
             assert!(piece.is_sorted_by(|a, b| b.1 - a.1 < 11.0 && b.1 > a.1));
         }
-        assert!(azimuth(&table, 2).is_empty(), "a vertical axis has no azimuth");
+        assert!(
+            azimuth(&table, 2).is_empty(),
+            "a vertical axis has no azimuth"
+        );
     }
 
     #[test]

@@ -98,7 +98,10 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         name: "three-axis-made-up".to_owned(),
         site: Site::with_normal_gravity(39.9 * DEGREE, 116.3 * DEGREE, 50.0),
         meta: BTreeMap::from([
-            ("instrument".to_owned(), "navigation-grade FOG <IMU> & co".to_owned()),
+            (
+                "instrument".to_owned(),
+                "navigation-grade FOG <IMU> & co".to_owned(),
+            ),
             ("operator".to_owned(), "nobody".to_owned()),
         ]),
         imu: ImuRecord {
@@ -171,14 +174,23 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     let prior_mean = to_vector(&PerSensor::from_fn(|s| run.prior.get(s).mean(form)));
     let final_sigma = ParameterVector::from_fn(|i, _| {
         let (sensor, p) = crate::calibration::states::sensor_and_parameter(i);
-        let kind = ParameterKind::ALL.iter().position(|k| *k == Triad::kind(p)).unwrap();
+        let kind = ParameterKind::ALL
+            .iter()
+            .position(|k| *k == Triad::kind(p))
+            .unwrap();
         let spread = 0.8 + 0.4 * rng.random::<f64>();
         let has = Triad::has_parameter(form, p);
-        if has { FINAL[sensor as usize][kind] * spread } else { 0.0 }
+        if has {
+            FINAL[sensor as usize][kind] * spread
+        } else {
+            0.0
+        }
     });
     let truth = prior_mean + prior_sigma.component_mul(&vector(rng));
     let drawn = final_sigma.component_mul(&vector(rng));
-    let seen: Vec<f64> = (0..PARAMETERS).map(|i| DWELL * (1.0 + (i % 7) as f64)).collect();
+    let seen: Vec<f64> = (0..PARAMETERS)
+        .map(|i| DWELL * (1.0 + (i % 7) as f64))
+        .collect();
     let length = run.imu.duration();
     let history: Vec<Moment> = (0..(length * 5.0) as usize)
         .map(|k| {
@@ -190,8 +202,16 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
                 prior_sigma[i].min(aim / gain)
             });
             let wander = 0.3 * (time / 40.0).sin();
-            let estimate = truth + drawn.component_div(&final_sigma.map(|s| s.max(1e-300))).component_mul(&sigma) * (1.0 + wander);
-            Moment { time, estimate, sigma }
+            let estimate = truth
+                + drawn
+                    .component_div(&final_sigma.map(|s| s.max(1e-300)))
+                    .component_mul(&sigma)
+                    * (1.0 + wander);
+            Moment {
+                time,
+                estimate,
+                sigma,
+            }
         })
         .collect();
     let innovations = dwells
@@ -253,7 +273,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             table: nis(1.051, 1197),
         },
         velocity_sigma: 1.2e-5,
-        warnings: vec!["The path turns about z by less than a full turn; gyro K z rests on one move.".to_owned()],
+        warnings: vec![
+            "The path turns about z by less than a full turn; gyro K z rests on one move."
+                .to_owned(),
+        ],
     };
     let truth = from_vector(form, &truth);
     debug_assert!(parameter(Sensor::Accel, 0) == PARAMETERS / 2);

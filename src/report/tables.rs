@@ -67,9 +67,11 @@ pub(super) fn groups(report: &Report) -> Markup {
             row.push(claimed.map_or("–".to_owned(), |(_, rms)| sigma(rms)));
             if let Some(truth) = &truth {
                 let error = group.spread(&(estimate.vector() - truth), &indices);
-                row.extend(error.map_or(["–".to_owned(), "–".to_owned()], |(largest, rms)| {
-                    [three_digits(largest), three_digits(rms)]
-                }));
+                row.extend(
+                    error.map_or(["–".to_owned(), "–".to_owned()], |(largest, rms)| {
+                        [three_digits(largest), three_digits(rms)]
+                    }),
+                );
             }
         }
         if let (Some(difference), Some((_, first))) = (&difference, methods.first()) {
@@ -101,7 +103,11 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
         let shown = value(group.shown(values[i]), s);
         let mut row = vec![
             parameter_name(form, i)?,
-            if fixed { format!("{shown} (fixed)") } else { format!("{shown} ± {}", sigma(s)) },
+            if fixed {
+                format!("{shown} (fixed)")
+            } else {
+                format!("{shown} ± {}", sigma(s))
+            },
             group.unit().to_owned(),
         ];
         if let Some(prior) = &prior {
@@ -112,7 +118,11 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
         if let Some(truth) = &truth {
             let error = (values[i] - truth[i]) / unit;
             row.push(value(error, s));
-            row.push(if fixed { "–".to_owned() } else { value(error / s, 0.1) });
+            row.push(if fixed {
+                "–".to_owned()
+            } else {
+                value(error / s, 0.1)
+            });
         }
         Some(row)
     });
@@ -145,7 +155,15 @@ pub(super) fn passes(outcome: &Outcome) -> Markup {
         ]
     });
     table(
-        &["pass", "kind", "largest step, σ", "merit", "scalars", "merit / scalars", "rejected"],
+        &[
+            "pass",
+            "kind",
+            "largest step, σ",
+            "merit",
+            "scalars",
+            "merit / scalars",
+            "rejected",
+        ],
         rows,
     )
 }
@@ -158,7 +176,9 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
     ]
     .map(|(name, nis)| {
         if nis.count == 0 {
-            return [name, "not observed", "", "", "0"].map(str::to_owned).to_vec();
+            return [name, "not observed", "", "", "0"]
+                .map(str::to_owned)
+                .to_vec();
         }
         let (low, high) = nis.interval;
         let verdict = if nis.mean < low {
@@ -177,7 +197,13 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
         ]
     });
     table(
-        &["observation", "NIS per scalar", "95 % interval", "lag-one correlation", "scalars"],
+        &[
+            "observation",
+            "NIS per scalar",
+            "95 % interval",
+            "lag-one correlation",
+            "scalars",
+        ],
         rows,
     )
 }
@@ -233,7 +259,10 @@ pub(super) fn run(run: &Run) -> Markup {
                 run.unit.get(sensor)
             ),
         ));
-        rows.push(text(&format!("{} noise", sensor.name()), noise(sensor, run.noise.get(sensor))));
+        rows.push(text(
+            &format!("{} noise", sensor.name()),
+            noise(sensor, run.noise.get(sensor)),
+        ));
     }
     rows.push(match &run.table {
         Some(table) => text(
@@ -255,7 +284,10 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
         Sensor::Gyro => (DEG_PER_SQRT_H, "°/√h", DEG_PER_H, "°/h"),
         Sensor::Accel => (MICRO_G_PER_SQRT_HZ, "µg/√Hz", MICRO_G, "µg"),
     };
-    let mut text = format!("random walk {} {walk_unit}", sigma(noise.random_walk / walk));
+    let mut text = format!(
+        "random walk {} {walk_unit}",
+        sigma(noise.random_walk / walk)
+    );
     if let Some(instability) = noise.instability {
         text.push_str(&format!(
             ", instability {} {bias_unit} over {} s",
@@ -297,7 +329,10 @@ pub(super) fn model(report: &Report) -> Markup {
         rows.push(("closed form", note.to_owned()));
     }
     rows.push(("dwells", number::count(report.dwells.len())));
-    facts(rows.into_iter().map(|(name, value)| (name.to_owned(), value)))
+    facts(
+        rows.into_iter()
+            .map(|(name, value)| (name.to_owned(), value)),
+    )
 }
 
 /// Short names of the parameters that the path hardly observed.
