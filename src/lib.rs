@@ -17,6 +17,7 @@ pub mod earth;
 pub mod imu;
 pub mod models;
 pub mod navigation;
+pub mod report;
 pub mod run;
 pub mod simulation;
 pub mod turntable;
