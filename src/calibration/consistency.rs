@@ -9,15 +9,16 @@ const OUTSIDE: f64 = 0.05;
 
 /// Consistency of a pass: velocity and table apart.
 pub(super) fn consistency(innovations: &[Innovation]) -> Consistency {
-    let of = |observation| {
+    let of = |kinds: &[Observation]| {
         nis(innovations
             .iter()
-            .filter(|i| i.observation == observation && i.accepted)
+            .filter(|i| kinds.contains(&i.observation) && i.accepted)
             .map(|i| i.whitened))
     };
     Consistency {
-        velocity: of(Observation::Velocity),
-        table: of(Observation::Table),
+        all: of(&[Observation::Velocity, Observation::Table]),
+        velocity: of(&[Observation::Velocity]),
+        table: of(&[Observation::Table]),
     }
 }
 

@@ -1,7 +1,5 @@
 //! The estimator: coarse start, a live pass, and held passes until nothing moves.
 
-use nalgebra::Vector3;
-
 use super::coarse::coarse_start;
 use super::consistency::consistency;
 use super::error::CalibrationError;
@@ -94,42 +92,38 @@ fn iterate(
 ) -> Result<PassResult, CalibrationError> {
     let mut at = from;
     let mut rejected = Vec::new();
-    let mut best: Option<(Linearisation, PassResult)> = None;
+    // Where the last pass with this gate linearised, and its merit.
+    let mut before: Option<(Linearisation, f64)> = None;
     loop {
-        let result = pass(
-            problem,
-            &at,
-            Mode::Held {
-                rejected: &rejected,
-            },
-        )?;
+        let mode = Mode::Held {
+            rejected: &rejected,
+        };
+        let result = pass(problem, &at, mode)?;
         let summary = summary(&result, &at, false);
         progress(&summary);
         passes.push(summary);
-        let exhausted = passes.len() >= PASSES;
-        if let Some((before, kept)) = &best
-            && result.merit > kept.merit + MERIT_RISE
-        {
-            if exhausted {
-                return Ok(result);
-            }
-            at = before.towards(&at, 0.5);
-            continue;
-        }
         let outliers: Vec<bool> = result
             .innovations
             .iter()
-            .map(|i| Vector3::from(i.whitened).norm_squared() > problem.gate)
+            .map(|i| i.distance() > problem.gate)
             .collect();
-        let same_gate = outliers.iter().any(|&o| o) == rejected.iter().any(|&o| o)
-            && (rejected.is_empty() || outliers == rejected);
-        if exhausted || (summary.largest_step <= CONVERGED && same_gate) {
+        let same_gate = outliers
+            .iter()
+            .enumerate()
+            .all(|(k, &outlier)| outlier == rejected.get(k).copied().unwrap_or(false));
+        if passes.len() >= PASSES || (summary.largest_step <= CONVERGED && same_gate) {
             return Ok(result);
         }
-        rejected = outliers;
-        let next = result.estimate;
-        best = Some((at, result));
-        at = next;
+        match before {
+            Some((last, merit)) if result.merit > merit + MERIT_RISE => {
+                at = last.towards(&at, 0.5);
+            }
+            _ => {
+                before = same_gate.then_some((at, result.merit));
+                rejected = outliers;
+                at = result.estimate;
+            }
+        }
     }
 }
 

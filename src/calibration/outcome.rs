@@ -136,9 +136,18 @@ pub struct Innovation {
     pub accepted: bool,
 }
 
+impl Innovation {
+    /// Squared Mahalanobis distance, χ² with three degrees of freedom.
+    pub fn distance(&self) -> f64 {
+        self.whitened.iter().map(|w| w * w).sum()
+    }
+}
+
 /// Normalised innovation squared, apart for each kind of observation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
+    /// All observations.
+    pub all: Nis,
     /// Zero velocity.
     pub velocity: Nis,
     /// Attitude of the table.

@@ -201,6 +201,11 @@ impl Prior {
 pub struct Nominal(pub Vector3<f64>);
 
 impl Nominal {
+    /// `K C` of a normalised triad in the file's quantity.
+    pub fn sensitivity(&self, triad: &Triad) -> Matrix3<f64> {
+        Matrix3::from_diagonal(&self.0) * triad.sensitivity()
+    }
+
     /// The factor from the normalised parameter to the file's: the nominal scale for scale factors
     /// and biases, one for angles.
     pub fn factor(&self, parameter: usize) -> f64 {

@@ -24,6 +24,11 @@ const SHORTEST: f64 = 0.5;
 /// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and one that stops still rings.
 const MARGIN: f64 = 0.2;
+/// A table that creeps, or takes up its next position before it turns, shows it in the mean of this
+/// long a stretch at an end of the dwell, s …
+const CREEP_STRETCH: f64 = 1.0;
+/// … by this many σ.
+const CREEP_SIGMAS: f64 = 5.0;
 /// Readings of a standing table differ by less than this many σ of their noise …
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
@@ -52,43 +57,59 @@ impl Run {
     }
 
     fn dwell(&self, table: &TableRecord, standing: Range<usize>) -> Option<Dwell> {
-        let (first, last) = (
-            *table.time.get(standing.start)?,
-            *table.time.get(standing.end - 1)?,
-        );
+        let settled = settled(table, standing);
         // At either end of the log the table is not known to move.
-        let begin = if standing.start == 0 {
-            first
-        } else {
-            first + MARGIN
-        };
-        let end = if standing.end == table.time.len() {
-            last
-        } else {
-            last - MARGIN
-        };
-        let sample = |time: f64, up: bool| {
-            let k = (time - self.imu.start) / self.imu.period;
-            // A stamp that misses a sample's edge by rounding must not cost the sample.
-            let k = if up {
-                (k - 1e-3).ceil()
-            } else {
-                (k + 1e-3).floor()
-            };
-            k.clamp(0.0, self.imu.len() as f64) as usize
-        };
-        let samples = sample(begin, true)..sample(end, false);
-        let readings = standing.start + table.time[standing.clone()].partition_point(|&t| t < begin)
-            ..standing.start + table.time[standing].partition_point(|&t| t <= end);
-        if samples.len() as f64 * self.imu.period < SHORTEST || readings.is_empty() {
+        let margin = |at_end: bool| if at_end { 0.0 } else { MARGIN };
+        let begin = table.time.get(settled.start)? + margin(settled.start == 0);
+        let end =
+            table.time.get(settled.end.checked_sub(1)?)? - margin(settled.end == table.time.len());
+
+        let times = &table.time[settled.clone()];
+        let readings = settled.start + times.partition_point(|&t| t < begin)
+            ..settled.start + times.partition_point(|&t| t <= end);
+        // A stamp that misses a sample's edge by rounding must not cost the sample.
+        let edge = |time: f64| (time - self.imu.start) / self.imu.period;
+        let sample = |k: f64| k.clamp(0.0, self.imu.len() as f64) as usize;
+        let samples = sample((edge(begin) - 1e-3).ceil())..sample((edge(end) + 1e-3).floor());
+        if samples.len() as f64 * self.imu.period < SHORTEST {
             return None;
         }
         Some(Dwell {
-            attitude: mean_attitude(&table.attitude[readings.clone()])?,
+            attitude: mean_attitude(table.attitude.get(readings.clone())?)?,
             samples,
             readings,
         })
     }
+}
+
+/// Cuts off the ends of a standstill at which the mean of the readings is not that of its middle.
+fn settled(table: &TableRecord, standing: Range<usize>) -> Range<usize> {
+    let quarter = standing.len() / 4;
+    let middle = standing.start + quarter..standing.end - quarter;
+    let (first, last) = (table.time[standing.start], table.time[standing.end - 1]);
+    let interval = (last - first) / (standing.len() as f64 - 1.0);
+    let stretch = (CREEP_STRETCH / interval).round();
+    let Some(level) = mean_attitude(&table.attitude[middle.clone()]) else {
+        return standing;
+    };
+    if !(stretch >= 1.0 && stretch <= quarter as f64) {
+        return standing;
+    }
+    let stretch = stretch as usize;
+    let sigma = table.reading_sigma * (1.0 / stretch as f64 + 1.0 / middle.len() as f64).sqrt();
+    let creeps = |readings: Range<usize>| {
+        mean_attitude(&table.attitude[readings])
+            .is_some_and(|mean| log(&(mean * level.transpose())).norm() > CREEP_SIGMAS * sigma)
+    };
+    let mut settled = standing;
+    while settled.start + stretch <= middle.start && creeps(settled.start..settled.start + stretch)
+    {
+        settled.start += stretch;
+    }
+    while settled.end >= middle.end + stretch && creeps(settled.end - stretch..settled.end) {
+        settled.end -= stretch;
+    }
+    settled
 }
 
 /// The mean of attitudes that lie close together; `None` of none.

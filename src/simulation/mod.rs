@@ -133,6 +133,7 @@ impl Scenario {
                     .max(self.integrator.lever_arm.norm()),
             },
             table: Some(self.readings(&read, seed, stream)),
+            notes: Vec::new(),
             segments: Vec::new(),
         };
         Ok(Simulated {

@@ -1,0 +1,180 @@
+//! From an estimate to the record that others read.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
+use super::states::{PARAMETERS, sensor_and_parameter};
+use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::run::Run;
+use crate::run::record::{
+    Aiding, BodyFrame, CalibrationRecord, ConsistencyRecord, EQUATION, Method, NisRecord,
+    TestVector, TriadRecord,
+};
+
+/// Inputs of the test vectors: rad/s, then m/s².
+const TEST_INPUTS: [[f64; 6]; 3] = [
+    [0.0, 0.0, 0.0, 0.0, 0.0, 9.8],
+    [0.1, -0.2, 0.3, 1.0, 2.0, -3.0],
+    [-1.0, 0.5, 0.25, -9.8, 0.5, 4.0],
+];
+
+impl Outcome {
+    /// The record of this calibration of a run.
+    pub fn record(&self, run: &Run) -> CalibrationRecord {
+        CalibrationRecord {
+            method: Some(Method::Ekf),
+            aiding: Some(Aiding::Table),
+            passes: Some(self.passes.len()),
+            converged: Some(self.converged),
+            consistency: Some(consistency_record(&self.consistency)),
+            warnings: self.warnings.clone(),
+            ..self.estimate.record(run)
+        }
+    }
+}
+
+impl Estimate {
+    /// The record of this estimate, with a model card: equation, correction, test vectors.
+    pub fn record(&self, run: &Run) -> CalibrationRecord {
+        let form = self.form();
+        let sigma = self.sigma();
+        let estimated: Vec<usize> = self.estimated().collect();
+        let names = |wanted: bool| {
+            (0..PARAMETERS)
+                .filter(|&i| (self.covariance[(i, i)] > 0.0) == wanted)
+                .filter_map(|i| parameter_name(form, i))
+                .collect()
+        };
+        let factor = |index: usize| {
+            let (sensor, of_triad) = sensor_and_parameter(index);
+            run.nominal.get(sensor).factor(of_triad)
+        };
+        let of = |sensor| triad_record(self.triads.get(sensor), run.nominal.get(sensor));
+        let corrections = PerSensor::from_fn(|sensor| {
+            let sensitivity = run.nominal.get(sensor).sensitivity(self.triads.get(sensor));
+            rows(&sensitivity.try_inverse().unwrap_or_else(Matrix3::zeros))
+        });
+        CalibrationRecord {
+            method: Some(Method::SixPosition),
+            installation_form: Some(form),
+            body_frame: BodyFrame::Table,
+            unit: Some(run.unit.clone()),
+            sigma: Some(PerSensor::from_fn(|sensor| {
+                let sigma = sigma.fixed_rows::<PER_TRIAD>(super::states::parameter(sensor, 0));
+                sigma_record(form, &sigma.into_owned(), run.nominal.get(sensor))
+            })),
+            parameters: names(true),
+            covariance: estimated
+                .iter()
+                .map(|&i| {
+                    estimated
+                        .iter()
+                        .map(|&j| self.covariance[(i, j)] * factor(i) * factor(j))
+                        .collect()
+                })
+                .collect(),
+            fixed: names(false),
+            equation: Some(EQUATION.to_owned()),
+            correction: Some(corrections),
+            test_vectors: TEST_INPUTS
+                .iter()
+                .map(|input| self.test_vector(run, input))
+                .collect(),
+            meta: run.meta.clone(),
+            ..CalibrationRecord::new(of(Sensor::Gyro), of(Sensor::Accel))
+        }
+    }
+
+    fn test_vector(&self, run: &Run, input: &[f64; 6]) -> TestVector {
+        let mut raw = [0.0; 6];
+        for (sensor, first) in [(Sensor::Gyro, 0), (Sensor::Accel, 3)] {
+            let u = Vector3::from_column_slice(&input[first..first + 3]);
+            let output = self.triads.get(sensor).output(&u);
+            let output = output.component_mul(&run.nominal.get(sensor).0);
+            raw[first..first + 3].copy_from_slice(output.as_slice());
+        }
+        TestVector {
+            raw,
+            calibrated: *input,
+        }
+    }
+}
+
+/// The record of a known truth.
+pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> CalibrationRecord {
+    let of = |sensor| triad_record(truth.get(sensor), run.nominal.get(sensor));
+    CalibrationRecord {
+        installation_form: Some(truth.gyro.form),
+        unit: Some(run.unit.clone()),
+        ..CalibrationRecord::new(of(Sensor::Gyro), of(Sensor::Accel))
+    }
+}
+
+/// Both triads of a record, normalised by these nominal scales and split in a form. A record may
+/// hold any installation matrix, so the split goes through `K C`, which all forms share.
+pub fn triads_of(
+    record: &CalibrationRecord,
+    nominal: &PerSensor<Nominal>,
+    form: InstallationForm,
+) -> PerSensor<Triad> {
+    PerSensor::from_fn(|sensor| {
+        let triad = match sensor {
+            Sensor::Gyro => &record.gyro,
+            Sensor::Accel => &record.accel,
+        };
+        let nominal = nominal.get(sensor).0;
+        let a = Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j] / nominal[i]);
+        let bias = Vector3::from(triad.bias).component_div(&nominal);
+        Triad::from_sensitivity(form, &a, bias)
+    })
+}
+
+fn triad_record(triad: &Triad, nominal: &Nominal) -> TriadRecord {
+    TriadRecord {
+        scale: triad.scale.component_mul(&nominal.0).into(),
+        installation: rows(&triad.installation()),
+        bias: triad.bias.component_mul(&nominal.0).into(),
+    }
+}
+
+fn sigma_record(
+    form: InstallationForm,
+    sigma: &crate::imu::TriadVector,
+    nominal: &Nominal,
+) -> TriadRecord {
+    let triad = Triad::from_vector(form, sigma);
+    let mut installation = [[0.0; 3]; 3];
+    for (angle, &(row, column)) in form.angle_names().iter().enumerate() {
+        installation[row][column] = triad.angles[angle];
+        if form == InstallationForm::ThreeAngle {
+            installation[column][row] = triad.angles[angle];
+        }
+    }
+    TriadRecord {
+        scale: triad.scale.component_mul(&nominal.0).abs().into(),
+        installation,
+        bias: triad.bias.component_mul(&nominal.0).abs().into(),
+    }
+}
+
+fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
+}
+
+fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
+    let Consistency {
+        all,
+        velocity,
+        table,
+    } = consistency;
+    let of = |nis: &Nis| NisRecord {
+        nis: nis.mean,
+        nis_interval: [nis.interval.0, nis.interval.1],
+    };
+    let some = |nis: &Nis| (nis.count > 0).then(|| of(nis));
+    ConsistencyRecord {
+        all: of(all),
+        velocity: some(velocity),
+        table: some(table),
+    }
+}
