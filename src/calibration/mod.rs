@@ -17,6 +17,7 @@ pub mod states;
 
 pub use closed_form::{ClosedForm, Position, six_position, six_position_triad};
 pub use coarse::coarse_start;
+pub use consistency::mean_square_interval;
 pub use error::CalibrationError;
 pub use estimator::{Progress, estimate};
 pub use outcome::{Estimate, Outcome};

@@ -1,0 +1,86 @@
+//! Accuracy and honesty of the filter over many simulated runs with the paper's initial errors.
+
+use rayon::prelude::*;
+use turncal::calibration::outcome::to_vector;
+use turncal::calibration::states::{PARAMETERS, ParameterVector};
+use turncal::calibration::{Outcome, estimate, mean_square_interval};
+use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
+use turncal::simulation::Scenario;
+
+/// Fixed before the first run was made.
+const SEED: u64 = 2016;
+const RUNS: u64 = 100;
+
+struct Trial {
+    /// Error of each parameter in units of its claimed σ.
+    normalised: ParameterVector,
+    /// Normalised estimation error squared over all parameters.
+    nees: f64,
+    outcome: Outcome,
+}
+
+fn trial(scenario: &Scenario, stream: u64) -> Trial {
+    let simulated = scenario.simulate(SEED, stream).unwrap();
+    let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+    let error = outcome.estimate.vector() - to_vector(&simulated.truth);
+    let sigma = outcome.estimate.sigma();
+    // In units of σ the covariance is a correlation matrix, which inverts without loss.
+    let normalised = error.component_div(&sigma);
+    let correlation = nalgebra::DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+        outcome.estimate.covariance[(i, j)] / (sigma[i] * sigma[j])
+    });
+    let solved = correlation
+        .cholesky()
+        .unwrap()
+        .solve(&nalgebra::DVector::from_column_slice(normalised.as_slice()));
+    let nees = normalised.iter().zip(&solved).map(|(a, b)| a * b).sum();
+    Trial {
+        normalised,
+        nees,
+        outcome,
+    }
+}
+
+#[test]
+fn claimed_accuracy_is_true_from_the_papers_initial_errors_on() {
+    let scenario = Scenario::load("demo").unwrap();
+    let trials: Vec<Trial> = (0..RUNS)
+        .into_par_iter()
+        .map(|stream| trial(&scenario, stream))
+        .collect();
+    assert!(trials.iter().all(|t| t.outcome.converged));
+    assert!(trials.iter().all(|t| t.outcome.passes.len() <= 4));
+
+    let runs = RUNS as f64;
+    let anees = trials.iter().map(|t| t.nees).sum::<f64>() / (runs * PARAMETERS as f64);
+    let (low, high) = mean_square_interval(PARAMETERS * RUNS as usize, 0.002);
+    println!("ANEES/24 {anees:.4} of {RUNS} runs, 99.8 % interval {low:.4} to {high:.4}");
+    assert!((low..high).contains(&anees), "ANEES/24 {anees}");
+
+    for triad in 0..2 {
+        for kind in ParameterKind::ALL {
+            let members: Vec<usize> = (0..PER_TRIAD)
+                .filter(|&p| Triad::kind(p) == kind)
+                .map(|p| triad * PER_TRIAD + p)
+                .collect();
+            let mean_square = trials
+                .iter()
+                .flat_map(|t| members.iter().map(|&i| t.normalised[i].powi(2)))
+                .sum::<f64>()
+                / (runs * members.len() as f64);
+            let ratio = mean_square.sqrt();
+            let (low, high) = mean_square_interval(members.len() * RUNS as usize, 0.01);
+            println!("RMS/σ of triad {triad} {kind:?}: {ratio:.3}");
+            assert!(
+                (0.9 * low.sqrt()..1.1 * high.sqrt()).contains(&ratio),
+                "triad {triad} {kind:?}: RMS/σ {ratio}"
+            );
+        }
+    }
+
+    let mean = |f: &dyn Fn(&Trial) -> f64| trials.iter().map(f).sum::<f64>() / runs;
+    let velocity = mean(&|t| t.outcome.consistency.velocity.mean);
+    let table = mean(&|t| t.outcome.consistency.table.mean);
+    println!("NIS velocity {velocity:.4}, table {table:.4}");
+    assert!((0.9..1.1).contains(&velocity) && (0.9..1.1).contains(&table));
+}
