@@ -15,10 +15,12 @@ pub mod record;
 mod segments;
 mod table_log;
 mod whole;
+mod write;
 
 pub use error::{Place, RunError};
 pub use record::CalibrationRecord;
 pub use whole::{WholeDirectory, write_whole};
+pub use write::write_run;
 
 use std::collections::BTreeMap;
 
