@@ -146,7 +146,6 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "[\"gx\", \"gy\"]",
             "imu.columns.gyro & three",
         ),
-        ("\"gy\"", "\"gx\"", "gx & twice"),
         ("= 0.001", "= -0.001", "angle_random_walk & zero or"),
         (
             "bias_sigma = 10.0",
@@ -351,8 +350,8 @@ fn each_wrong_file_has_its_message() {
             .collect::<String>();
     for (file, content, words) in [
         ("imu.csv", "", "an empty file"),
-        ("imu.csv", header, "0 rows & at least 100"),
-        ("imu.csv", &two_rows, "2 rows & at least 100"),
+        ("imu.csv", header, "0 samples & at least 100"),
+        ("imu.csv", &two_rows, "2 samples & at least 100"),
         (
             "imu.csv",
             &twice_as_slow,
@@ -363,7 +362,7 @@ fn each_wrong_file_has_its_message() {
         (
             "table.csv",
             "t,qw,qx,qy,qz\n0,1,0,0,0\n",
-            "1 rows & at least 2",
+            "single reading & at least 2",
         ),
         ("run.toml", "", "no `format`"),
         (
@@ -394,7 +393,7 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     std::io::Write::write_all(&mut gz, imu().as_bytes()).unwrap();
     let whole = gz.finish().unwrap();
     let mut flipped = whole.clone();
-    flipped[whole.len() / 2] ^= 0xff;
+    flipped[whole.len() - 8] ^= 0xff;
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.csv.gz")).unwrap();
     fs::write(at("imu.csv.gz"), &whole).unwrap();
     assert!(Run::read(&at("run.toml")).is_ok());
@@ -402,6 +401,10 @@ fn missing_damaged_and_foreign_files_have_their_message() {
         fs::write(at("imu.csv.gz"), damaged).unwrap();
         assert_says(&error(), "imu.csv.gz", "damaged or cut off");
     }
+
+    fs::write(at("imu.csv"), imu()).unwrap();
+    fs::write(at("run.toml"), RUN.replace("\"gy\"", "\"gx\"")).unwrap();
+    assert_says(&error(), "imu.csv", "`gx` named for two & run.toml");
 
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.txt")).unwrap();
     assert_says(&error(), "imu.txt", ".csv or .csv.gz");
@@ -442,8 +445,12 @@ fn each_wrong_calibration_has_its_message() {
             "\"gyro\":{\"scale\":[1,1,1e999]",
             "out of range",
         ),
-        ("[[1,0],[0,2]]", "[[1,0]]", "1 rows in covariance & 2"),
-        ("[[1,0],[0,2]]", "[[1,0],[2]]", "1 values in row 2 & square"),
+        ("[[1,0],[0,2]]", "[[1,0]]", "1 row(s) in covariance & 2"),
+        (
+            "[[1,0],[0,2]]",
+            "[[1,0],[2]]",
+            "1 value(s) in row 2 & square",
+        ),
         ("[[1,0],[0,2]]", "[[1,0],[0,-2]]", "row 2 & below zero"),
         (
             "gyro.scale.x",
@@ -451,7 +458,7 @@ fn each_wrong_calibration_has_its_message() {
             "gyro.scal.x & mean `gyro.scale.x`",
         ),
         ("gyro.scale.x", "accel.bias.z", "`accel.bias.z` twice"),
-        ("}}", "", "line 2"),
+        ("\"any\"}", "\"any\"", "line 2"),
     ] {
         let spoilt = good.replacen(from, to, 1);
         assert_ne!(spoilt, good, "{from}");

@@ -14,6 +14,7 @@ pub(super) struct CsvFile {
     file: PathBuf,
     reader: Reader<Box<dyn Read>>,
     header: Vec<String>,
+    taken: Vec<usize>,
     row: ByteRecord,
     line: u64,
 }
@@ -52,6 +53,7 @@ impl CsvFile {
                 .buffer_capacity(1 << 16)
                 .from_reader(source),
             header: Vec::new(),
+            taken: Vec::new(),
             row: ByteRecord::new(),
             line: 1,
         };
@@ -72,12 +74,20 @@ impl CsvFile {
         Ok(csv)
     }
 
-    /// The index of a named column.
-    pub fn column(&self, name: &str) -> Result<usize, RunError> {
+    /// The index of a named column, which nothing else may be.
+    pub fn column(&mut self, name: &str) -> Result<usize, RunError> {
         let mut places = (0..self.header.len()).filter(|&i| self.header[i] == name);
         let header = || self.header.iter().map(String::as_str);
         match (places.next(), places.next()) {
-            (Some(index), None) => Ok(index),
+            (Some(index), None) if self.taken.contains(&index) => Err(self.error_here(
+                format_args!("`{name}` named for two quantities"),
+                "a column of its own for each",
+                "Correct `columns` in run.toml.",
+            )),
+            (Some(index), None) => {
+                self.taken.push(index);
+                Ok(index)
+            }
             (Some(_), Some(_)) => Err(self.error_here(
                 format_args!("two columns named `{name}`"),
                 "one",

@@ -79,8 +79,8 @@ impl<'a> Fields<'a> {
                 return Err(self.document.error(
                     Some(key.span()),
                     format_args!("the unknown field `{name}`{}", self.place()),
-                    "a field of the run format",
-                    suggestion(name, known.iter().copied()),
+                    format_args!("one of {}", list(known.iter().copied())),
+                    suggestion(name, known.iter().copied(), "Remove or rename it."),
                 ));
             }
         }
@@ -336,7 +336,7 @@ impl<'a> Field<'a> {
             None => Err(self.error(
                 self.source(),
                 format_args!("one of {}", list(words.clone())),
-                suggestion(word, words),
+                suggestion(word, words, "Choose one of them."),
             )),
         }
     }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-use super::ImuRecord;
 use super::axes::BodyAxes;
 use super::csv_file::CsvFile;
 use super::error::{Place, RunError};
+use super::{ImuRecord, nanoseconds};
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
@@ -86,7 +86,7 @@ impl ImuLog<'_> {
         }
         if stamps.len() < FEWEST_SAMPLES {
             return Err(csv.error(
-                format_args!("{} rows of samples", stamps.len()),
+                format_args!("{} samples", stamps.len()),
                 format_args!("at least {FEWEST_SAMPLES}"),
                 "Record a run with dwells and turns.",
             ));
@@ -179,7 +179,7 @@ fn uniform_time(
     {
         return error(
             first.1,
-            format!("steps of {median} s from row to row"),
+            format!("steps of {} s from row to row", nanoseconds(median)),
             format!("sample_period_s = {period} as in run.toml"),
             "Correct sample_period_s or the time column.",
         );
@@ -190,7 +190,7 @@ fn uniform_time(
             return error(
                 line,
                 format!("a gap in time from {before} s to {time} s"),
-                format!("a step of {} s", step_limit / 1.5),
+                format!("a step of {} s", nanoseconds(step_limit / 1.5)),
                 "Only uniform sampling can be integrated: fill the gap or split the record there.",
             );
         }

@@ -140,3 +140,8 @@ pub struct Segment {
     /// `x_up` … `z_down`, `rot_x+360` and the like.
     pub label: String,
 }
+
+/// A time rounded to 1 ns, so that it prints short.
+fn nanoseconds(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
+}

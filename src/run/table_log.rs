@@ -76,7 +76,7 @@ impl<'a> AttitudeColumns<&'a str> {
         }
     }
 
-    fn find(&self, csv: &CsvFile) -> Result<AttitudeColumns<usize>, RunError> {
+    fn find(&self, csv: &mut CsvFile) -> Result<AttitudeColumns<usize>, RunError> {
         Ok(match self {
             Self::Quaternion([w, x, y, z]) => AttitudeColumns::Quaternion([
                 csv.column(w)?,
@@ -201,7 +201,7 @@ impl<'a> TableLog<'a> {
     pub fn read(&self, imu: &ImuRecord) -> Result<TableRecord, RunError> {
         let mut csv = CsvFile::open(&self.file)?;
         let time_column = csv.column(self.time)?;
-        let columns = self.attitude.find(&csv)?;
+        let columns = self.attitude.find(&mut csv)?;
 
         let mut time: Vec<f64> = Vec::new();
         let mut attitude = Vec::new();
@@ -227,7 +227,7 @@ impl<'a> TableLog<'a> {
             [first, .., last] => (*first, *last),
             _ => {
                 return Err(csv.error(
-                    format_args!("{} rows of readings", time.len()),
+                    "a single reading or none",
                     "at least 2",
                     "Log the table over the whole run, or remove [turntable].",
                 ));

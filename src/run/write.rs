@@ -12,7 +12,7 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use super::error::{Place, RunError, list, suggestion};
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
-use super::{CalibrationRecord, ImuRecord, Run, Segment, TableRecord};
+use super::{CalibrationRecord, ImuRecord, Run, Segment, TableRecord, nanoseconds};
 use crate::imu::{Output, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -47,8 +47,8 @@ pub fn write_run(
             &configuration,
             Place::File,
             format_args!("`{name}` among the meta fields"),
-            "a field of [meta]",
-            suggestion(name, META),
+            format_args!("one of {}", list(META)),
+            suggestion(name, META, "Rename it."),
         ));
     }
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
@@ -138,11 +138,6 @@ fn segment_rows(file: &mut dyn Write, segments: &[Segment]) -> io::Result<()> {
         csv.write_record([&start, &end, &segment.label])?;
     }
     csv.flush()
-}
-
-/// A time rounded to 1 ns, so that it prints short.
-fn nanoseconds(time: f64) -> f64 {
-    (time * 1e9).round() / 1e9
 }
 
 /// A number to fifteen digits: all that a conversion of units leaves true.
