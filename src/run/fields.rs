@@ -196,21 +196,19 @@ impl<'a> Field<'a> {
     /// An error at this value.
     pub fn error(
         &self,
-        found: impl std::fmt::Display,
         expected: impl std::fmt::Display,
         advice: impl std::fmt::Display,
     ) -> RunError {
         self.document.error(
             Some(self.value.span()),
-            format_args!("{} = {found}", self.name),
+            format_args!("{} = {}", self.name, self.source()),
             expected,
             advice,
         )
     }
 
     fn wrong_kind(&self, expected: &str) -> RunError {
-        let found = self.source();
-        self.error(found, expected, "Correct this value.")
+        self.error(expected, "Correct this value.")
     }
 
     /// The value as it stands in the file, its first line.
@@ -334,7 +332,6 @@ impl<'a> Field<'a> {
         match choices.iter().find(|(choice, _)| *choice == word) {
             Some(&(_, meaning)) => Ok(meaning),
             None => Err(self.error(
-                self.source(),
                 format_args!("one of {}", list(words.clone())),
                 suggestion(word, words, "Choose one of them."),
             )),
