@@ -129,6 +129,13 @@ impl<'a> Fields<'a> {
 
     /// A table below this one, if it is there.
     pub fn table(&self, name: &str, known: &[&str]) -> Result<Option<Self>, RunError> {
+        self.open_table(name)?
+            .map(|table| table.with_only(known))
+            .transpose()
+    }
+
+    /// A table below this one whose names are not checked here.
+    pub fn open_table(&self, name: &str) -> Result<Option<Self>, RunError> {
         let Some(field) = self.get(name) else {
             return Ok(None);
         };
@@ -137,14 +144,12 @@ impl<'a> Fields<'a> {
             .get_ref()
             .as_table()
             .ok_or_else(|| field.wrong_kind("a table"))?;
-        Self {
+        Ok(Some(Self {
             document: self.document,
             name: field.name,
             span: Some(field.value.span()),
             entries,
-        }
-        .with_only(known)
-        .map(Some)
+        }))
     }
 
     /// A table below this one that must be there.
@@ -171,17 +176,6 @@ impl<'a> Fields<'a> {
             };
             (name, field)
         })
-    }
-
-    /// Tables below this one whose names are not checked here.
-    pub fn open_table(&self, name: &str) -> Result<Option<Self>, RunError> {
-        let names: Vec<&str> = self
-            .entries
-            .get(name)
-            .and_then(|value| value.get_ref().as_table())
-            .map(|table| table.keys().map(|key| &**key.get_ref()).collect())
-            .unwrap_or_default();
-        self.table(name, &names)
     }
 }
 
