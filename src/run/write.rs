@@ -5,7 +5,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use flate2::write::GzEncoder;
 use flate2::{Compression, GzBuilder};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
@@ -54,18 +53,20 @@ pub fn write_run(
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = directory.join(name);
         let written = File::create(&path).and_then(|file| {
-            let mut file = BufWriter::new(file);
             if name.ends_with(".gz") {
                 // No time of writing in the header, so that the same run gives the same bytes.
-                let mut gz: GzEncoder<_> = GzBuilder::new()
+                let gz = GzBuilder::new()
                     .mtime(0)
                     .write(file, Compression::default());
-                content(&mut gz)?;
-                file = gz.finish()?;
+                let mut rows = BufWriter::with_capacity(1 << 16, gz);
+                content(&mut rows)?;
+                rows.into_inner()?.finish()?;
+                Ok(())
             } else {
-                content(&mut file)?;
+                let mut text = BufWriter::new(file);
+                content(&mut text)?;
+                text.flush()
             }
-            file.flush()
         });
         written.map_err(|error| {
             RunError::io(
