@@ -14,6 +14,7 @@ pub(super) struct CsvFile {
     file: PathBuf,
     reader: Reader<Box<dyn Read>>,
     header: Vec<String>,
+    taken: Vec<usize>,
     row: ByteRecord,
     line: u64,
 }
@@ -52,6 +53,7 @@ impl CsvFile {
                 .buffer_capacity(1 << 16)
                 .from_reader(source),
             header: Vec::new(),
+            taken: Vec::new(),
             row: ByteRecord::new(),
             line: 1,
         };
@@ -72,12 +74,20 @@ impl CsvFile {
         Ok(csv)
     }
 
-    /// The index of a named column.
-    pub fn column(&self, name: &str) -> Result<usize, RunError> {
+    /// The index of a named column, which nothing else may be.
+    pub fn column(&mut self, name: &str) -> Result<usize, RunError> {
         let mut places = (0..self.header.len()).filter(|&i| self.header[i] == name);
         let header = || self.header.iter().map(String::as_str);
         match (places.next(), places.next()) {
-            (Some(index), None) => Ok(index),
+            (Some(index), None) if self.taken.contains(&index) => Err(self.error_here(
+                format_args!("`{name}` named for two quantities"),
+                "a column of its own for each",
+                "Correct `columns` in run.toml.",
+            )),
+            (Some(index), None) => {
+                self.taken.push(index);
+                Ok(index)
+            }
             (Some(_), Some(_)) => Err(self.error_here(
                 format_args!("two columns named `{name}`"),
                 "one",
@@ -118,6 +128,24 @@ impl CsvFile {
             .and_then(|text| text.parse().ok())
             .filter(|number: &f64| number.is_finite())
             .ok_or_else(|| self.not(column, "a finite number"))
+    }
+
+    /// The time in a column of the row, which must be later than that of the row before.
+    pub fn time(&self, column: usize, before: Option<f64>) -> Result<f64, RunError> {
+        let time = self.number(column)?;
+        match before {
+            Some(before) if time == before => Err(self.error_here(
+                format_args!("time {time} s again, a duplicate of the row before"),
+                "a later time",
+                "Remove the duplicate row, or print times with more digits.",
+            )),
+            Some(before) if time < before => Err(self.error_here(
+                format_args!("time going back from {before} s to {time} s"),
+                "times that increase",
+                "Put the rows in order, or split the file where the clock was set.",
+            )),
+            _ => Ok(time),
+        }
     }
 
     /// The text in a column of the row, not empty.

@@ -80,11 +80,13 @@ pub(super) fn nearest<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
+    let name = name.to_lowercase();
     candidates
         .into_iter()
         .map(|candidate| {
+            let lower = candidate.to_lowercase();
             (
-                strsim::normalized_damerau_levenshtein(name, candidate),
+                strsim::normalized_damerau_levenshtein(&name, &lower),
                 candidate,
             )
         })
@@ -93,15 +95,16 @@ pub(super) fn nearest<'a>(
         .map(|(_, candidate)| candidate)
 }
 
-/// `Did you mean … ?`, or the names to choose from.
+/// `Did you mean … ?`, or else the advice given.
 pub(super) fn suggestion<'a>(
     name: &str,
-    candidates: impl IntoIterator<Item = &'a str> + Clone,
+    candidates: impl IntoIterator<Item = &'a str>,
+    otherwise: &str,
 ) -> String {
-    match nearest(name, candidates.clone()) {
-        Some(candidate) => format!("Did you mean `{candidate}`?"),
-        None => format!("The names here are {}.", list(candidates)),
-    }
+    nearest(name, candidates).map_or_else(
+        || otherwise.to_owned(),
+        |candidate| format!("Did you mean `{candidate}`?"),
+    )
 }
 
 /// Names in backquotes, separated by commas.

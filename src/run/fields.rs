@@ -79,8 +79,8 @@ impl<'a> Fields<'a> {
                 return Err(self.document.error(
                     Some(key.span()),
                     format_args!("the unknown field `{name}`{}", self.place()),
-                    "a field of the run format",
-                    suggestion(name, known.iter().copied()),
+                    format_args!("one of {}", list(known.iter().copied())),
+                    suggestion(name, known.iter().copied(), "Remove or rename it."),
                 ));
             }
         }
@@ -129,6 +129,13 @@ impl<'a> Fields<'a> {
 
     /// A table below this one, if it is there.
     pub fn table(&self, name: &str, known: &[&str]) -> Result<Option<Self>, RunError> {
+        self.open_table(name)?
+            .map(|table| table.with_only(known))
+            .transpose()
+    }
+
+    /// A table below this one whose names are not checked here.
+    pub fn open_table(&self, name: &str) -> Result<Option<Self>, RunError> {
         let Some(field) = self.get(name) else {
             return Ok(None);
         };
@@ -137,14 +144,12 @@ impl<'a> Fields<'a> {
             .get_ref()
             .as_table()
             .ok_or_else(|| field.wrong_kind("a table"))?;
-        Self {
+        Ok(Some(Self {
             document: self.document,
             name: field.name,
             span: Some(field.value.span()),
             entries,
-        }
-        .with_only(known)
-        .map(Some)
+        }))
     }
 
     /// A table below this one that must be there.
@@ -172,17 +177,6 @@ impl<'a> Fields<'a> {
             (name, field)
         })
     }
-
-    /// Tables below this one whose names are not checked here.
-    pub fn open_table(&self, name: &str) -> Result<Option<Self>, RunError> {
-        let names: Vec<&str> = self
-            .entries
-            .get(name)
-            .and_then(|value| value.get_ref().as_table())
-            .map(|table| table.keys().map(|key| &**key.get_ref()).collect())
-            .unwrap_or_default();
-        self.table(name, &names)
-    }
 }
 
 /// A value in a TOML file.
@@ -196,21 +190,19 @@ impl<'a> Field<'a> {
     /// An error at this value.
     pub fn error(
         &self,
-        found: impl std::fmt::Display,
         expected: impl std::fmt::Display,
         advice: impl std::fmt::Display,
     ) -> RunError {
         self.document.error(
             Some(self.value.span()),
-            format_args!("{} = {found}", self.name),
+            format_args!("{} = {}", self.name, self.source()),
             expected,
             advice,
         )
     }
 
     fn wrong_kind(&self, expected: &str) -> RunError {
-        let found = self.source();
-        self.error(found, expected, "Correct this value.")
+        self.error(expected, "Correct this value.")
     }
 
     /// The value as it stands in the file, its first line.
@@ -334,9 +326,8 @@ impl<'a> Field<'a> {
         match choices.iter().find(|(choice, _)| *choice == word) {
             Some(&(_, meaning)) => Ok(meaning),
             None => Err(self.error(
-                self.source(),
                 format_args!("one of {}", list(words.clone())),
-                suggestion(word, words),
+                suggestion(word, words, "Choose one of them."),
             )),
         }
     }

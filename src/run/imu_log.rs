@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-use super::ImuRecord;
 use super::axes::BodyAxes;
 use super::csv_file::CsvFile;
 use super::error::{Place, RunError};
+use super::{ImuRecord, nanoseconds};
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
@@ -74,7 +74,8 @@ impl ImuLog<'_> {
         let mut stamps = Vec::new();
         let mut samples = PerSensor::from_fn(|_| Vec::new());
         while csv.advance()? {
-            stamps.push((csv.number(time)?, csv.line()));
+            let before = stamps.last().map(|&(stamp, _)| stamp);
+            stamps.push((csv.time(time, before)?, csv.line()));
             for sensor in Sensor::ALL {
                 samples
                     .get_mut(sensor)
@@ -86,7 +87,7 @@ impl ImuLog<'_> {
         }
         if stamps.len() < FEWEST_SAMPLES {
             return Err(csv.error(
-                format_args!("{} rows of samples", stamps.len()),
+                format_args!("{} samples", stamps.len()),
                 format_args!("at least {FEWEST_SAMPLES}"),
                 "Record a run with dwells and turns.",
             ));
@@ -133,7 +134,7 @@ impl ImuLog<'_> {
     }
 }
 
-/// The first stamp and the period of stamps that are printed rounded but belong to samples of equal
+/// The first stamp and the period of increasing stamps that are printed rounded but belong to samples of equal
 /// length. There must be at least two.
 fn uniform_time(
     file: &Path,
@@ -150,25 +151,6 @@ fn uniform_time(
         ))
     };
     let steps = || stamps.windows(2).map(|w| (w[0], w[1], w[1].0 - w[0].0));
-    for ((before, _), (time, line), step) in steps() {
-        if step == 0.0 {
-            return error(
-                line,
-                format!("time {time} s again, a duplicate of the row before"),
-                "a later time".to_owned(),
-                "Remove the duplicate row, or print times with more digits.",
-            );
-        }
-        if step < 0.0 {
-            return error(
-                line,
-                format!("time going back from {before} s to {time} s"),
-                "times that increase".to_owned(),
-                "Put the rows in order, or split the file where the clock was set.",
-            );
-        }
-    }
-
     let first = stamps[0];
     let last = stamps[stamps.len() - 1].0;
     let mut sorted: Vec<f64> = steps().map(|(_, _, step)| step).collect();
@@ -179,7 +161,7 @@ fn uniform_time(
     {
         return error(
             first.1,
-            format!("steps of {median} s from row to row"),
+            format!("steps of {} s from row to row", nanoseconds(median)),
             format!("sample_period_s = {period} as in run.toml"),
             "Correct sample_period_s or the time column.",
         );
@@ -190,7 +172,7 @@ fn uniform_time(
             return error(
                 line,
                 format!("a gap in time from {before} s to {time} s"),
-                format!("a step of {} s", step_limit / 1.5),
+                format!("a step of {} s", nanoseconds(step_limit / 1.5)),
                 "Only uniform sampling can be integrated: fill the gap or split the record there.",
             );
         }
@@ -203,7 +185,7 @@ fn uniform_time(
             return error(
                 line,
                 format!("time {time} s at sample {}", k + 1),
-                format!("{due:.6} s at {period} s a sample"),
+                format!("{} s at {period} s a sample", nanoseconds(due)),
                 "Correct sample_period_s, or resample the record to a uniform clock.",
             );
         }

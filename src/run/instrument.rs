@@ -123,7 +123,6 @@ fn no_terms(imu: &Fields) -> Result<(), RunError> {
     };
     match terms.all().next() {
         Some((name, field)) => Err(field.error(
-            format_args!("a further term, `{name}`"),
             "scale factors, installation and biases only",
             format_args!(
                 "`{name}` is not modelled yet in turncal {}; remove it from [imu.terms].",
@@ -247,9 +246,8 @@ fn check_scale(
     scale: Vector3<f64>,
     unit_scale: Option<f64>,
 ) -> Result<(), RunError> {
-    let found = || format!("[{}, {}, {}]", scale.x, scale.y, scale.z);
     if scale.iter().any(|&s| s == 0.0) {
-        return Err(field.error(found(), "no zeros", "Give the data sheet's scale factor."));
+        return Err(field.error("no zeros", "Give the data sheet's scale factor."));
     }
     if let Some(unit_scale) = unit_scale
         && scale
@@ -257,7 +255,6 @@ fn check_scale(
             .any(|s| !(0.5..=2.0).contains(&(s.abs() / unit_scale)))
     {
         return Err(field.error(
-            found(),
             format_args!("about {unit_scale}, which this unit says for one rad/s or m/s²"),
             "Correct the scale or the unit, or leave the scale out.",
         ));

@@ -16,12 +16,14 @@ pub mod record;
 mod segments;
 mod table_log;
 mod whole;
+mod write;
 
 pub use dwells::Dwell;
 pub(crate) use dwells::mean_attitude;
 pub use error::{Place, RunError};
 pub use record::CalibrationRecord;
 pub use whole::{WholeDirectory, write_whole};
+pub use write::write_run;
 
 use std::collections::BTreeMap;
 
@@ -140,4 +142,9 @@ pub struct Segment {
     pub end: f64,
     /// `x_up` … `z_down`, `rot_x+360` and the like.
     pub label: String,
+}
+
+/// A time rounded to 1 ns, so that it prints short.
+fn nanoseconds(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
 }

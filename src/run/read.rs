@@ -15,7 +15,7 @@ use crate::units::DEGREE;
 pub(super) const FORMAT: &str = "turncal-run/1";
 
 /// Fields of `[meta]`.
-const META: [&str; 8] = [
+pub(super) const META: [&str; 8] = [
     "instrument",
     "serial",
     "operator",

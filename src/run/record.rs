@@ -198,13 +198,16 @@ impl CalibrationRecord {
                 line: error.line() as u64,
                 column: error.column() as u64,
             };
-            RunError::new(
-                path,
+            let at = format!(" at line {} column {}", error.line(), error.column());
+            let what = error.to_string().replace(&at, "");
+            RunError {
+                file: path.to_owned(),
                 place,
-                error,
-                format_args!("a calibration in the format {FORMAT}"),
-                "Correct the file or write it again.",
-            )
+                message: format!(
+                    "not a calibration in the format {FORMAT}: {what}. Correct the file or write it \
+                     again."
+                ),
+            }
         })?;
         record.check(path)?;
         Ok(record)
@@ -291,7 +294,11 @@ impl CalibrationRecord {
                 let (found, advice) = if !known.contains(name) {
                     (
                         format!("`{name}` in {field}"),
-                        suggestion(name, known.iter().map(String::as_str)),
+                        suggestion(
+                            name,
+                            known.iter().map(String::as_str),
+                            "Remove it: this form does not have it.",
+                        ),
                     )
                 } else if !seen.insert(name) {
                     (
@@ -317,14 +324,14 @@ impl CalibrationRecord {
         let size = self.parameters.len();
         if self.covariance.len() != size {
             return error(
-                format!("{} rows in covariance", self.covariance.len()),
+                format!("{} row(s) in covariance", self.covariance.len()),
                 format!("{size}, one for each entry of parameters"),
             );
         }
         for (i, row) in self.covariance.iter().enumerate() {
             if row.len() != size {
                 return error(
-                    format!("{} values in row {} of covariance", row.len(), i + 1),
+                    format!("{} value(s) in row {} of covariance", row.len(), i + 1),
                     format!("{size}, for covariance is square"),
                 );
             }

@@ -28,12 +28,8 @@ impl<'a> AttitudeColumns<&'a str> {
         let axes = table.get("axes").or_else(|| columns.get("axes"));
         match (columns.get("quaternion"), columns.get("angles"), axes) {
             (Some(quaternion), None, None) => {
-                let names = quaternion.texts()?.try_into().map_err(|names: Vec<_>| {
-                    quaternion.error(
-                        format_args!("{} columns", names.len()),
-                        "four, in the order w, x, y, z",
-                        "Name all four.",
-                    )
+                let names = quaternion.texts()?.try_into().map_err(|_| {
+                    quaternion.error("four columns, in the order w, x, y, z", "Name all four.")
                 })?;
                 Ok(Self::Quaternion(names))
             }
@@ -42,8 +38,10 @@ impl<'a> AttitudeColumns<&'a str> {
                 let letters = axes.texts()?;
                 if names.is_empty() || names.len() != letters.len() {
                     return Err(angles.error(
-                        format_args!("{} angles for {} axes", names.len(), letters.len()),
-                        "one angle for each axis, outermost first",
+                        format_args!(
+                            "an angle for each of {} axes, outermost first",
+                            letters.len()
+                        ),
                         "Complete `angles` or `axes`.",
                     ));
                 }
@@ -54,7 +52,6 @@ impl<'a> AttitudeColumns<&'a str> {
                         "z" => Vector3::z(),
                         _ => {
                             return Err(axes.error(
-                            format_args!("`{letter}`"),
                             "`x`, `y` or `z` for each axis",
                             "Name the axis about which the table turns when all angles are zero.",
                         ));
@@ -66,7 +63,6 @@ impl<'a> AttitudeColumns<&'a str> {
             }
             (None, Some(_), None) => Err(table.missing("axes", "the axes of the angles")),
             (Some(quaternion), _, _) => Err(quaternion.error(
-                "columns beside `angles` or `axes`",
                 "either a quaternion or angles with their axes",
                 "Remove one of them.",
             )),
@@ -76,7 +72,7 @@ impl<'a> AttitudeColumns<&'a str> {
         }
     }
 
-    fn find(&self, csv: &CsvFile) -> Result<AttitudeColumns<usize>, RunError> {
+    fn find(&self, csv: &mut CsvFile) -> Result<AttitudeColumns<usize>, RunError> {
         Ok(match self {
             Self::Quaternion([w, x, y, z]) => AttitudeColumns::Quaternion([
                 csv.column(w)?,
@@ -173,12 +169,11 @@ impl<'a> TableLog<'a> {
             let Some(field) = fields.get(name) else {
                 continue;
             };
-            let sigma = field.positive()?;
+            field.positive()?;
             if name == "nonorthogonality_sigma_arcsec"
                 && matches!(attitude, AttitudeColumns::Quaternion(_))
             {
                 return Err(field.error(
-                    sigma,
                     "it with `angles` only, for a quaternion does not tell the axes apart",
                     "Remove it, or give the angles of the table's axes.",
                 ));
@@ -201,33 +196,19 @@ impl<'a> TableLog<'a> {
     pub fn read(&self, imu: &ImuRecord) -> Result<TableRecord, RunError> {
         let mut csv = CsvFile::open(&self.file)?;
         let time_column = csv.column(self.time)?;
-        let columns = self.attitude.find(&csv)?;
+        let columns = self.attitude.find(&mut csv)?;
 
         let mut time: Vec<f64> = Vec::new();
         let mut attitude = Vec::new();
         while csv.advance()? {
-            let now = csv.number(time_column)?;
-            if let Some(&before) = time.last()
-                && now <= before
-            {
-                return Err(csv.error_here(
-                    if now == before {
-                        format!("time {now} s again, a duplicate of the row before")
-                    } else {
-                        format!("time going back from {before} s to {now} s")
-                    },
-                    "times that increase",
-                    "Remove the row or put the rows in order.",
-                ));
-            }
-            time.push(now);
+            time.push(csv.time(time_column, time.last().copied())?);
             attitude.push(columns.reading(&csv)?);
         }
         let (first, last) = match time.as_slice() {
             [first, .., last] => (*first, *last),
             _ => {
                 return Err(csv.error(
-                    format_args!("{} rows of readings", time.len()),
+                    "a single reading or none",
                     "at least 2",
                     "Log the table over the whole run, or remove [turntable].",
                 ));

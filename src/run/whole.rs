@@ -192,3 +192,93 @@ pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), RunErro
     })?;
     stage.commit()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = fs::read_dir(directory).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_directory_appears_on_commit_and_not_before() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("a/b");
+        let whole = WholeDirectory::create(&target, false, &[]).unwrap();
+        fs::write(whole.path().join("x"), "1").unwrap();
+        assert!(!target.exists());
+        whole.commit().unwrap();
+        assert_eq!(names(&target), ["x"]);
+        assert_eq!(names(&root.path().join("a")), ["b"]);
+    }
+
+    #[test]
+    fn a_directory_that_is_given_up_leaves_nothing() {
+        let root = tempfile::tempdir().unwrap();
+        let whole = WholeDirectory::create(&root.path().join("a"), false, &[]).unwrap();
+        fs::write(whole.path().join("x"), "1").unwrap();
+        drop(whole);
+        assert!(names(root.path()).is_empty());
+    }
+
+    #[test]
+    fn an_existing_directory_is_replaced_only_with_force_and_then_wholly() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("a");
+        fs::create_dir(&target).unwrap();
+        fs::write(target.join("old"), "1").unwrap();
+        let error = WholeDirectory::create(&target, false, &[]).err().unwrap();
+        assert!(error.to_string().contains("--force"), "{error}");
+        let whole = WholeDirectory::create(&target, true, &[]).unwrap();
+        fs::write(whole.path().join("new"), "1").unwrap();
+        assert_eq!(names(&target), ["old"]);
+        whole.commit().unwrap();
+        assert_eq!(names(&target), ["new"]);
+        assert_eq!(names(root.path()), ["a"]);
+    }
+
+    #[test]
+    fn a_target_that_appeared_meanwhile_is_kept() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("a");
+        let whole = WholeDirectory::create(&target, false, &[]).unwrap();
+        fs::create_dir(&target).unwrap();
+        assert!(whole.commit().is_err());
+        assert_eq!(names(root.path()), ["a"]);
+    }
+
+    #[test]
+    fn force_replaces_neither_a_file_nor_what_holds_an_input_or_this_directory() {
+        let root = tempfile::tempdir().unwrap();
+        let file = root.path().join("run.toml");
+        fs::write(&file, "1").unwrap();
+        for (target, inputs) in [
+            (file.as_path(), vec![]),
+            (root.path(), vec![file.as_path()]),
+            (&std::env::current_dir().unwrap(), vec![]),
+            (Path::new("/"), vec![]),
+        ] {
+            assert!(WholeDirectory::create(target, true, &inputs).is_err());
+        }
+        assert_eq!(names(root.path()), ["run.toml"]);
+    }
+
+    #[test]
+    fn a_file_is_replaced_only_with_force_and_a_directory_never() {
+        let root = tempfile::tempdir().unwrap();
+        let file = root.path().join("x");
+        write_whole(&file, b"1", false).unwrap();
+        assert!(write_whole(&file, b"2", false).is_err());
+        assert_eq!(fs::read(&file).unwrap(), b"1");
+        write_whole(&file, b"2", true).unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"2");
+        assert!(write_whole(root.path(), b"3", true).is_err());
+        assert_eq!(names(root.path()), ["x"]);
+    }
+}

@@ -1,0 +1,154 @@
+//! What is written reads back.
+
+use std::fs;
+
+use nalgebra::Vector3;
+use turncal::imu::{InstallationForm, Nominal, Output, PerSensor};
+use turncal::run::record::{
+    Aiding, BodyFrame, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
+};
+use turncal::run::{CalibrationRecord, write_run};
+use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
+
+use crate::made::{assert_same, made_run, read, shared};
+
+fn triad_record(scale: f64) -> TriadRecord {
+    TriadRecord {
+        scale: [scale, 1.1 * scale, 0.3 * scale],
+        installation: [[1.0, 1e-3, 0.1], [0.0, 1.0, 2e-17], [0.3, 0.0, 1.0]],
+        bias: [0.1, -0.2, 1.0 / 3.0],
+    }
+}
+
+#[test]
+fn increments_and_rates_come_back_as_they_went() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut run = made_run("increments");
+    let truth = CalibrationRecord::new(triad_record(1.0), triad_record(1e5));
+    let place = directory.path().join("increments");
+    fs::create_dir(&place).unwrap();
+    write_run(&place, &run, Output::Increment, Some(&truth)).unwrap();
+    assert_same(&run, &read(&place));
+    assert_eq!(
+        CalibrationRecord::read(&place.join("truth.json")),
+        Ok(truth)
+    );
+
+    run.name = "rates".to_owned();
+    run.unit = PerSensor {
+        gyro: "deg/h".to_owned(),
+        accel: "g".to_owned(),
+    };
+    run.nominal = PerSensor {
+        gyro: Nominal(Vector3::repeat(1.0 / DEG_PER_H)),
+        accel: Nominal(Vector3::repeat(1.0 / STANDARD_GRAVITY)),
+    };
+    let place = directory.path().join("rates");
+    fs::create_dir(&place).unwrap();
+    write_run(&place, &run, Output::Rate, None).unwrap();
+    assert_same(&run, &read(&place));
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes() {
+    let bytes = || {
+        let directory = tempfile::tempdir().unwrap();
+        write_run(directory.path(), &made_run("x"), Output::Increment, None).unwrap();
+        ["run.toml", "imu.csv.gz", "table.csv.gz", "segments.csv"]
+            .map(|file| fs::read(directory.path().join(file)).unwrap())
+    };
+    assert_eq!(bytes(), bytes());
+}
+
+#[test]
+fn pulses_come_back_exactly() {
+    let Some(shared) = shared("three-axis-counts") else {
+        return;
+    };
+    let run = read(&shared);
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path().join("three-axis-counts");
+    fs::create_dir(&place).unwrap();
+    write_run(&place, &run, Output::Pulse, None).unwrap();
+    let back = read(&place);
+    assert_eq!(
+        (&back.imu.gyro, &back.imu.accel),
+        (&run.imu.gyro, &run.imu.accel)
+    );
+    assert_same(&run, &back);
+}
+
+#[test]
+fn a_run_that_could_not_be_read_is_not_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let error = write_run(directory.path(), &made_run("x"), Output::Pulse, None).unwrap_err();
+    assert!(error.to_string().contains("gyro_unit = `rad`"), "{error}");
+    let mut run = made_run("x");
+    run.meta.insert("weather".to_owned(), "fine".to_owned());
+    let error = write_run(directory.path(), &run, Output::Increment, None).unwrap_err();
+    assert!(error.to_string().contains("weather"), "{error}");
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_calibration_comes_back_as_it_went() {
+    let mut record = CalibrationRecord::new(triad_record(2e6), triad_record(-1e5));
+    record.method = Some(Method::Ekf);
+    record.installation_form = Some(InstallationForm::ThreeAngle);
+    record.aiding = Some(Aiding::Velocity);
+    record.body_frame = BodyFrame::Accelerometer;
+    record.unit = Some(PerSensor {
+        gyro: "count".to_owned(),
+        accel: "count".to_owned(),
+    });
+    let sigma = triad_record(1.0).scale.map(|_| 0.1);
+    let sigma = TriadRecord {
+        bias: sigma,
+        ..triad_record(1.0)
+    };
+    record.sigma = Some(PerSensor {
+        gyro: sigma,
+        accel: sigma,
+    });
+    record.parameters = vec!["gyro.installation.yz".to_owned(), "accel.bias.x".to_owned()];
+    record.covariance = vec![vec![1.0 / 3.0, 1e-300], vec![1e-300, 2.0]];
+    record.passes = Some(3);
+    record.converged = Some(true);
+    let nis = NisRecord {
+        nis: 1.01,
+        nis_interval: [0.9, 1.1],
+    };
+    record.consistency = Some(ConsistencyRecord {
+        all: nis,
+        velocity: Some(nis),
+        table: None,
+    });
+    record.warnings = vec!["heading is not observed".to_owned()];
+    record.fixed = vec!["accel.installation.xy".to_owned()];
+    record.equation = Some(EQUATION.to_owned());
+    record.correction = Some(PerSensor {
+        gyro: sigma.installation,
+        accel: sigma.installation,
+    });
+    record.test_vectors = vec![TestVector {
+        raw: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        calibrated: [0.1; 6],
+    }];
+    record.meta.insert("serial".to_owned(), "7".to_owned());
+
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("calibration.json");
+    record.write(&path, false).unwrap();
+    assert_eq!(CalibrationRecord::read(&path), Ok(record.clone()));
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    assert_eq!(json["consistency"]["nis_interval"][1], 1.1);
+    assert_eq!(json["installation_form"], "three-angle");
+    assert_eq!(json["body_frame"], "accelerometer");
+
+    record.gyro.bias[0] = f64::NAN;
+    let error = record
+        .write(&directory.path().join("other.json"), false)
+        .unwrap_err();
+    assert!(error.to_string().contains("gyro"), "{error}");
+    assert!(!directory.path().join("other.json").exists());
+}

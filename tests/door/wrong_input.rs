@@ -1,0 +1,497 @@
+//! Whatever is wrong with a run: one message that names the file and says what to do.
+
+use std::fs;
+use std::path::Path;
+
+use turncal::run::{CalibrationRecord, Run};
+
+const RUN: &str = r#"format = "turncal-run/1"
+[site]
+latitude_deg = 34.0
+height_m = 10.0
+gravity_m_s2 = 9.79
+[meta]
+serial = "7"
+[imu]
+file = "imu.csv"
+output = "pulse"
+gyro_unit = "count"
+accel_unit = "count"
+sample_period_s = 0.01
+time_stamp = "end"
+columns = { time = "t", gyro = ["gx", "gy", "gz"], accel = ["ax", "ay", "az"] }
+[imu.noise]
+angle_random_walk_deg_per_sqrt_h = 0.001
+velocity_random_walk_ug_per_sqrt_hz = 5.0
+[imu.prior.gyro]
+scale = 2000000.0
+scale_sigma_ppm = 1000.0
+installation_sigma_arcsec = 200.0
+bias_sigma = 10.0
+[imu.prior.accel]
+scale = [100000.0, 100000.0, 100000.0]
+scale_sigma_ppm = 1000.0
+installation_sigma_arcsec = 200.0
+bias = 3.0
+bias_sigma = [10.0, 11.0, 12.0]
+[standstill]
+position_sigma_m = 1.0
+[turntable]
+file = "table.csv"
+columns = { time = "t", quaternion = ["qw", "qx", "qy", "qz"] }
+position_sigma_arcsec = 1.0
+reading_sigma_arcsec = 0.5
+[segments]
+file = "segments.csv"
+"#;
+
+fn imu() -> String {
+    let rows = (1..=200).map(|k| format!("{:.2},1,-2,3,0,1,9790\n", f64::from(k) * 0.01));
+    "t,gx,gy,gz,ax,ay,az\n".to_owned() + &rows.collect::<String>()
+}
+
+fn table() -> String {
+    let rows = (0..=20).map(|k| format!("{:.1},1,0,0,0\n", f64::from(k) * 0.1));
+    "t,qw,qx,qy,qz\n".to_owned() + &rows.collect::<String>()
+}
+
+fn good_run(directory: &Path) {
+    fs::write(directory.join("run.toml"), RUN).unwrap();
+    fs::write(directory.join("imu.csv"), imu()).unwrap();
+    fs::write(directory.join("table.csv"), table()).unwrap();
+    fs::write(
+        directory.join("segments.csv"),
+        "start,end,label\n0,1,z_up\n",
+    )
+    .unwrap();
+}
+
+/// The error of a run in which one text of one file was replaced by another.
+fn error_after(file: &str, from: &str, to: &str) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    good_run(directory.path());
+    let path = directory.path().join(file);
+    let text = fs::read_to_string(&path).unwrap();
+    assert_eq!(text.matches(from).count(), 1, "`{from}` in {file}");
+    fs::write(&path, text.replace(from, to)).unwrap();
+    match Run::read(&directory.path().join("run.toml")) {
+        Ok(_) => panic!("`{to}` for `{from}` in {file} was accepted"),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn assert_says(message: &str, file: &str, words: &str) {
+    for word in [file].into_iter().chain(words.split(" & ")) {
+        assert!(message.contains(word), "no `{word}` in: {message}");
+    }
+    assert!(message.ends_with(['.', '?']), "no advice in: {message}");
+    println!("{message}\n");
+}
+
+#[test]
+fn the_run_that_the_cases_spoil_is_good() {
+    let directory = tempfile::tempdir().unwrap();
+    good_run(directory.path());
+    let run = Run::read(&directory.path().join("run.toml")).unwrap();
+    assert_eq!(
+        (run.imu.len(), run.imu.start, run.imu.period),
+        (200, 0.0, 0.01)
+    );
+    assert!(run.notes.is_empty());
+}
+
+#[test]
+fn each_wrong_value_in_run_toml_has_its_message() {
+    let prior = "scale = 2000000.0\nscale_sigma_ppm = 1000.0";
+    for (from, to, words) in [
+        ("[site]", "[site", "line 2 & TOML"),
+        (
+            "turncal-run/1",
+            "turncal-run/2",
+            "line 1 & turncal-run/2 & turncal-run/1",
+        ),
+        (
+            "height_m",
+            "heigth_m",
+            "line 4, column 1 & heigth_m & mean `height_m`",
+        ),
+        (
+            "[standstill]",
+            "[standstil]",
+            "standstil & mean `standstill`",
+        ),
+        ("serial", "seriel", "[meta] & mean `serial`"),
+        ("latitude_deg = 34.0", "", "[site] & latitude_deg & Add"),
+        (
+            "34.0",
+            "91.0",
+            "line 3, column 16 & site.latitude_deg = 91.0 & -90 to 90",
+        ),
+        ("34.0", "nan", "site.latitude_deg = nan & finite"),
+        ("34.0", "\"north\"", "\"north\" & finite number"),
+        ("height_m = 10.0", "height_m = 1e6", "height_m & 9000"),
+        ("9.79", "979.0", "gravity_m_s2 = 979.0 & 9.7 to 9.9"),
+        ("\"pulse\"", "\"pulses\"", "`pulse` & Did you mean"),
+        (
+            "gyro_unit = \"count\"",
+            "gyro_unit = \"rad\"",
+            "imu.gyro_unit & `count`",
+        ),
+        ("\"end\"", "\"ned\"", "imu.time_stamp & `end`"),
+        ("time_stamp = \"end\"", "", "[imu] & time_stamp"),
+        ("= 0.01\n", "= 0.0\n", "sample_period_s & above zero"),
+        ("= 0.01\n", "= -0.01\n", "sample_period_s & above zero"),
+        (
+            "[\"gx\", \"gy\", \"gz\"]",
+            "[\"gx\", \"gy\"]",
+            "imu.columns.gyro & three",
+        ),
+        ("= 0.001", "= -0.001", "angle_random_walk & zero or"),
+        (
+            "bias_sigma = 10.0",
+            "",
+            "[imu.prior.gyro] & bias_sigma & Add",
+        ),
+        (
+            "bias_sigma = 10.0",
+            "bias_sigma = -1.0",
+            "bias_sigma & above zero",
+        ),
+        (
+            "bias_sigma = 10.0",
+            "bias_sigma = 0",
+            "bias_sigma & above zero",
+        ),
+        (
+            "[10.0, 11.0, 12.0]",
+            "[10.0, 11.0]",
+            "bias_sigma & three numbers",
+        ),
+        (
+            prior,
+            "scale_sigma_ppm = 1000.0",
+            "[imu.prior.gyro] & `scale` & count",
+        ),
+        ("scale = 2000000.0", "scale = 0.0", "scale = 0.0 & no zeros"),
+        (
+            "[standstill]",
+            "[imu.terms]\nlever_arm = { sigma = 0.1 }\n[standstill]",
+            "lever_arm & not modelled yet & 0.1.0",
+        ),
+        (
+            "position_sigma_m = 1.0",
+            "position_sigma_m = 0",
+            "position_sigma_m & above zero",
+        ),
+        (
+            "reading_sigma_arcsec = 0.5",
+            "reading_sigma_arcsec = -0.5",
+            "reading_sigma_arcsec & above zero",
+        ),
+        (
+            "reading_sigma_arcsec = 0.5",
+            "reading_sigma_arcsec = 0.5\nnonorthogonality_sigma_arcsec = 1",
+            "nonorthogonality & angles",
+        ),
+        (
+            "quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"]",
+            "angles = [\"qw\", \"qx\", \"qy\"]",
+            "axes",
+        ),
+        (
+            "quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"]",
+            "angles = [\"qw\"], axes = [\"u\"]",
+            "[\"u\"] & `x`",
+        ),
+        (
+            "quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"]",
+            "angles = [\"qw\"], axes = [\"x\", \"y\"]",
+            "each of 2 axes",
+        ),
+        ("\"qz\"]", "\"qz\", \"qw\"]", "\"qw\"] & four columns"),
+    ] {
+        assert_says(&error_after("run.toml", from, to), "run.toml", words);
+    }
+}
+
+#[test]
+fn a_scale_that_its_unit_rules_out_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    good_run(directory.path());
+    let text = RUN
+        .replace("\"pulse\"", "\"rate\"")
+        .replace("gyro_unit = \"count\"", "gyro_unit = \"deg/s\"")
+        .replace("scale = 2000000.0", "scale = 1.0");
+    fs::write(directory.path().join("run.toml"), text).unwrap();
+    let error = Run::read(&directory.path().join("run.toml")).unwrap_err();
+    assert_says(
+        &error.to_string(),
+        "run.toml",
+        "imu.prior.gyro.scale & 57.29",
+    );
+}
+
+#[test]
+fn each_wrong_row_or_column_has_its_message() {
+    for (file, from, to, words) in [
+        (
+            "imu.csv",
+            "gx,gy",
+            "gX,gy",
+            "line 1 & named `gx` & mean `gX`",
+        ),
+        (
+            "imu.csv",
+            "gx,gy",
+            "gx,gx",
+            "line 1 & two columns named `gx`",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,",
+            "\n0.50,one,",
+            "line 51, column `gx` & `one` & finite",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,",
+            "\n0.50,NaN,",
+            "line 51, column `gx` & `NaN` & finite",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,",
+            "\n0.50,inf,",
+            "line 51, column `gx` & `inf` & finite",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,",
+            "\n0.50,,",
+            "line 51, column `gx` & an empty field",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,",
+            "\n0.50,1.5,",
+            "line 51, column `gx` & `1.5` & whole & increment",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,",
+            "\n0.50,1,1,",
+            "line 51 & 8 fields & 7",
+        ),
+        ("imu.csv", "\n0.50,", "\n0.49,", "line 51 & duplicate"),
+        (
+            "imu.csv",
+            "\n0.50,",
+            "\n0.35,",
+            "line 51 & going back from 0.49 s to 0.35 s",
+        ),
+        (
+            "imu.csv",
+            "\n0.50,1,-2,3,0,1,9790",
+            "",
+            "line 51 & gap & 0.49 s to 0.51 s & split",
+        ),
+        (
+            "table.csv",
+            "\n0.5,1,0",
+            "\n0.5,1,1",
+            "line 7 & norm 1.414214 & w, x, y, z",
+        ),
+        ("table.csv", "\n0.5,", "\n0.4,", "line 7 & duplicate"),
+        ("table.csv", "\n0.5,", "\n0.1,", "line 7 & going back"),
+        ("table.csv", "qw,", "q0,", "line 1 & named `qw`"),
+        (
+            "segments.csv",
+            "0,1,",
+            "1,1,",
+            "line 2 & end after the start",
+        ),
+        (
+            "segments.csv",
+            "0,1,",
+            "0,3,",
+            "line 2 & inside the IMU record",
+        ),
+        (
+            "segments.csv",
+            "z_up",
+            "",
+            "line 2, column `label` & an empty field",
+        ),
+    ] {
+        assert_says(&error_after(file, from, to), file, words);
+    }
+}
+
+#[test]
+fn each_wrong_file_has_its_message() {
+    let good = imu();
+    let two_rows: String = good.split_inclusive('\n').take(3).collect();
+    let table_elsewhere = table()
+        .replace("\n0.", "\n90.")
+        .replace("\n1.", "\n91.")
+        .replace("\n2.", "\n92.");
+    let header = "t,gx,gy,gz,ax,ay,az\n";
+    let twice_as_slow: String = header.to_owned()
+        + &(1..=200)
+            .map(|k| format!("{:.2},1,1,1,1,1,1\n", f64::from(k) * 0.02))
+            .collect::<String>();
+    let drifting: String = header.to_owned()
+        + &(1..=200)
+            .map(|k| format!("{:.4},1,1,1,1,1,1\n", f64::from(k) * 0.0101))
+            .collect::<String>();
+    for (file, content, words) in [
+        ("imu.csv", "", "an empty file"),
+        ("imu.csv", header, "0 samples & at least 100"),
+        ("imu.csv", &two_rows, "2 samples & at least 100"),
+        (
+            "imu.csv",
+            &twice_as_slow,
+            "steps of 0.02 s & sample_period_s",
+        ),
+        ("imu.csv", &drifting, "line 52 & sample_period_s"),
+        ("table.csv", &table_elsewhere, "90 s to 92 s & overlap"),
+        (
+            "table.csv",
+            "t,qw,qx,qy,qz\n0,1,0,0,0\n",
+            "single reading & at least 2",
+        ),
+        ("run.toml", "", "no `format`"),
+        (
+            "run.toml",
+            "format = \"turncal-run/1\"",
+            "no [site] & latitude_deg",
+        ),
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        good_run(directory.path());
+        fs::write(directory.path().join(file), content).unwrap();
+        let error = Run::read(&directory.path().join("run.toml")).expect_err(words);
+        assert_says(&error.to_string(), file, words);
+    }
+}
+
+#[test]
+fn missing_damaged_and_foreign_files_have_their_message() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    good_run(directory.path());
+    let error = || Run::read(&at("run.toml")).unwrap_err().to_string();
+
+    fs::remove_file(at("imu.csv")).unwrap();
+    assert_says(&error(), "imu.csv", "cannot open & relative to run.toml");
+
+    let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::Write::write_all(&mut gz, imu().as_bytes()).unwrap();
+    let whole = gz.finish().unwrap();
+    let mut flipped = whole.clone();
+    flipped[whole.len() - 8] ^= 0xff;
+    fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.csv.gz")).unwrap();
+    fs::write(at("imu.csv.gz"), &whole).unwrap();
+    assert!(Run::read(&at("run.toml")).is_ok());
+    for damaged in [&whole[..whole.len() / 2], &flipped, b"t,gx\n1,2\n"] {
+        fs::write(at("imu.csv.gz"), damaged).unwrap();
+        assert_says(&error(), "imu.csv.gz", "damaged or cut off");
+    }
+
+    fs::write(at("imu.csv"), imu()).unwrap();
+    fs::write(at("run.toml"), RUN.replace("\"gy\"", "\"gx\"")).unwrap();
+    assert_says(&error(), "imu.csv", "`gx` named for two & run.toml");
+
+    fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.txt")).unwrap();
+    assert_says(&error(), "imu.txt", ".csv or .csv.gz");
+    fs::write(at("run.toml"), [0xff, 0xfe]).unwrap();
+    assert_says(&error(), "run.toml", "cannot read");
+    fs::remove_file(at("run.toml")).unwrap();
+    assert_says(&error(), "run.toml", "cannot read & Give the path");
+    let error = Run::read(directory.path()).unwrap_err().to_string();
+    assert_says(&error, "", "cannot read & Give the path");
+}
+
+#[test]
+fn each_wrong_calibration_has_its_message() {
+    let triad = r#"{"scale":[1,1,1],"installation":[[1,0,0],[0,1,0],[0,0,1]],"bias":[0,0,0]}"#;
+    let good = format!(
+        r#"{{"format":"turncal-calibration/1","gyro":{triad},
+"accel":{triad},"parameters":["gyro.scale.x","accel.bias.z"],"covariance":[[1,0],[0,2]],"source":"any"}}"#
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("calibration.json");
+    fs::write(&path, &good).unwrap();
+    assert!(CalibrationRecord::read(&path).is_ok());
+    for (from, to, words) in [
+        ("tion/1", "tion/2", "calibration/2"),
+        ("\"accel\":", "\"axel\":", "missing field `accel` & line"),
+        (
+            "\"gyro\":{\"scale\":[1,1,1]",
+            "\"gyro\":{\"scale\":[1,1]",
+            "line 1 & array of length 3",
+        ),
+        (
+            "\"gyro\":{\"scale\":[1,1,1]",
+            "\"gyro\":{\"scale\":[1,1,0]",
+            "gyro.scale & zero",
+        ),
+        (
+            "\"gyro\":{\"scale\":[1,1,1]",
+            "\"gyro\":{\"scale\":[1,1,1e999]",
+            "out of range",
+        ),
+        ("[[1,0],[0,2]]", "[[1,0]]", "1 row(s) in covariance & 2"),
+        (
+            "[[1,0],[0,2]]",
+            "[[1,0],[2]]",
+            "1 value(s) in row 2 & square",
+        ),
+        ("[[1,0],[0,2]]", "[[1,0],[0,-2]]", "row 2 & below zero"),
+        (
+            "gyro.scale.x",
+            "gyro.scal.x",
+            "gyro.scal.x & mean `gyro.scale.x`",
+        ),
+        ("gyro.scale.x", "accel.bias.z", "`accel.bias.z` twice"),
+        ("\"any\"}", "\"any\"", "line 2"),
+    ] {
+        let spoilt = good.replacen(from, to, 1);
+        assert_ne!(spoilt, good, "{from}");
+        fs::write(&path, spoilt).unwrap();
+        let error = CalibrationRecord::read(&path).expect_err(words);
+        assert_says(&error.to_string(), "calibration.json", words);
+    }
+}
+
+#[test]
+fn byte_order_mark_spaces_and_other_line_ends_are_not_wrong() {
+    let directory = tempfile::tempdir().unwrap();
+    good_run(directory.path());
+    let good = Run::read(&directory.path().join("run.toml")).unwrap();
+    let spaced = "\u{feff}".to_owned() + &imu().replace(',', ", ").replace('\n', "\r\n");
+    fs::write(directory.path().join("imu.csv"), spaced).unwrap();
+    assert_eq!(Run::read(&directory.path().join("run.toml")), Ok(good));
+}
+
+proptest::proptest! {
+    #[test]
+    fn no_spoilt_byte_makes_it_panic(
+        file in 0usize..4,
+        place in proptest::prelude::any::<proptest::sample::Index>(),
+        bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..4),
+    ) {
+        let directory = tempfile::tempdir().unwrap();
+        good_run(directory.path());
+        let name = ["run.toml", "imu.csv", "table.csv", "segments.csv"][file];
+        let path = directory.path().join(name);
+        let mut content = fs::read(&path).unwrap();
+        let at = place.index(content.len());
+        content.splice(at..=at, bytes);
+        fs::write(&path, content).unwrap();
+        if let Err(error) = Run::read(&directory.path().join("run.toml")) {
+            let message = error.to_string();
+            proptest::prop_assert!(message.contains(directory.path().to_str().unwrap()));
+        }
+    }
+}
