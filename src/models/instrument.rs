@@ -3,7 +3,7 @@
 use nalgebra::{SVector, Vector3};
 use serde::Deserialize;
 
-use super::{Finite, ModelError, NonNegative, Positive, Room, read};
+use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{ANGLES, Instability, InstallationForm, Noise, PerSensor, Prior, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -85,12 +85,12 @@ pub struct InstallationModel {
 }
 
 impl InstallationModel {
-    /// Reads one by embedded name or path.
+    /// Finds and reads one.
     ///
     /// # Errors
     /// If there is none of that name or it is malformed.
-    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
-        let (file, _): (InstallationFile, _) = read(Room::Installation, name_or_path)?;
+    pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
+        let file: InstallationFile = text(Room::Installation, name_or_path, named_in)?.parse()?;
         Ok(Self {
             form: file.form,
             angles: file.angles_deg.times(DEGREE),
@@ -109,15 +109,15 @@ impl InstallationModel {
 }
 
 impl Instrument {
-    /// Reads one by embedded name or path.
+    /// Finds and reads one.
     ///
     /// # Errors
     /// If there is none of that name or it is malformed.
-    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
-        let (file, name): (InstrumentFile, _) = read(Room::Imu, name_or_path)?;
-        let InstrumentFile { gyro, accel, .. } = file;
+    pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
+        let text = text(Room::Imu, name_or_path, named_in)?;
+        let InstrumentFile { gyro, accel } = text.parse()?;
         Ok(Self {
-            name,
+            name: text.name(),
             pulse: PerSensor {
                 gyro: gyro.pulse_arcsec.0 * ARCSEC,
                 accel: accel.pulse_um_per_s.0 * 1e-6,

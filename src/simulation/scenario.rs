@@ -8,13 +8,15 @@ use super::Integrator;
 use crate::earth::Site;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, Triad};
 use crate::models::{
-    self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Positive, Room,
+    self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
 use crate::turntable::{Imperfection, Motion, Path, Table};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
 /// Steps of the true motion in one sample of the IMU.
 const STEPS: u32 = 4;
+/// The longest record that is simulated in memory; it takes some gigabytes.
+const MOST_SAMPLES: f64 = 2e7;
 
 /// Everything that makes a simulated run but its random numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,32 +62,26 @@ pub struct Given {
 }
 
 impl Scenario {
-    /// Reads a scenario and the models that it names, by embedded name or path.
+    /// Finds and reads a scenario, by embedded name or path, and the models that it names.
     ///
     /// # Errors
-    /// If one of them does not exist or is malformed, or the path is beyond the table.
+    /// If one of them does not exist or is malformed, or they do not fit together.
     pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
-        let (file, display): (ScenarioFile, _) = models::read(Room::Scenario, name_or_path)?;
+        let text = models::text(Room::Scenario, name_or_path, &Place::CommandLine)?;
+        let file: ScenarioFile = text.parse()?;
         let site = file.site.in_si();
-        let installation = InstallationModel::load(&file.imu.installation)?;
-        let (table, table_name) = models::turntable(&file.turntable.model)?;
-        let (path, path_name) = models::path(&file.turntable.path, &site)?;
-        let name = std::path::Path::new(&display)
-            .file_stem()
-            .map_or_else(|| display.clone(), |stem| stem.to_string_lossy().into());
-        let given =
-            file.truth
-                .in_si(installation.form)
-                .map_err(|message| ModelError::Inconsistent {
-                    file: display.clone(),
-                    message,
-                })?;
+        let installation = InstallationModel::load(&file.imu.installation, &text.place)?;
+        let (table, table_name) = models::turntable(&file.turntable.model, &text.place)?;
+        let (path, path_name) = models::path(&file.turntable.path, &text.place, &site)?;
         let scenario = Self {
-            name,
+            name: text.name(),
             site,
-            instrument: Instrument::load(&file.imu.model)?,
+            instrument: Instrument::load(&file.imu.model, &text.place)?,
             installation,
-            given,
+            given: file
+                .truth
+                .in_si(installation.form)
+                .map_err(|message| text.inconsistent(message))?,
             table,
             table_name,
             path,
@@ -99,16 +95,23 @@ impl Scenario {
             reading_rate: file.turntable.reading_rate_hz.0,
             seed: file.seed,
         };
-        scenario.checked()
+        scenario
+            .check()
+            .map_err(|message| text.inconsistent(message))?;
+        Ok(scenario)
     }
 
     /// The same scenario along another path, by embedded name or path of its file.
     ///
     /// # Errors
-    /// If it does not exist, is malformed, or is beyond the table.
+    /// If it does not exist, is malformed, or does not fit the table.
     pub fn with_path(mut self, name_or_path: &str) -> Result<Self, ModelError> {
-        (self.path, self.path_name) = models::path(name_or_path, &self.site)?;
-        self.checked()
+        (self.path, self.path_name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
+        self.check().map_err(|message| ModelError::Inconsistent {
+            file: name_or_path.into(),
+            message,
+        })?;
+        Ok(self)
     }
 
     /// How long a run takes, s.
@@ -117,18 +120,27 @@ impl Scenario {
             .map_or(0.0, |motion| motion.duration())
     }
 
-    fn checked(self) -> Result<Self, ModelError> {
+    /// What would otherwise fail only when it is simulated.
+    fn check(&self) -> Result<(), String> {
         // With the errors of a real table, so that a path that cannot have them is found here.
-        Motion::new(
-            &self.table,
-            &self.path,
-            &Imperfection::draw(&self.table, || 1.0),
-        )
-        .map_err(|source| ModelError::Path {
-            file: self.path_name.clone(),
-            source,
-        })?;
-        Ok(self)
+        let real = Imperfection::draw(&self.table, || 1.0);
+        let motion = Motion::new(&self.table, &self.path, &real)
+            .map_err(|error| format!("path {}: {error}", self.path_name))?;
+        let duration = motion.duration();
+        for (what, rate) in [
+            ("samples", 1.0 / self.integrator.period),
+            ("readings", self.reading_rate),
+        ] {
+            let number = duration * rate;
+            if !(2.0..=MOST_SAMPLES).contains(&number) {
+                return Err(format!(
+                    "{duration:.1} s of path {} at {rate} Hz make {number:.3e} {what}; expected 2 to \
+                     {MOST_SAMPLES:.0e}",
+                    self.path_name
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// One triad's true parameters.
