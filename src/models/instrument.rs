@@ -1,6 +1,8 @@
 //! Instruments and installations: what a grade of instrument is before it is calibrated.
 
 use nalgebra::{SVector, Vector3};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::Deserialize;
 
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
@@ -59,8 +61,7 @@ impl Spread {
     }
 
     /// One draw.
-    pub fn draw(&self, rng: &mut impl rand::Rng) -> f64 {
-        use rand_distr::{Distribution, StandardNormal, StandardUniform};
+    pub fn draw(&self, rng: &mut impl Rng) -> f64 {
         self.mean
             + match self.shape {
                 Shape::Uniform(half_width) => {
@@ -97,13 +98,12 @@ impl InstallationModel {
         })
     }
 
-    /// One draw of as many angles as any form has, so that what is drawn after them does not depend
-    /// on the form.
-    pub fn draw(&self, rng: &mut impl rand::Rng) -> SVector<f64, ANGLES> {
-        let mut angles = SVector::<f64, ANGLES>::from_fn(|_, _| self.angles.draw(rng));
-        angles
-            .rows_range_mut(self.form.angle_names().len()..)
-            .fill(0.0);
+    /// One draw of the form's angles.
+    pub fn draw(&self, rng: &mut impl Rng) -> SVector<f64, ANGLES> {
+        let mut angles = SVector::<f64, ANGLES>::zeros();
+        for angle in angles.iter_mut().take(self.form.angle_names().len()) {
+            *angle = self.angles.draw(rng);
+        }
         angles
     }
 }
