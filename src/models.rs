@@ -1,21 +1,19 @@
 //! What a user may edit: instruments, installations, tables, paths and scenarios as TOML files.
 //!
 //! The files of the `models/` folder are embedded. A path to an existing file wins over an embedded
-//! name.
+//! name, on the command line and in a user's scenario; an embedded scenario names embedded models.
 
 mod instrument;
 mod machine;
 mod values;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
 pub(crate) use values::{Finite, NonNegative, OneOrThree, Positive};
-
-use crate::turntable::TableError;
 
 /// A folder of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -146,14 +144,6 @@ pub enum ModelError {
         /// What is wrong and what to do.
         message: String,
     },
-    /// A path that the table cannot be driven along.
-    #[error("{file}: {source}")]
-    Path {
-        /// The file of the path or of the scenario that names it.
-        file: String,
-        /// Why not.
-        source: TableError,
-    },
 }
 
 /// The embedded names of a folder, in order.
@@ -161,26 +151,82 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().iter().map(|&(name, _)| name)
 }
 
-/// The text of a model and the name to show for it: the file at `name_or_path` if there is one, else
-/// the embedded model of that name.
+/// Where a model is named, which decides what its name can mean.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// On the command line: a path from the working directory, or an embedded name.
+    CommandLine,
+    /// In a file of this folder: a path from there, or an embedded name.
+    Folder(PathBuf),
+    /// In an embedded model: an embedded name.
+    Embedded,
+}
+
+/// The text of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Text {
+    /// The file's content.
+    pub text: String,
+    /// What to call the file in messages.
+    pub file: String,
+    /// Where the models are that it names.
+    pub place: Place,
+}
+
+impl Text {
+    /// The file's name without folder and extension.
+    pub fn name(&self) -> String {
+        Path::new(&self.file)
+            .file_stem()
+            .map_or_else(|| self.file.clone(), |stem| stem.to_string_lossy().into())
+    }
+
+    pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
+        toml::from_str(&self.text).map_err(|source| ModelError::Malformed {
+            file: self.file.clone(),
+            source: Box::new(source),
+        })
+    }
+
+    pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
+        ModelError::Inconsistent {
+            file: self.file.clone(),
+            message: message.into(),
+        }
+    }
+}
+
+/// Finds a model: the file at `name_or_path` if there is one, else the embedded model of that name.
 ///
 /// # Errors
 /// If there is neither, or the file cannot be read.
-pub fn text(room: Room, name_or_path: &str) -> Result<(String, String), ModelError> {
-    if Path::new(name_or_path).is_file() {
-        let text =
-            std::fs::read_to_string(name_or_path).map_err(|source| ModelError::Unreadable {
-                file: name_or_path.into(),
-                source,
-            })?;
-        return Ok((text, name_or_path.into()));
+pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, ModelError> {
+    let path = match named_in {
+        Place::CommandLine => Some(PathBuf::from(name_or_path)),
+        Place::Folder(folder) => Some(folder.join(name_or_path)),
+        Place::Embedded => None,
+    };
+    if let Some(path) = path.filter(|path| path.is_file()) {
+        let file = path.display().to_string();
+        return match std::fs::read_to_string(&path) {
+            Ok(text) => Ok(Text {
+                text,
+                file,
+                place: Place::Folder(path.parent().unwrap_or(Path::new("")).into()),
+            }),
+            Err(source) => Err(ModelError::Unreadable { file, source }),
+        };
     }
-    if let Some(&(name, text)) = room
+    if let Some((name, text)) = room
         .embedded()
         .iter()
         .find(|(name, _)| *name == name_or_path)
     {
-        return Ok((text.into(), name.into()));
+        return Ok(Text {
+            text: (*text).into(),
+            file: (*name).into(),
+            place: Place::Embedded,
+        });
     }
     let nearest = names(room)
         .map(|name| (strsim::jaro_winkler(name, name_or_path), name))
@@ -194,28 +240,33 @@ pub fn text(room: Room, name_or_path: &str) -> Result<(String, String), ModelErr
     })
 }
 
-/// Reads a model as `T`; returns the name to show beside it.
-pub(crate) fn read<T: DeserializeOwned>(
-    room: Room,
-    name_or_path: &str,
-) -> Result<(T, String), ModelError> {
-    let (text, file) = text(room, name_or_path)?;
-    match toml::from_str(&text) {
-        Ok(model) => Ok((model, file)),
-        Err(source) => Err(ModelError::Malformed {
-            file,
-            source: Box::new(source),
-        }),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn message(room: Room, content: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        std::fs::write(&path, content).unwrap();
+        let path = path.to_str().unwrap();
+        let place = &Place::CommandLine;
+        let site = crate::earth::Site::with_normal_gravity(0.6, 0.0, 0.0);
+        let error = match room {
+            Room::Imu => Instrument::load(path, place).unwrap_err(),
+            Room::Installation => InstallationModel::load(path, place).unwrap_err(),
+            Room::Turntable => turntable(path, place).unwrap_err(),
+            Room::Path => machine::path(path, place, &site).unwrap_err(),
+            Room::Scenario => crate::simulation::Scenario::load(path).unwrap_err(),
+        };
+        let message = error.to_string();
+        assert!(message.contains("mine.toml"), "{message}");
+        message
+    }
+
     #[test]
     fn an_unknown_name_lists_what_exists_and_the_nearest() {
-        let message = text(Room::Imu, "navigaton-fog").unwrap_err().to_string();
+        let error = text(Room::Imu, "navigaton-fog", &Place::Embedded).unwrap_err();
+        let message = error.to_string();
         assert!(
             message.contains("did you mean \"navigation-fog\""),
             "{message}"
@@ -224,15 +275,63 @@ mod tests {
     }
 
     #[test]
-    fn a_file_wins_over_an_embedded_name() {
-        let mut file = tempfile::NamedTempFile::new().unwrap();
-        std::io::Write::write_all(
-            &mut file,
-            b"form = \"six-angle\"\nangles_deg = { sigma = 1 }",
+    fn a_file_wins_over_an_embedded_name_but_not_for_an_embedded_scenario() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(
+            folder.path().join("general"),
+            "form = \"six-angle\"\nangles_deg = { sigma = 1 }",
         )
         .unwrap();
-        let path = file.path().to_str().unwrap();
-        let model = InstallationModel::load(path).unwrap();
-        assert_eq!(model.form, crate::imu::InstallationForm::SixAngle);
+        let here = Place::Folder(folder.path().into());
+        let form = |place: &Place| InstallationModel::load("general", place).unwrap().form;
+        assert_eq!(form(&here), crate::imu::InstallationForm::SixAngle);
+        assert_eq!(
+            form(&Place::Embedded),
+            crate::imu::InstallationForm::General
+        );
+    }
+
+    #[test]
+    fn a_wrong_value_or_field_is_named_with_its_line_and_what_was_expected() {
+        for (room, content, says) in [
+            (
+                Room::Installation,
+                "form = \"general\"\nangles_deg = { sigma = -1.0 }",
+                ["line 2", "found -1, expected a number above zero"],
+            ),
+            (
+                Room::Installation,
+                "form = \"general\"\nangles_deg = { mean = 1.0 }",
+                ["line 2", "either uniform"],
+            ),
+            (
+                Room::Installation,
+                "form = \"general\"\nangle_deg = { sigma = 1.0 }",
+                ["line 2", "expected `form` or `angles_deg`"],
+            ),
+            (
+                Room::Imu,
+                "[gyro]\npulse_arcsec = \"fine\"",
+                ["line 2", "expected f64"],
+            ),
+            (
+                Room::Turntable,
+                "[[axis]]\nname = \"outer\"\ndirection = [0, 0, 0]",
+                ["line 3", "not all zero"],
+            ),
+            (Room::Turntable, "axis = []", ["without axes", "[[axis]]"]),
+            (Room::Path, "first_dwell_s = nan", ["line 1", "found NaN"]),
+            (Room::Path, "first_dwell_s = 1", ["[axes]", "[body]"]),
+            (
+                Room::Scenario,
+                "seed = 1\n[site]\nlatitude_deg = 91.0",
+                ["line 3", "latitude from -90 to 90"],
+            ),
+        ] {
+            let message = message(room, content);
+            for said in says {
+                assert!(message.contains(said), "{said} in {message}");
+            }
+        }
     }
 }

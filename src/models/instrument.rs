@@ -1,9 +1,11 @@
 //! Instruments and installations: what a grade of instrument is before it is calibrated.
 
 use nalgebra::{SVector, Vector3};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::Deserialize;
 
-use super::{Finite, ModelError, NonNegative, Positive, Room, read};
+use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{ANGLES, Instability, InstallationForm, Noise, PerSensor, Prior, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -59,8 +61,7 @@ impl Spread {
     }
 
     /// One draw.
-    pub fn draw(&self, rng: &mut impl rand::Rng) -> f64 {
-        use rand_distr::{Distribution, StandardNormal, StandardUniform};
+    pub fn draw(&self, rng: &mut impl Rng) -> f64 {
         self.mean
             + match self.shape {
                 Shape::Uniform(half_width) => {
@@ -85,39 +86,38 @@ pub struct InstallationModel {
 }
 
 impl InstallationModel {
-    /// Reads one by embedded name or path.
+    /// Finds and reads one.
     ///
     /// # Errors
     /// If there is none of that name or it is malformed.
-    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
-        let (file, _): (InstallationFile, _) = read(Room::Installation, name_or_path)?;
+    pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
+        let file: InstallationFile = text(Room::Installation, name_or_path, named_in)?.parse()?;
         Ok(Self {
             form: file.form,
             angles: file.angles_deg.times(DEGREE),
         })
     }
 
-    /// One draw of as many angles as any form has, so that what is drawn after them does not depend
-    /// on the form.
-    pub fn draw(&self, rng: &mut impl rand::Rng) -> SVector<f64, ANGLES> {
-        let mut angles = SVector::<f64, ANGLES>::from_fn(|_, _| self.angles.draw(rng));
-        angles
-            .rows_range_mut(self.form.angle_names().len()..)
-            .fill(0.0);
+    /// One draw of the form's angles.
+    pub fn draw(&self, rng: &mut impl Rng) -> SVector<f64, ANGLES> {
+        let mut angles = SVector::<f64, ANGLES>::zeros();
+        for angle in angles.iter_mut().take(self.form.angle_names().len()) {
+            *angle = self.angles.draw(rng);
+        }
         angles
     }
 }
 
 impl Instrument {
-    /// Reads one by embedded name or path.
+    /// Finds and reads one.
     ///
     /// # Errors
     /// If there is none of that name or it is malformed.
-    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
-        let (file, name): (InstrumentFile, _) = read(Room::Imu, name_or_path)?;
-        let InstrumentFile { gyro, accel, .. } = file;
+    pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
+        let text = text(Room::Imu, name_or_path, named_in)?;
+        let InstrumentFile { gyro, accel } = text.parse()?;
         Ok(Self {
-            name,
+            name: text.name(),
             pulse: PerSensor {
                 gyro: gyro.pulse_arcsec.0 * ARCSEC,
                 accel: accel.pulse_um_per_s.0 * 1e-6,

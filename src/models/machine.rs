@@ -3,18 +3,19 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use super::{Finite, ModelError, NonNegative, Positive, Room, read};
+use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::attitude::from_pitch_roll_heading;
 use crate::earth::Site;
 use crate::turntable::{AxesStep, Axis, BodyStep, Moves, Path, Rotation, Table, TableErrors};
 use crate::units::{ARCSEC, DEGREE};
 
-/// Reads a turntable by embedded name or path; returns the name to show beside it.
+/// Finds and reads a turntable; returns its name beside it.
 ///
 /// # Errors
 /// If there is none of that name or it is malformed.
-pub fn turntable(name_or_path: &str) -> Result<(Table, String), ModelError> {
-    let (file, name): (TableFile, _) = read(Room::Turntable, name_or_path)?;
+pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String), ModelError> {
+    let text = text(Room::Turntable, name_or_path, named_in)?;
+    let file: TableFile = text.parse()?;
     let axes = file.axis.into_iter().map(|axis| Axis {
         name: axis.name,
         direction: axis.direction.0,
@@ -35,29 +36,31 @@ pub fn turntable(name_or_path: &str) -> Result<(Table, String), ModelError> {
         },
     };
     if table.axes.is_empty() {
-        return Err(ModelError::Inconsistent {
-            file: name,
-            message: "a table without axes; give one [[axis]] each, outermost first".into(),
-        });
+        return Err(
+            text.inconsistent("a table without axes; give one [[axis]] each, outermost first")
+        );
     }
-    Ok((table, name))
+    Ok((table, text.name()))
 }
 
-/// Reads a path by embedded name or path of its file; returns the name to show beside it. Directions
-/// such as `earth-rate` are those of the site.
+/// Finds and reads a path; returns its name beside it. Directions such as `earth-rate` are those of
+/// the site.
 ///
 /// # Errors
 /// If there is none of that name or it is malformed.
-pub fn path(name_or_path: &str, site: &Site) -> Result<(Path, String), ModelError> {
-    let (file, name): (PathFile, _) = read(Room::Path, name_or_path)?;
+pub fn path(
+    name_or_path: &str,
+    named_in: &Place,
+    site: &Site,
+) -> Result<(Path, String), ModelError> {
+    let text = text(Room::Path, name_or_path, named_in)?;
+    let file: PathFile = text.parse()?;
     let moves = match (file.axes, file.body) {
         (Some(moves), None) => moves.in_radians(),
         (None, Some(moves)) => moves.in_radians(site),
         _ => {
-            return Err(ModelError::Inconsistent {
-                file: name,
-                message: "expected either [axes] or [body], whichever the path turns about".into(),
-            });
+            return Err(text
+                .inconsistent("expected either [axes] or [body], whichever the path turns about"));
         }
     };
     Ok((
@@ -65,7 +68,7 @@ pub fn path(name_or_path: &str, site: &Site) -> Result<(Path, String), ModelErro
             first_dwell: file.first_dwell_s.0,
             moves,
         },
-        name,
+        text.name(),
     ))
 }
 

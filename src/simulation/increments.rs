@@ -195,6 +195,7 @@ mod tests {
         for k in 0..samples {
             let (angle, force) = (ideal.gyro[k], ideal.accel[k]);
             let sculling = angle.cross(&force) / 2.0
+                + angle.cross(&angle.cross(&force)) / 6.0
                 + (last_angle.cross(&force) + last_force.cross(&angle)) / 12.0;
             let time = (k as f64 + 0.5) * fine.period;
             let gravity = exp(site.earth_rate_n() * time) * site.gravity_n();

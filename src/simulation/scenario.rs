@@ -8,13 +8,15 @@ use super::Integrator;
 use crate::earth::Site;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, Triad};
 use crate::models::{
-    self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Positive, Room,
+    self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
-use crate::turntable::{Imperfection, Motion, Path, Table};
+use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
 /// Steps of the true motion in one sample of the IMU.
 const STEPS: u32 = 4;
+/// The longest record that is simulated in memory; it takes some gigabytes.
+const MOST_SAMPLES: f64 = 2e7;
 
 /// Everything that makes a simulated run but its random numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,32 +62,26 @@ pub struct Given {
 }
 
 impl Scenario {
-    /// Reads a scenario and the models that it names, by embedded name or path.
+    /// Finds and reads a scenario, by embedded name or path, and the models that it names.
     ///
     /// # Errors
-    /// If one of them does not exist or is malformed, or the path is beyond the table.
+    /// If one of them does not exist or is malformed, or they do not fit together.
     pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
-        let (file, display): (ScenarioFile, _) = models::read(Room::Scenario, name_or_path)?;
+        let text = models::text(Room::Scenario, name_or_path, &Place::CommandLine)?;
+        let file: ScenarioFile = text.parse()?;
         let site = file.site.in_si();
-        let installation = InstallationModel::load(&file.imu.installation)?;
-        let (table, table_name) = models::turntable(&file.turntable.model)?;
-        let (path, path_name) = models::path(&file.turntable.path, &site)?;
-        let name = std::path::Path::new(&display)
-            .file_stem()
-            .map_or_else(|| display.clone(), |stem| stem.to_string_lossy().into());
-        let given =
-            file.truth
-                .in_si(installation.form)
-                .map_err(|message| ModelError::Inconsistent {
-                    file: display.clone(),
-                    message,
-                })?;
+        let installation = InstallationModel::load(&file.imu.installation, &text.place)?;
+        let (table, table_name) = models::turntable(&file.turntable.model, &text.place)?;
+        let (path, path_name) = models::path(&file.turntable.path, &text.place, &site)?;
         let scenario = Self {
-            name,
+            name: text.name(),
             site,
-            instrument: Instrument::load(&file.imu.model)?,
+            instrument: Instrument::load(&file.imu.model, &text.place)?,
             installation,
-            given,
+            given: file
+                .truth
+                .in_si(installation.form)
+                .map_err(|message| text.inconsistent(message))?,
             table,
             table_name,
             path,
@@ -99,36 +95,55 @@ impl Scenario {
             reading_rate: file.turntable.reading_rate_hz.0,
             seed: file.seed,
         };
-        scenario.checked()
+        scenario
+            .check()
+            .map_err(|message| text.inconsistent(message))?;
+        Ok(scenario)
     }
 
     /// The same scenario along another path, by embedded name or path of its file.
     ///
     /// # Errors
-    /// If it does not exist, is malformed, or is beyond the table.
+    /// If it does not exist, is malformed, or does not fit the table.
     pub fn with_path(mut self, name_or_path: &str) -> Result<Self, ModelError> {
-        (self.path, self.path_name) = models::path(name_or_path, &self.site)?;
-        self.checked()
+        (self.path, self.path_name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
+        self.check().map_err(|message| ModelError::Inconsistent {
+            file: name_or_path.into(),
+            message,
+        })?;
+        Ok(self)
     }
 
     /// How long a run takes, s.
-    pub fn duration(&self) -> f64 {
-        Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))
-            .map_or(0.0, |motion| motion.duration())
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn duration(&self) -> Result<f64, TableError> {
+        let perfect = Imperfection::none(&self.table);
+        Ok(Motion::new(&self.table, &self.path, &perfect)?.duration())
     }
 
-    fn checked(self) -> Result<Self, ModelError> {
+    /// What would otherwise fail only when it is simulated.
+    fn check(&self) -> Result<(), String> {
         // With the errors of a real table, so that a path that cannot have them is found here.
-        Motion::new(
-            &self.table,
-            &self.path,
-            &Imperfection::draw(&self.table, || 1.0),
-        )
-        .map_err(|source| ModelError::Path {
-            file: self.path_name.clone(),
-            source,
-        })?;
-        Ok(self)
+        let real = Imperfection::draw(&self.table, || 1.0);
+        let motion = Motion::new(&self.table, &self.path, &real)
+            .map_err(|error| format!("path {}: {error}", self.path_name))?;
+        let duration = motion.duration();
+        for (what, rate) in [
+            ("samples", 1.0 / self.integrator.period),
+            ("readings", self.reading_rate),
+        ] {
+            let number = duration * rate;
+            if !(2.0..=MOST_SAMPLES).contains(&number) {
+                return Err(format!(
+                    "{duration:.1} s of path {} at {rate} Hz make {number:.3e} {what}; expected 2 to \
+                     {MOST_SAMPLES:.0e}",
+                    self.path_name
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// One triad's true parameters.
@@ -314,17 +329,64 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_embedded_scenario_can_be_simulated() {
+    fn every_embedded_scenario_makes_a_run_as_long_as_its_path() {
         for name in models::names(Room::Scenario) {
             let scenario = Scenario::load(name).unwrap_or_else(|error| panic!("{name}: {error}"));
-            let duration = scenario.duration();
-            let start = std::time::Instant::now();
-            let simulated = scenario.simulate(1, 0).unwrap();
-            println!(
-                "{name}: {duration} s, {} samples, {:?}",
-                simulated.run.imu.len(),
-                start.elapsed()
+            let imu = scenario.simulate(scenario.seed, 0).unwrap().run.imu;
+            let missing = scenario.duration().unwrap() - imu.duration();
+            assert!(
+                (-1e-6..imu.period).contains(&missing),
+                "{name}: {missing} s"
             );
         }
+    }
+
+    #[test]
+    fn every_embedded_model_can_be_read() {
+        let site = Site::with_normal_gravity(0.6, 0.0, 0.0);
+        let place = &Place::Embedded;
+        for name in models::names(Room::Imu) {
+            Instrument::load(name, place).unwrap();
+        }
+        for name in models::names(Room::Installation) {
+            let form = InstallationModel::load(name, place).unwrap().form;
+            assert_eq!(form.name(), name);
+        }
+        for name in models::names(Room::Turntable) {
+            models::turntable(name, place).unwrap();
+        }
+        for name in models::names(Room::Path) {
+            models::path(name, place, &site).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_path_that_the_table_cannot_follow_is_refused_when_it_is_named() {
+        let refused = |path: &str| {
+            let scenario = Scenario::load("demo").unwrap();
+            scenario.with_path(path).unwrap_err().to_string()
+        };
+        assert!(refused("two-axis").contains("2 angles for a table of 3 axes"));
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        std::io::Write::write_all(
+            &mut file,
+            b"first_dwell_s = 1e12\n[axes]\nstart_deg = [0, 0, 0]\nrate_deg_per_s = 1\n\
+              acceleration_deg_per_s2 = 1\ndwell_s = 0\nsteps = []",
+        )
+        .unwrap();
+        assert!(refused(file.path().to_str().unwrap()).contains("samples; expected 2 to"));
+    }
+
+    #[test]
+    fn given_values_replace_the_draw_and_leave_the_prior() {
+        let drawn = Scenario::load("demo").unwrap();
+        let mut given = drawn.clone();
+        given.given.gyro.scale = Some(Vector3::new(1.0, 2.0, 3.0) * PPM);
+        let [drawn, given] = [drawn, given].map(|scenario| scenario.simulate(1, 0).unwrap());
+        assert_eq!(given.truth.gyro.scale.y, 1.0 + 2.0 * PPM);
+        assert_eq!(given.truth.gyro.bias, drawn.truth.gyro.bias);
+        assert_eq!(given.truth.gyro.angles, drawn.truth.gyro.angles);
+        assert_eq!(given.truth.accel, drawn.truth.accel);
+        assert_eq!(given.run.prior, drawn.run.prior);
     }
 }

@@ -5,12 +5,14 @@
 //! wobble) moves the true attitude but not the reading, see [`Imperfection`]; what it reads wrongly
 //! (position error and reading noise) is left to whoever makes the readings.
 
+mod chain;
 mod motion;
 mod path;
 mod profile;
 mod table;
 
-pub use motion::{Kinematics, Motion};
+pub use chain::Kinematics;
+pub use motion::Motion;
 pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
 pub use profile::{Profile, Turned};
 pub use table::{Axis, Imperfection, Table, TableErrors};

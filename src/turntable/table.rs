@@ -101,4 +101,10 @@ impl Imperfection {
         );
         Self { base, tilt, wobble }
     }
+
+    /// Whether any axis is tilted or wobbles.
+    pub(super) fn moves_axes(&self) -> bool {
+        let any = |vectors: &[Vector3<f64>]| vectors.iter().any(|v| *v != Vector3::zeros());
+        any(&self.tilt) || any(&self.wobble)
+    }
 }

@@ -1,0 +1,170 @@
+//! The chain of joints from the Earth to the body, and how it moves.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Imperfection, Profile, Table};
+use crate::attitude::exp;
+
+/// Attitude and its derivatives at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kinematics {
+    /// `C_b_n`, body to East-North-Up.
+    pub attitude: Matrix3<f64>,
+    /// `ω_nb`, rate of the body relative to the Earth along body axes, rad/s.
+    pub rate: Vector3<f64>,
+    /// Derivative of the components of `rate`, rad/s².
+    pub acceleration: Vector3<f64>,
+}
+
+impl Kinematics {
+    fn times(&mut self, constant: &Matrix3<f64>) {
+        self.attitude *= constant;
+        self.rate = constant.tr_mul(&self.rate);
+        self.acceleration = constant.tr_mul(&self.acceleration);
+    }
+
+    /// Goes on through a joint that turns about `axis`.
+    fn turn(&mut self, axis: &Vector3<f64>, angle: f64, rate: f64, acceleration: f64) {
+        let rotation = exp(axis * angle);
+        self.times(&rotation);
+        self.acceleration += axis * acceleration - axis.cross(&self.rate) * rate;
+        self.rate += axis * rate;
+    }
+}
+
+/// The joints that move during one stretch of a path, and what is fixed around them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chain {
+    /// What lies before the first joint; `C_b_n` where nothing moves.
+    base: Matrix3<f64>,
+    joints: Vec<Joint>,
+}
+
+/// A moving joint and what is fixed behind it.
+#[derive(Debug, Clone, PartialEq)]
+struct Joint {
+    axis: Vector3<f64>,
+    from: f64,
+    profile: Profile,
+    wobble: Vector3<f64>,
+    behind: Matrix3<f64>,
+}
+
+impl Chain {
+    /// A body that stands.
+    pub(super) fn still(attitude: Matrix3<f64>) -> Self {
+        Self {
+            base: attitude,
+            joints: Vec::new(),
+        }
+    }
+
+    /// A body that turns about an axis of its own.
+    pub(super) fn about_body_axis(
+        attitude: Matrix3<f64>,
+        axis: Vector3<f64>,
+        profile: Profile,
+    ) -> Self {
+        Self {
+            base: attitude,
+            joints: vec![Joint {
+                axis,
+                from: 0.0,
+                profile,
+                wobble: Vector3::zeros(),
+                behind: Matrix3::identity(),
+            }],
+        }
+    }
+
+    /// A table whose axes turn from these angles along these profiles; without profiles it stands.
+    pub(super) fn of_table(
+        table: &Table,
+        imperfection: &Imperfection,
+        angles: &[f64],
+        profiles: &[Profile],
+    ) -> Self {
+        let mut chain = Self::still(exp(imperfection.base));
+        let parts = table
+            .axes
+            .iter()
+            .zip(angles)
+            .zip(imperfection.tilt.iter().zip(&imperfection.wobble));
+        for (i, ((axis, &from), (tilt, &wobble))) in parts.enumerate() {
+            let tilt = exp(*tilt);
+            match profiles.get(i).filter(|profile| profile.duration() > 0.0) {
+                Some(&profile) => {
+                    chain.fix(&tilt);
+                    chain.joints.push(Joint {
+                        axis: axis.direction,
+                        from,
+                        profile,
+                        wobble,
+                        behind: Matrix3::identity(),
+                    });
+                }
+                None => {
+                    chain.fix(&(tilt * exp(wobble * from.sin()) * exp(axis.direction * from)));
+                }
+            }
+        }
+        chain.fix(&table.mount);
+        chain
+    }
+
+    fn fix(&mut self, rotation: &Matrix3<f64>) {
+        match self.joints.last_mut() {
+            Some(joint) => joint.behind *= rotation,
+            None => self.base *= rotation,
+        }
+    }
+
+    pub(super) fn stands(&self) -> bool {
+        self.joints.is_empty()
+    }
+
+    /// How long the slowest joint takes, s.
+    pub(super) fn duration(&self) -> f64 {
+        self.joints
+            .iter()
+            .map(|joint| joint.profile.duration())
+            .fold(0.0, f64::max)
+    }
+
+    /// Times in s since the start at which derivatives of the rate jump, in order.
+    pub(super) fn breaks(&self) -> Vec<f64> {
+        let mut breaks: Vec<f64> = self
+            .joints
+            .iter()
+            .flat_map(|joint| joint.profile.breaks())
+            .chain([0.0])
+            .collect();
+        breaks.sort_by(f64::total_cmp);
+        breaks
+    }
+
+    /// The state so many seconds after the start.
+    pub(super) fn at(&self, time: f64) -> Kinematics {
+        let mut state = Kinematics {
+            attitude: self.base,
+            rate: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+        };
+        for joint in &self.joints {
+            let turned = joint.profile.at(time);
+            let angle = joint.from + turned.angle;
+            if joint.wobble != Vector3::zeros() {
+                let (s, c) = angle.sin_cos();
+                state.turn(
+                    &joint.wobble,
+                    s,
+                    c * turned.rate,
+                    c * turned.acceleration - s * turned.rate * turned.rate,
+                );
+            }
+            state.turn(&joint.axis, angle, turned.rate, turned.acceleration);
+            state.times(&joint.behind);
+        }
+        state
+    }
+}
