@@ -1,0 +1,116 @@
+//! Numbers as a reader wants them: digits up to the second that σ leaves meaning to.
+
+const MINUS: char = '−';
+
+/// Decimals that show two digits of `sigma`.
+fn decimals(sigma: f64) -> usize {
+    if sigma > 0.0 && sigma.is_finite() {
+        (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        3
+    }
+}
+
+/// A value with the digits that its σ leaves meaning to; a dash if it is not a number.
+pub(super) fn value(value: f64, sigma: f64) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let text = format!("{value:.*}", decimals(sigma));
+    match text.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|c| matches!(c, '0' | '.')) => zero.to_owned(),
+        Some(magnitude) => format!("{MINUS}{magnitude}"),
+        None => text,
+    }
+}
+
+/// A quantity that is its own measure of accuracy, to two digits.
+pub(super) fn sigma(sigma: f64) -> String {
+    value(sigma, sigma)
+}
+
+/// A quantity to three digits.
+pub(super) fn three_digits(x: f64) -> String {
+    if x.is_finite() && x.abs() >= 1000.0 {
+        let last = 10f64.powf(x.abs().log10().floor() - 2.0);
+        return whole((x / last).round() * last);
+    }
+    value(x, x.abs() / 10.0)
+}
+
+/// A quantity rounded to a whole number, in groups of three digits.
+pub(super) fn whole(x: f64) -> String {
+    if !x.is_finite() {
+        return value(x, x);
+    }
+    // Beyond this neither a floating-point number nor a reader knows the last digit.
+    if x.abs() >= 1e15 {
+        return format!("{x:.2e}").replace('-', "−");
+    }
+    let sign = if x.round() < 0.0 { "−" } else { "" };
+    format!("{sign}{}", count(x.abs().round() as usize))
+}
+
+/// A whole number in groups of three digits.
+pub(super) fn count(n: usize) -> String {
+    let digits = n.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        // A narrow no-break space, as in ISO 80000-1.
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A tick of an axis whose ticks are `step` apart.
+pub(super) fn tick(x: f64, step: f64) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let places = (-step.log10()).ceil().clamp(0.0, 12.0) as usize;
+    value(x, 10f64.powi(1 - places as i32))
+}
+
+/// A power of ten, written out while that is short.
+pub(super) fn power_of_ten(exponent: i32) -> String {
+    if (-3..=4).contains(&exponent) {
+        let step = 10f64.powi(exponent);
+        return tick(step, step);
+    }
+    let digits = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised: String = exponent
+        .to_string()
+        .chars()
+        .map(|c| c.to_digit(10).map_or('⁻', |d| digits[d as usize]))
+        .collect();
+    format!("10{raised}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_shows_two_digits_of_its_sigma() {
+        assert_eq!(value(2000.1234, 0.27), "2000.12");
+        assert_eq!(value(-49.98765, 0.0034), "−49.9877");
+        assert_eq!(value(1234.5, 40.0), "1234");
+        assert_eq!(value(-0.001, 0.5), "0.00");
+        assert_eq!(value(f64::NAN, 1.0), "–");
+        assert_eq!(sigma(0.0034), "0.0034");
+        assert_eq!(three_digits(21502.0), "21\u{202f}500");
+        assert_eq!(three_digits(-0.012345), "−0.0123");
+    }
+
+    #[test]
+    fn ticks_carry_only_the_decimals_of_their_step() {
+        assert_eq!(tick(0.30000000000000004, 0.1), "0.3");
+        assert_eq!(tick(-200.0, 50.0), "−200");
+        assert_eq!(power_of_ten(-2), "0.01");
+        assert_eq!(power_of_ten(-7), "10⁻⁷");
+        assert_eq!(count(59500), "59\u{202f}500");
+    }
+}
