@@ -15,5 +15,6 @@ pub mod attitude;
 pub mod calibration;
 pub mod earth;
 pub mod imu;
+pub mod report;
 pub mod run;
 pub mod units;

@@ -1,0 +1,224 @@
+//! The tables of the page.
+
+use maud::{Markup, html};
+
+use super::Report;
+use super::group::{Group, short_name};
+use super::number::{self, count, sigma, three_digits, value};
+use crate::calibration::outcome::{Estimate, Outcome, parameter_name};
+use crate::imu::ParameterKind;
+
+/// A path that leaves more than this of the prior σ has hardly observed the parameter.
+pub(super) const HARDLY_OBSERVED: f64 = 0.5;
+
+/// Rows that belong together.
+type Section = Vec<Vec<String>>;
+
+/// A table whose first column names the row.
+fn table(headings: &[&str], sections: impl IntoIterator<Item = Section>) -> Markup {
+    html! {
+        table {
+            thead { tr { @for heading in headings { th scope="col" { (heading) } } } }
+            @for section in sections {
+                tbody {
+                    @for row in &section {
+                        tr {
+                            @for (n, cell) in row.iter().enumerate() {
+                                @if n == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Largest error and σ of each group for each method: the answer at a glance.
+pub(super) fn groups(report: &Report) -> Markup {
+    let methods = report.methods();
+    let truth = report.truth_vector();
+    let mut headings = vec!["".to_owned(), "unit".to_owned()];
+    for (name, _) in &methods {
+        headings.push(format!("{name}: RMS\u{a0}σ"));
+        if truth.is_some() {
+            headings.push(format!("{name}: RMS\u{a0}error"));
+            headings.push(format!("{name}: largest\u{a0}error"));
+        }
+    }
+    let difference = match methods.as_slice() {
+        &[(_, closed), (_, filter)] if truth.is_none() => {
+            headings.push("closed form less EKF, RMS".to_owned());
+            Some(closed.vector() - filter.vector())
+        }
+        _ => None,
+    };
+    let rows = Group::all().map(|group| {
+        let mut row = vec![group.title(), group.unit().to_owned()];
+        for (_, estimate) in &methods {
+            let indices = group.parameters(estimate.form());
+            let claimed = group.spread(&estimate.sigma(), &group.estimated(estimate));
+            row.push(claimed.map_or("–".to_owned(), |(_, rms)| sigma(rms)));
+            if let Some(truth) = &truth {
+                let error = group.spread(&(estimate.vector() - truth), &indices);
+                row.extend(
+                    error.map_or(["–".to_owned(), "–".to_owned()], |(largest, rms)| {
+                        [three_digits(rms), three_digits(largest)]
+                    }),
+                );
+            }
+        }
+        if let (Some(difference), Some((_, first))) = (&difference, methods.first()) {
+            let spread = group.spread(difference, &group.parameters(first.form()));
+            row.push(spread.map_or("–".to_owned(), |(_, rms)| three_digits(rms)));
+        }
+        row
+    });
+    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+    let rows: Section = rows.collect();
+    table(
+        &headings,
+        rows.chunks(ParameterKind::ALL.len()).map(<[_]>::to_vec),
+    )
+}
+
+/// Every parameter with its accuracy, and its error where the truth is known.
+pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
+    let prior = report.outcome.map(|outcome| outcome.prior_sigma);
+    let truth = report.truth_vector();
+    let (form, posterior, values) = (estimate.form(), estimate.sigma(), estimate.vector());
+    let mut headings = vec!["parameter", "value ± 1σ", "unit"];
+    if prior.is_some() {
+        headings.extend(["prior σ", "posterior σ", "ratio"]);
+    }
+    if truth.is_some() {
+        headings.extend(["error", "error / σ"]);
+    }
+    let row = |group: Group, i: usize| {
+        let (unit, fixed) = (group.unit_value(), posterior[i] <= 0.0);
+        let s = posterior[i] / unit;
+        let shown = value(group.shown(values[i]), s);
+        let mut row = vec![
+            parameter_name(form, i)?,
+            if fixed {
+                format!("{shown} (fixed)")
+            } else {
+                format!("{shown} ± {}", sigma(s))
+            },
+            group.unit().to_owned(),
+        ];
+        if let Some(prior) = &prior {
+            row.push(three_digits(prior[i] / unit));
+            row.extend(if fixed {
+                ["–".to_owned(), "–".to_owned()]
+            } else {
+                [sigma(s), ratio(posterior[i], prior[i])]
+            });
+        }
+        if let Some(truth) = &truth {
+            let error = (values[i] - truth[i]) / unit;
+            row.push(value(error, s));
+            row.push(if fixed {
+                "–".to_owned()
+            } else {
+                value(error / s, 0.1)
+            });
+        }
+        Some(row)
+    };
+    let sections = Group::all().map(|group| {
+        let rows = group.parameters(form).into_iter();
+        rows.filter_map(|i| row(group, i)).collect()
+    });
+    table(&headings, sections)
+}
+
+/// Posterior over prior σ, with words where the path hardly observed the parameter.
+fn ratio(posterior: f64, prior: f64) -> String {
+    let ratio = posterior / prior;
+    if !ratio.is_finite() {
+        "–".to_owned()
+    } else if ratio > HARDLY_OBSERVED {
+        format!("{ratio:.2}, hardly observed")
+    } else {
+        format!("1 : {}", three_digits(1.0 / ratio))
+    }
+}
+
+/// The passes of the filter.
+pub(super) fn passes(outcome: &Outcome) -> Markup {
+    let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
+        vec![
+            (n + 1).to_string(),
+            if pass.live { "live, fed back" } else { "held" }.to_owned(),
+            three_digits(pass.largest_step),
+            number::whole(pass.merit),
+            count(pass.observations),
+            three_digits(pass.merit / pass.observations as f64),
+            count(pass.rejected),
+        ]
+    });
+    table(
+        &[
+            "pass",
+            "kind",
+            "largest step, σ",
+            "merit",
+            "scalars",
+            "merit / scalars",
+            "rejected",
+        ],
+        [rows.collect()],
+    )
+}
+
+/// How the innovations agree with their covariance.
+pub(super) fn consistency(outcome: &Outcome) -> Markup {
+    let rows = [
+        ("zero velocity", outcome.consistency.velocity),
+        ("table attitude", outcome.consistency.table),
+    ]
+    .map(|(name, nis)| {
+        if nis.count == 0 {
+            return [name, "not observed", "", "", "0"]
+                .map(str::to_owned)
+                .to_vec();
+        }
+        let (low, high) = nis.interval;
+        let verdict = if nis.mean < low {
+            ", below"
+        } else if nis.mean > high {
+            ", above"
+        } else {
+            ""
+        };
+        vec![
+            name.to_owned(),
+            format!("{}{verdict}", value(nis.mean, 0.01)),
+            format!("{} … {}", value(low, 0.01), value(high, 0.01)),
+            value(nis.lag_one, 0.01),
+            count(nis.count),
+        ]
+    });
+    table(
+        &[
+            "observation",
+            "NIS per scalar",
+            "95 % interval",
+            "lag-one correlation",
+            "scalars",
+        ],
+        [rows.to_vec()],
+    )
+}
+
+/// Short names of the parameters that the path hardly observed.
+pub(super) fn hardly_observed(outcome: &Outcome) -> Vec<String> {
+    let sigma = outcome.estimate.sigma();
+    outcome
+        .estimate
+        .estimated()
+        .filter(|&i| sigma[i] > HARDLY_OBSERVED * outcome.prior_sigma[i])
+        .map(|i| short_name(outcome.estimate.form(), i))
+        .collect()
+}
