@@ -143,3 +143,24 @@ pub(super) fn model(report: &Report) -> Markup {
             .map(|(name, value)| (name.to_owned(), value)),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::synthetic;
+    use super::*;
+    use crate::imu::InstallationForm;
+
+    #[test]
+    fn noise_is_given_in_the_units_of_data_sheets() {
+        let made_up = synthetic(InstallationForm::General);
+        let shown = run(&made_up.run).into_string();
+        for fact in [
+            "random walk 0.0010 °/√h, instability 0.0030 °/h over 3600 s",
+            "random walk 5.0 µg/√Hz",
+            "position 1.0 ″",
+            "latitude 39.90000°",
+        ] {
+            assert!(shown.contains(fact), "{fact}");
+        }
+    }
+}

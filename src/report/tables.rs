@@ -222,3 +222,38 @@ pub(super) fn hardly_observed(outcome: &Outcome) -> Vec<String> {
         .map(|i| short_name(outcome.estimate.form(), i))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::synthetic;
+    use super::*;
+    use crate::calibration::outcome::{from_vector, to_vector};
+    use crate::imu::InstallationForm;
+    use crate::units::PPM;
+
+    #[test]
+    fn an_error_is_estimate_less_truth_in_ppm_and_in_sigma() {
+        let mut made_up = synthetic(InstallationForm::General);
+        let mut truth = to_vector(&made_up.outcome.estimate.triads);
+        truth[0] += 3.0 * PPM;
+        made_up.truth = from_vector(InstallationForm::General, &truth);
+        made_up.outcome.estimate.covariance[(0, 0)] = (1.5 * PPM).powi(2);
+        let report = made_up.report();
+        let parameters = estimates(&report, &made_up.outcome.estimate).into_string();
+        assert!(
+            parameters.contains("<td>−3.0</td><td>−2.00</td>"),
+            "{parameters}"
+        );
+        let summary = groups(&report).into_string();
+        // The other two scale factors have no error: RMS 3/√3.
+        assert!(summary.contains("<td>1.73</td><td>3.00</td>"), "{summary}");
+    }
+
+    #[test]
+    fn a_nis_outside_its_interval_is_called_so() {
+        let made_up = synthetic(InstallationForm::General);
+        let shown = consistency(&made_up.outcome).into_string();
+        assert!(shown.contains("1.051, above"));
+        assert!(!shown.contains("1.002,"));
+    }
+}
