@@ -15,6 +15,9 @@ enum Scale {
     Symlog { linear: f64 },
 }
 
+/// The most decades of a logarithmic axis; what lies lower is drawn at its foot.
+const DECADES: i32 = 10;
+
 /// One axis of a panel, with its ticks and their labels.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
@@ -52,7 +55,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis over whole decades that hold all positive values.
+    /// A logarithmic axis over whole decades that hold the positive values.
     pub(super) fn log(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = values
             .filter(|v| v.is_finite() && *v > 0.0)
@@ -60,7 +63,8 @@ impl Axis {
                 (l.min(v), h.max(v))
             });
         let (first, last) = if high > 0.0 {
-            let first = low.log10().floor() as i32;
+            // An error that is zero but for rounding must not squeeze all others.
+            let first = (low.log10().floor() as i32).max(high.log10().ceil() as i32 - DECADES);
             (first, (high.log10().ceil() as i32).max(first + 1))
         } else {
             (-1, 1)

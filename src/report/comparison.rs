@@ -1,11 +1,12 @@
 //! Closed form against filter against truth, parameter by parameter.
 
 use super::axis::Axis;
-use super::canvas::{Area, DrawError, INK, Margins, Mark, Panel, Pen, QUIET};
+use super::canvas::{Area, DrawError, INK, Pen, QUIET};
 use super::group::{Group, axis_name, short_name};
+use super::panel::{Margins, Mark, Panel};
 use super::{Figure, Report, ReportError};
 use crate::calibration::outcome::Estimate;
-use crate::calibration::states::ParameterVector;
+use crate::calibration::states::{ParameterVector, sensor_and_parameter};
 
 /// Errors of each method against the truth, or the difference between the methods where the truth is
 /// not known; `None` if there is neither a truth nor a second method.
@@ -30,7 +31,7 @@ fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Result<Figu
         "comparison.svg",
         "Errors against the truth",
         caption,
-        (1200, 700),
+        (1200, 600),
         |area| {
             for (group, area) in Group::all().zip(area.split_evenly((2, 3))) {
                 error_panel(&area, group, methods, truth)?;
@@ -74,7 +75,7 @@ fn error_panel(
         &format!("{}, {}", group.title(), group.unit()),
         Margins {
             left: 56.0,
-            right: 84.0,
+            right: 96.0,
         },
         (Axis::places(indices.iter().map(|&i| axis_name(form, i))), y),
         "",
@@ -90,14 +91,14 @@ fn error_panel(
         for (place, &(error, sigma)) in points.iter().enumerate() {
             let x = place as f64 + offset;
             if sigma > 0.0 {
-                let whisker = Pen::solid(pen.color(), 1.0);
+                let whisker = Pen::solid(pen.color, 1.0);
                 panel.line(&[(x, floor), (x, sigma)], whisker)?;
                 panel.line(&[(x - 0.07, sigma), (x + 0.07, sigma)], whisker)?;
             }
             panel.marks(&[(x, error.max(floor))], mark, pen)?;
         }
         if let Some(last) = points.last() {
-            panel.label(last.0.max(floor), *name, pen.color());
+            panel.label(last.0.max(floor), *name, pen.color);
         }
     }
     panel.finish()
@@ -112,11 +113,17 @@ fn differences(closed: &Estimate, filter: &Estimate) -> Result<Figure, ReportErr
         .filter(|&i| variance[i] > 0.0)
         .map(|i| (i, difference[i] / variance[i].sqrt()))
         .collect();
+    let sensor = |index: usize| sensor_and_parameter(index).0;
     let extent = points.iter().map(|point| point.1.abs()).fold(4.0, f64::max);
     let caption = String::from(
         "Closed form less EKF in units of the σ of their difference, as if they had no data in common. \
-         Dashed: ±3. The vertical axis is linear in the middle and logarithmic beyond.",
+         Dashed: ±3.",
     );
+    let y = if extent > 20.0 {
+        Axis::symlog(1.0, 1.2 * extent)
+    } else {
+        Axis::linear(-1.2 * extent, 1.2 * extent)
+    };
     Figure::draw(
         "comparison.svg",
         "Closed form against EKF",
@@ -124,29 +131,29 @@ fn differences(closed: &Estimate, filter: &Estimate) -> Result<Figure, ReportErr
         (1200, 420),
         |area| {
             let rows = area.split_evenly((2, 1));
-            let halves = points.chunks(points.len().div_ceil(2).max(1));
-            for (half, area) in halves.zip(rows) {
+            let triads = points.chunk_by(|a, b| sensor(a.0) == sensor(b.0));
+            for (triad, area) in triads.zip(rows) {
                 let mut panel = Panel::new(
                     &area,
                     "closed form less EKF, σ",
                     Margins {
                         left: 56.0,
-                        right: 40.0,
+                        right: 52.0,
                     },
                     (
-                        Axis::places(half.iter().map(|&(i, _)| short_name(form, i))),
-                        Axis::symlog(1.0, 1.2 * extent),
+                        Axis::places(triad.iter().map(|&(i, _)| short_name(form, i))),
+                        y.clone(),
                     ),
                     "",
                     &[],
                 )?;
-                let ends = (-0.5, half.len() as f64 - 0.5);
+                let ends = (-0.5, triad.len() as f64 - 0.5);
                 panel.line(&[(ends.0, 0.0), (ends.1, 0.0)], Pen::solid(QUIET, 0.75))?;
                 for y in [-3.0, 3.0] {
                     panel.line(&[(ends.0, y), (ends.1, y)], Pen::dashed(INK, 1.0))?;
                     panel.label(y, if y < 0.0 { "−3σ" } else { "+3σ" }, INK);
                 }
-                for (place, &(_, y)) in half.iter().enumerate() {
+                for (place, &(_, y)) in triad.iter().enumerate() {
                     panel.line(&[(place as f64, 0.0), (place as f64, y)], Pen::nth(0, 1.0))?;
                     panel.marks(&[(place as f64, y)], Mark::Dot, Pen::nth(0, 2.5))?;
                 }

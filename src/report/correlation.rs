@@ -1,15 +1,15 @@
 //! Correlations between the estimated parameters.
 
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, VPos};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::canvas::{Area, DrawError, INK, QUIET, px, write};
+use super::canvas::{Area, DrawError, INK, QUIET, font, px, write};
 use super::group::{Group, short_name};
 use super::{Figure, ReportError};
 use crate::calibration::outcome::Estimate;
 
-const LEFT: f64 = 120.0;
-const TOP: f64 = 80.0;
+const LEFT: f64 = 124.0;
+const TOP: f64 = 92.0;
 /// Weaker than this a number would only hide the strong ones.
 const WRITTEN: f64 = 0.2;
 
@@ -56,7 +56,7 @@ pub(super) fn figure(estimate: &Estimate) -> Result<Option<Figure>, ReportError>
                 } else if r.abs() >= WRITTEN {
                     let text = format!("{:.0}", 100.0 * r).replace('-', "−");
                     let place = (corner.0 + 0.5 * cell, corner.1 + 0.5 * cell);
-                    write(area, &text, place, (HPos::Center, VPos::Center), &INK, 0.85)?;
+                    write(area, &text, place, (HPos::Center, VPos::Center), &INK, 0.9)?;
                 }
             }
         }
@@ -119,9 +119,7 @@ fn square(area: &Area, corner: (f64, f64), cell: f64, r: f64) -> Result<(), Draw
 }
 
 fn write_upright(area: &Area, text: &str, (x, y): (f64, f64)) -> Result<(), DrawError> {
-    use plotters::style::text_anchor::Pos;
-    let style = ("sans-serif", 8.0 * 14.5)
-        .into_font()
+    let style = font(0.9)
         .transform(FontTransform::Rotate270)
         .color(&INK)
         .pos(Pos::new(HPos::Left, VPos::Center));

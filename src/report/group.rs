@@ -1,6 +1,6 @@
 //! The six groups in which an engineer reads a calibration, each with the unit it is spoken of in.
 
-use crate::calibration::outcome::parameter_name;
+use crate::calibration::outcome::{Estimate, parameter_name};
 use crate::calibration::states::{PARAMETERS, ParameterVector, sensor_and_parameter};
 use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
 use crate::units;
@@ -34,6 +34,12 @@ impl Group {
         (0..PARAMETERS)
             .filter(|&index| Self::of(index) == self && parameter_name(form, index).is_some())
             .collect()
+    }
+
+    /// Indices of those that were estimated.
+    pub(super) fn estimated(self, estimate: &Estimate) -> Vec<usize> {
+        let indices = estimate.estimated();
+        indices.filter(|&index| Self::of(index) == self).collect()
     }
 
     /// Such as `gyro scale factor K`.

@@ -1,8 +1,9 @@
 //! Whitened innovations with their bounds.
 
 use super::axis::Axis;
-use super::canvas::{INK, Margins, Mark, Panel, Pen, QUIET, envelope};
+use super::canvas::{INK, Pen, QUIET, envelope};
 use super::number;
+use super::panel::{Margins, Mark, Panel};
 use super::{Figure, Report, ReportError};
 use crate::calibration::outcome::{Innovation, Nis, Observation, Outcome};
 
@@ -47,7 +48,7 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
                     &format!("{name}, {}, σ", DIRECTIONS[direction]),
                     Margins {
                         left: 40.0,
-                        right: 44.0,
+                        right: 50.0,
                     },
                     (Axis::linear(start, end), Axis::stepped(-EDGE, EDGE, 2.0)),
                     "time, s",

@@ -8,15 +8,19 @@ mod canvas;
 mod comparison;
 mod correlation;
 mod estimates;
+mod facts;
 mod group;
 mod innovations;
 mod number;
 mod page;
+mod panel;
 mod path;
 mod sigma;
 #[cfg(test)]
 mod synthetic;
 mod tables;
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -166,18 +170,5 @@ impl Figure {
             caption,
             svg,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::synthetic::synthetic;
-    use super::*;
-    #[test]
-    fn peek() {
-        let s = synthetic(crate::imu::InstallationForm::General);
-        let d = Path::new("/tmp/report-peek");
-        fs::create_dir_all(d).unwrap();
-        s.report().write(d).unwrap();
     }
 }

@@ -31,7 +31,24 @@ pub(super) fn sigma(sigma: f64) -> String {
 
 /// A quantity to three digits.
 pub(super) fn three_digits(x: f64) -> String {
+    if x.is_finite() && x.abs() >= 1000.0 {
+        let last = 10f64.powf(x.abs().log10().floor() - 2.0);
+        return whole((x / last).round() * last);
+    }
     value(x, x.abs() / 10.0)
+}
+
+/// A quantity rounded to a whole number, in groups of three digits.
+pub(super) fn whole(x: f64) -> String {
+    if !x.is_finite() {
+        return value(x, x);
+    }
+    // Beyond this neither a floating-point number nor a reader knows the last digit.
+    if x.abs() >= 1e15 {
+        return format!("{x:.2e}").replace('-', "−");
+    }
+    let sign = if x.round() < 0.0 { "−" } else { "" };
+    format!("{sign}{}", count(x.abs().round() as usize))
 }
 
 /// A whole number in groups of three digits.
@@ -40,7 +57,7 @@ pub(super) fn count(n: usize) -> String {
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
         // A narrow no-break space, as in ISO 80000-1.
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             text.push('\u{202f}');
         }
         text.push(digit);
@@ -84,6 +101,8 @@ mod tests {
         assert_eq!(value(-0.001, 0.5), "0.00");
         assert_eq!(value(f64::NAN, 1.0), "–");
         assert_eq!(sigma(0.0034), "0.0034");
+        assert_eq!(three_digits(21502.0), "21\u{202f}500");
+        assert_eq!(three_digits(-0.012345), "−0.0123");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::{Figure, Report, number, tables};
+use super::{Figure, Report, facts, number, tables};
 use crate::calibration::outcome::Outcome;
 
 const STYLE: &str = include_str!("style.css");
@@ -25,7 +25,7 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
                     h2 { "Accuracy of each group" }
                     (tables::groups(report))
                     p.note {
-                        "σ is the root mean square of the group's 1σ. "
+                        "RMS σ is the root mean square of the 1σ that the method claims in the group. "
                         @if report.truth.is_some() { "Errors are estimate less truth. " }
                         @if let Some(closed) = report.closed_form { "Closed form: " (closed.note) "." }
                     }
@@ -36,14 +36,15 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
                 @if let Some(outcome) = report.outcome {
                     section { h2 { "Consistency" } (tables::consistency(outcome))
                         p.note {
-                            "A NIS of one and a correlation of zero mean that the filter's σ are true."
+                            "A NIS within its interval and a correlation near zero say that the innovations \
+                            are as large and as white as the filter claims."
                         }
                     }
                     section { h2 { "Passes" } (tables::passes(outcome)) }
                 }
                 @for figure in figures { (drawn(figure)) }
-                section { h2 { "Model and method" } (tables::model(report)) }
-                section { h2 { "Run" } (tables::run(report.run)) }
+                section { h2 { "Model and method" } (facts::model(report)) }
+                section { h2 { "Run" } (facts::run(report.run)) }
                 footer { "turncal " (env!("CARGO_PKG_VERSION")) }
             }
         }
@@ -56,7 +57,7 @@ fn summary(report: &Report) -> String {
     let mut text = format!(
         "Run {}, {} s. ",
         report.run.name,
-        number::value(report.run.imu.duration(), 1.0)
+        number::value(report.run.imu.duration(), 10.0)
     );
     if let Some(outcome) = report.outcome {
         let state = if outcome.converged {
@@ -83,7 +84,7 @@ fn notices(report: &Report) -> Markup {
     let notices = report.outcome.map(outcome_notices).unwrap_or_default();
     html! {
         @if notices.is_empty() {
-            p.quiet { "No warnings." }
+            @if report.outcome.is_some() { p.quiet { "No warnings." } }
         } @else {
             section.warnings {
                 h2 { "Warnings" }

@@ -4,7 +4,8 @@ use nalgebra::Matrix3;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::axis::Axis;
-use super::canvas::{Area, DrawError, Margins, Panel, Pen, QUIET, envelope, write};
+use super::canvas::{Area, DrawError, Pen, QUIET, envelope, write};
+use super::panel::{Margins, Panel};
 use super::{Figure, Report, ReportError};
 use crate::imu::AXES;
 use crate::run::{ImuRecord, TableRecord};
@@ -89,10 +90,11 @@ fn draw_panel(
         let pen = Pen::axis(axis);
         let count: usize = pieces.iter().map(Vec::len).sum();
         for piece in &pieces {
-            panel.line(&envelope(piece, POINTS * piece.len() / count), pen)?;
+            let share = POINTS * piece.len() / count.max(1);
+            panel.line(&envelope(piece, share), pen)?;
         }
         if let Some(last) = pieces.last().and_then(|piece| piece.last()) {
-            panel.label(last.1, AXES[axis], pen.color());
+            panel.label(last.1, AXES[axis], pen.color);
         }
     }
     panel.finish()

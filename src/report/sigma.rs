@@ -1,8 +1,9 @@
 //! σ of every parameter against time.
 
 use super::axis::Axis;
-use super::canvas::{INK, Margins, Panel, Pen, envelope};
+use super::canvas::{INK, Pen, envelope};
 use super::group::{Group, axis_name};
+use super::panel::{Margins, Panel};
 use super::{Figure, Report, ReportError};
 use crate::calibration::outcome::Outcome;
 
@@ -29,14 +30,10 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
         "sigma.svg",
         "Accuracy against time",
         caption,
-        (1200, 760),
+        (1200, 660),
         |area| {
             for (group, area) in Group::all().zip(area.split_evenly((2, 3))) {
-                let indices: Vec<usize> = group
-                    .parameters(form)
-                    .into_iter()
-                    .filter(|&i| outcome.prior_sigma[i] > 0.0)
-                    .collect();
+                let indices = group.estimated(&outcome.estimate);
                 let lines: Vec<Vec<(f64, f64)>> = indices
                     .iter()
                     .map(|&i| {
@@ -70,7 +67,7 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
                     let pen = Pen::nth(n, 1.5);
                     panel.line(line, pen)?;
                     if let Some(last) = line.last() {
-                        panel.label(last.1, format!("σ {}", axis_name(form, index)), pen.color());
+                        panel.label(last.1, format!("σ {}", axis_name(form, index)), pen.color);
                     }
                 }
                 panel.line(&error, Pen::dashed(INK, 1.5))?;

@@ -11,7 +11,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{ClosedForm, Report};
 use crate::attitude;
 use crate::calibration::outcome::*;
-use crate::calibration::states::{PARAMETERS, ParameterMatrix, ParameterVector, parameter};
+use crate::calibration::states::{
+    PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
+};
 use crate::earth::Site;
 use crate::imu::*;
 use crate::run::{ImuRecord, Run, Standstill, TableRecord};
@@ -168,12 +170,12 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     let run = run(rng);
     let dwells = dwells();
     let prior_sigma = ParameterVector::from_fn(|i, _| {
-        let (sensor, p) = crate::calibration::states::sensor_and_parameter(i);
+        let (sensor, p) = sensor_and_parameter(i);
         run.prior.get(sensor).sigma(form)[p]
     });
     let prior_mean = to_vector(&PerSensor::from_fn(|s| run.prior.get(s).mean(form)));
     let final_sigma = ParameterVector::from_fn(|i, _| {
-        let (sensor, p) = crate::calibration::states::sensor_and_parameter(i);
+        let (sensor, p) = sensor_and_parameter(i);
         let kind = ParameterKind::ALL
             .iter()
             .position(|k| *k == Triad::kind(p))
@@ -265,7 +267,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             pass(false, 0.004, 7195.2, 9),
         ],
         converged: true,
-        live_history: history.clone(),
+        live_history: live(&history, &truth),
         history,
         innovations,
         consistency: Consistency {
@@ -279,7 +281,6 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         ],
     };
     let truth = from_vector(form, &truth);
-    debug_assert!(parameter(Sensor::Accel, 0) == PARAMETERS / 2);
     Synthetic {
         run,
         outcome,
@@ -287,6 +288,16 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         truth,
         dwells,
     }
+}
+
+/// The same with errors that feedback has made larger.
+fn live(history: &[Moment], truth: &ParameterVector) -> Vec<Moment> {
+    let widened = |m: &Moment| {
+        let gain = 1.6 + 1.2 * (m.time / 25.0).cos();
+        let estimate = truth + (m.estimate - truth) * gain;
+        Moment { estimate, ..*m }
+    };
+    history.iter().map(widened).collect()
 }
 
 fn vector(rng: &mut ChaCha8Rng) -> ParameterVector {

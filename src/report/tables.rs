@@ -2,41 +2,35 @@
 
 use maud::{Markup, html};
 
+use super::Report;
 use super::group::{Group, short_name};
 use super::number::{self, count, sigma, three_digits, value};
-use super::{ClosedForm, Report};
 use crate::calibration::outcome::{Estimate, Outcome, parameter_name};
-use crate::imu::{Noise, Sensor};
-use crate::run::Run;
-use crate::units::{
-    ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
-};
+use crate::imu::ParameterKind;
 
 /// A path that leaves more than this of the prior σ has hardly observed the parameter.
 pub(super) const HARDLY_OBSERVED: f64 = 0.5;
 
+/// Rows that belong together.
+type Section = Vec<Vec<String>>;
+
 /// A table whose first column names the row.
-fn table(headings: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Markup {
+fn table(headings: &[&str], sections: impl IntoIterator<Item = Section>) -> Markup {
     html! {
         table {
             thead { tr { @for heading in headings { th scope="col" { (heading) } } } }
-            tbody {
-                @for row in rows {
-                    tr {
-                        @for (n, cell) in row.iter().enumerate() {
-                            @if n == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+            @for section in sections {
+                tbody {
+                    @for row in &section {
+                        tr {
+                            @for (n, cell) in row.iter().enumerate() {
+                                @if n == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+                            }
                         }
                     }
                 }
             }
         }
-    }
-}
-
-/// Pairs of a name and a value.
-fn facts(rows: impl IntoIterator<Item = (String, String)>) -> Markup {
-    html! {
-        dl { @for (name, value) in rows { div { dt { (name) } dd { (value) } } } }
     }
 }
 
@@ -46,10 +40,10 @@ pub(super) fn groups(report: &Report) -> Markup {
     let truth = report.truth_vector();
     let mut headings = vec!["".to_owned(), "unit".to_owned()];
     for (name, _) in &methods {
-        headings.push(format!("{name}: σ"));
+        headings.push(format!("{name}: RMS\u{a0}σ"));
         if truth.is_some() {
-            headings.push("largest error".to_owned());
-            headings.push("RMS error".to_owned());
+            headings.push(format!("{name}: RMS\u{a0}error"));
+            headings.push(format!("{name}: largest\u{a0}error"));
         }
     }
     let difference = match methods.as_slice() {
@@ -63,13 +57,13 @@ pub(super) fn groups(report: &Report) -> Markup {
         let mut row = vec![group.title(), group.unit().to_owned()];
         for (_, estimate) in &methods {
             let indices = group.parameters(estimate.form());
-            let claimed = group.spread(&estimate.sigma(), &indices);
+            let claimed = group.spread(&estimate.sigma(), &group.estimated(estimate));
             row.push(claimed.map_or("–".to_owned(), |(_, rms)| sigma(rms)));
             if let Some(truth) = &truth {
                 let error = group.spread(&(estimate.vector() - truth), &indices);
                 row.extend(
                     error.map_or(["–".to_owned(), "–".to_owned()], |(largest, rms)| {
-                        [three_digits(largest), three_digits(rms)]
+                        [three_digits(rms), three_digits(largest)]
                     }),
                 );
             }
@@ -81,7 +75,11 @@ pub(super) fn groups(report: &Report) -> Markup {
         row
     });
     let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
-    table(&headings, rows.collect::<Vec<_>>())
+    let rows: Section = rows.collect();
+    table(
+        &headings,
+        rows.chunks(ParameterKind::ALL.len()).map(<[_]>::to_vec),
+    )
 }
 
 /// Every parameter with its accuracy, and its error where the truth is known.
@@ -96,8 +94,7 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
     if truth.is_some() {
         headings.extend(["error", "error / σ"]);
     }
-    let rows = (0..values.len()).filter_map(|i| {
-        let group = Group::of(i);
+    let row = |group: Group, i: usize| {
         let (unit, fixed) = (group.unit_value(), posterior[i] <= 0.0);
         let s = posterior[i] / unit;
         let shown = value(group.shown(values[i]), s);
@@ -112,8 +109,11 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
         ];
         if let Some(prior) = &prior {
             row.push(three_digits(prior[i] / unit));
-            row.push(sigma(s));
-            row.push(ratio(posterior[i], prior[i]));
+            row.extend(if fixed {
+                ["–".to_owned(), "–".to_owned()]
+            } else {
+                [sigma(s), ratio(posterior[i], prior[i])]
+            });
         }
         if let Some(truth) = &truth {
             let error = (values[i] - truth[i]) / unit;
@@ -125,8 +125,12 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
             });
         }
         Some(row)
+    };
+    let sections = Group::all().map(|group| {
+        let rows = group.parameters(form).into_iter();
+        rows.filter_map(|i| row(group, i)).collect()
     });
-    table(&headings, rows)
+    table(&headings, sections)
 }
 
 /// Posterior over prior σ, with words where the path hardly observed the parameter.
@@ -137,7 +141,7 @@ fn ratio(posterior: f64, prior: f64) -> String {
     } else if ratio > HARDLY_OBSERVED {
         format!("{ratio:.2}, hardly observed")
     } else {
-        format!("1 : {}", count((1.0 / ratio).round() as usize))
+        format!("1 : {}", three_digits(1.0 / ratio))
     }
 }
 
@@ -148,7 +152,7 @@ pub(super) fn passes(outcome: &Outcome) -> Markup {
             (n + 1).to_string(),
             if pass.live { "live, fed back" } else { "held" }.to_owned(),
             three_digits(pass.largest_step),
-            three_digits(pass.merit),
+            number::whole(pass.merit),
             count(pass.observations),
             three_digits(pass.merit / pass.observations as f64),
             count(pass.rejected),
@@ -164,7 +168,7 @@ pub(super) fn passes(outcome: &Outcome) -> Markup {
             "merit / scalars",
             "rejected",
         ],
-        rows,
+        [rows.collect()],
     )
 }
 
@@ -204,134 +208,7 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
             "lag-one correlation",
             "scalars",
         ],
-        rows,
-    )
-}
-
-/// What was recorded, where, and what was known before.
-pub(super) fn run(run: &Run) -> Markup {
-    let text = |name: &str, value: String| (name.to_owned(), value);
-    let imu = &run.imu;
-    let mut rows = vec![text("run", run.name.clone())];
-    rows.extend(run.meta.iter().map(|(k, v)| (k.clone(), v.clone())));
-    rows.push(text(
-        "site",
-        format!(
-            "latitude {}°, longitude {}°, height {} m, gravity {} m/s²",
-            value(run.site.latitude / DEGREE, 1e-4),
-            value(run.site.longitude / DEGREE, 1e-4),
-            value(run.site.height, 1.0),
-            value(run.site.gravity, 1e-5),
-        ),
-    ));
-    rows.push(text(
-        "samples",
-        format!(
-            "{} at {} Hz, {} s",
-            count(imu.len()),
-            three_digits(1.0 / imu.period),
-            value(imu.duration(), 1.0)
-        ),
-    ));
-    if imu.pulse.gyro > 0.0 || imu.pulse.accel > 0.0 {
-        rows.push(text(
-            "one pulse",
-            format!(
-                "{} ″, {} mm/s",
-                three_digits(imu.pulse.gyro / ARCSEC),
-                three_digits(imu.pulse.accel / MILLISECOND)
-            ),
-        ));
-    }
-    for sensor in Sensor::ALL {
-        let nominal = run.nominal.get(sensor).0;
-        let input = match sensor {
-            Sensor::Gyro => "rad/s",
-            Sensor::Accel => "m/s²",
-        };
-        rows.push(text(
-            &format!("{} nominal scale", sensor.name()),
-            format!(
-                "{}, {}, {} {} per second for 1 {input}",
-                nominal.x,
-                nominal.y,
-                nominal.z,
-                run.unit.get(sensor)
-            ),
-        ));
-        rows.push(text(
-            &format!("{} noise", sensor.name()),
-            noise(sensor, run.noise.get(sensor)),
-        ));
-    }
-    rows.push(match &run.table {
-        Some(table) => text(
-            "turntable",
-            format!(
-                "{} readings; position {} ″ (1σ, new at every position), reading {} ″ (1σ, white)",
-                count(table.time.len()),
-                sigma(table.position_sigma / ARCSEC),
-                sigma(table.reading_sigma / ARCSEC)
-            ),
-        ),
-        None => text("turntable", "no record".to_owned()),
-    });
-    facts(rows)
-}
-
-fn noise(sensor: Sensor, noise: &Noise) -> String {
-    let (walk, walk_unit, bias, bias_unit) = match sensor {
-        Sensor::Gyro => (DEG_PER_SQRT_H, "°/√h", DEG_PER_H, "°/h"),
-        Sensor::Accel => (MICRO_G_PER_SQRT_HZ, "µg/√Hz", MICRO_G, "µg"),
-    };
-    let mut text = format!(
-        "random walk {} {walk_unit}",
-        sigma(noise.random_walk / walk)
-    );
-    if let Some(instability) = noise.instability {
-        text.push_str(&format!(
-            ", instability {} {bias_unit} over {} s",
-            sigma(instability.sigma / bias),
-            sigma(instability.correlation_time)
-        ));
-    }
-    text
-}
-
-/// The model, the method and the frame.
-pub(super) fn model(report: &Report) -> Markup {
-    let mut rows = vec![
-        ("equation", "N = K C u + D; u = (K C)⁻¹ (N − D)".to_owned()),
-        (
-            "symbols",
-            "N: output per second over its nominal scale; u: angular rate or specific force along the \
-             body axes; K: scale factors, given as departure from nominal; E: entries of C beside the \
-             diagonal; D: bias"
-                .to_owned(),
-        ),
-    ];
-    if let Some(estimate) = report.estimate() {
-        rows.push(("installation form", estimate.form().name().to_owned()));
-    }
-    rows.push(("body frame", report.body_frame.to_owned()));
-    if let Some(outcome) = report.outcome {
-        let held = outcome.passes.iter().filter(|pass| !pass.live).count();
-        rows.push((
-            "filter",
-            format!(
-                "error-state EKF, {} passes, {held} of them held; velocity at standstill {} mm/s (1σ, white)",
-                outcome.passes.len(),
-                sigma(outcome.velocity_sigma / MILLISECOND)
-            ),
-        ));
-    }
-    if let Some(ClosedForm { note, .. }) = report.closed_form {
-        rows.push(("closed form", note.to_owned()));
-    }
-    rows.push(("dwells", number::count(report.dwells.len())));
-    facts(
-        rows.into_iter()
-            .map(|(name, value)| (name.to_owned(), value)),
+        [rows.to_vec()],
     )
 }
 
@@ -344,4 +221,39 @@ pub(super) fn hardly_observed(outcome: &Outcome) -> Vec<String> {
         .filter(|&i| sigma[i] > HARDLY_OBSERVED * outcome.prior_sigma[i])
         .map(|i| short_name(outcome.estimate.form(), i))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::synthetic;
+    use super::*;
+    use crate::calibration::outcome::{from_vector, to_vector};
+    use crate::imu::InstallationForm;
+    use crate::units::PPM;
+
+    #[test]
+    fn an_error_is_estimate_less_truth_in_ppm_and_in_sigma() {
+        let mut made_up = synthetic(InstallationForm::General);
+        let mut truth = to_vector(&made_up.outcome.estimate.triads);
+        truth[0] += 3.0 * PPM;
+        made_up.truth = from_vector(InstallationForm::General, &truth);
+        made_up.outcome.estimate.covariance[(0, 0)] = (1.5 * PPM).powi(2);
+        let report = made_up.report();
+        let parameters = estimates(&report, &made_up.outcome.estimate).into_string();
+        assert!(
+            parameters.contains("<td>−3.0</td><td>−2.00</td>"),
+            "{parameters}"
+        );
+        let summary = groups(&report).into_string();
+        // The other two scale factors have no error: RMS 3/√3.
+        assert!(summary.contains("<td>1.73</td><td>3.00</td>"), "{summary}");
+    }
+
+    #[test]
+    fn a_nis_outside_its_interval_is_called_so() {
+        let made_up = synthetic(InstallationForm::General);
+        let shown = consistency(&made_up.outcome).into_string();
+        assert!(shown.contains("1.051, above"));
+        assert!(!shown.contains("1.002,"));
+    }
 }

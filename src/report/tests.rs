@@ -1,0 +1,201 @@
+//! What holds of every report, whatever it was given.
+
+use super::synthetic::synthetic;
+use super::*;
+use crate::calibration::outcome::{Nis, parameter_name};
+use crate::calibration::states::{PARAMETERS, ParameterMatrix};
+use crate::imu::InstallationForm;
+
+/// Every file of a report, by name.
+fn written(report: &Report) -> Vec<(String, String)> {
+    let directory = tempfile::tempdir().unwrap();
+    report.write(directory.path()).unwrap();
+    let mut files: Vec<_> = fs::read_dir(directory.path())
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .map(|entry| {
+            let name = entry.file_name().into_string().unwrap();
+            (name, fs::read_to_string(entry.path()).unwrap())
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+fn names(files: &[(String, String)]) -> Vec<&str> {
+    files.iter().map(|(name, _)| name.as_str()).collect()
+}
+
+/// What must hold of any report.
+fn assert_sound(files: &[(String, String)]) {
+    for (name, text) in files {
+        for bad in ["NaN", "inf<", "inf ", "<script", "href"] {
+            assert!(!text.contains(bad), "{name} contains {bad}");
+        }
+        if name.ends_with(".svg") {
+            assert!(text.starts_with("<svg width=\"1200\""), "{name}");
+            assert!(text.ends_with("</svg>\n"), "{name}");
+            assert!(text.matches("<text").count() > 5, "{name} has labels");
+            assert!(text.matches("points=").count() > 2, "{name} has lines");
+            assert!(!text.contains("points=\"\""), "{name} has an empty line");
+        }
+    }
+    let (_, page) = files.iter().find(|(name, _)| name == "index.html").unwrap();
+    assert!(!page.contains("http"), "the page needs no network");
+    assert!(page.len() < 2_000_000);
+    for (name, _) in files.iter().filter(|(name, _)| name.ends_with(".svg")) {
+        assert!(page.contains(name.as_str()), "the page shows {name}");
+    }
+}
+
+#[test]
+fn a_report_has_every_figure_and_names_every_parameter_in_every_form() {
+    for form in InstallationForm::ALL {
+        let made_up = synthetic(form);
+        let files = written(&made_up.report());
+        assert_sound(&files);
+        assert_eq!(
+            names(&files),
+            [
+                "comparison.svg",
+                "correlation.svg",
+                "estimates.svg",
+                "index.html",
+                "innovations.svg",
+                "path.svg",
+                "sigma.svg"
+            ]
+        );
+        let (_, page) = &files[3];
+        for name in (0..PARAMETERS).filter_map(|i| parameter_name(form, i)) {
+            assert!(page.contains(&name), "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_same_result_makes_the_same_bytes() {
+    let bytes = || written(&synthetic(InstallationForm::General).report());
+    assert_eq!(bytes(), bytes());
+}
+
+#[test]
+fn warnings_stand_before_every_figure_and_text_is_escaped() {
+    let made_up = synthetic(InstallationForm::General);
+    let files = written(&made_up.report());
+    let page = &files
+        .iter()
+        .find(|(name, _)| name == "index.html")
+        .unwrap()
+        .1;
+    let warning = page.find(&made_up.outcome.warnings[0]).unwrap();
+    assert!(warning < page.find("<figure").unwrap());
+    assert!(page.contains("&lt;IMU&gt; &amp; co"));
+}
+
+#[test]
+fn a_parameter_that_keeps_its_prior_sigma_is_named_before_every_figure() {
+    let mut made_up = synthetic(InstallationForm::General);
+    made_up.outcome.prior_sigma[2] = 1.5 * made_up.outcome.estimate.sigma()[2];
+    let page = page::page(&made_up.report(), &[]);
+    assert!(page.contains("Hardly observed"));
+    assert!(page.contains("gyro K z."));
+}
+
+#[test]
+fn without_truth_or_baseline_no_error_is_claimed() {
+    let made_up = synthetic(InstallationForm::General);
+    let mut report = made_up.report();
+    report.truth = None;
+    let files = written(&report);
+    assert_sound(&files);
+    assert!(names(&files).contains(&"comparison.svg"));
+    assert!(!page::page(&report, &[]).contains("error / σ"));
+    report.closed_form = None;
+    let files = written(&report);
+    assert_sound(&files);
+    assert!(!names(&files).contains(&"comparison.svg"));
+}
+
+#[test]
+fn a_closed_form_alone_is_reported() {
+    let made_up = synthetic(InstallationForm::SixAngle);
+    let mut report = made_up.report();
+    report.outcome = None;
+    let files = written(&report);
+    assert_sound(&files);
+    assert_eq!(
+        names(&files),
+        [
+            "comparison.svg",
+            "correlation.svg",
+            "index.html",
+            "path.svg"
+        ]
+    );
+}
+
+#[test]
+fn a_run_without_a_table_is_reported() {
+    let mut made_up = synthetic(InstallationForm::General);
+    made_up.run.table = None;
+    made_up.outcome.innovations.clear();
+    made_up.outcome.consistency.table = Nis {
+        mean: f64::NAN,
+        count: 0,
+        interval: (f64::NAN, f64::NAN),
+        lag_one: f64::NAN,
+    };
+    let files = written(&made_up.report());
+    assert_sound(&files);
+    assert!(!names(&files).contains(&"innovations.svg"));
+}
+
+#[test]
+fn a_parameter_held_fixed_has_no_sigma_and_no_band() {
+    let mut made_up = synthetic(InstallationForm::General);
+    let fixed = PARAMETERS - 1;
+    let covariance = &mut made_up.outcome.estimate.covariance;
+    covariance.row_mut(fixed).fill(0.0);
+    covariance.column_mut(fixed).fill(0.0);
+    let files = written(&made_up.report());
+    assert_sound(&files);
+    let text = |name: &str| &files.iter().find(|(file, _)| file == name).unwrap().1;
+    assert!(text("index.html").contains("(fixed)"));
+    assert!(text("estimates.svg").contains("accel bias D y"));
+    assert!(!text("estimates.svg").contains("accel bias D z"));
+}
+
+#[test]
+fn a_filter_that_saw_next_to_nothing_is_reported() {
+    for moments in 0..3 {
+        let mut made_up = synthetic(InstallationForm::General);
+        made_up.outcome.history.truncate(moments);
+        made_up.outcome.innovations.truncate(moments);
+        made_up.outcome.passes.clear();
+        made_up.outcome.converged = false;
+        if moments == 0 {
+            made_up.outcome.estimate.covariance = ParameterMatrix::zeros();
+        }
+        made_up.dwells.clear();
+        if let Some(table) = &mut made_up.run.table {
+            table.time.clear();
+            table.attitude.clear();
+        }
+        made_up.run.imu.gyro.truncate(moments);
+        made_up.run.imu.accel.truncate(moments);
+        let page = page::page(&made_up.report(), &made_up.report().figures().unwrap());
+        assert!(!page.contains("NaN"));
+        assert!(page.contains("did not converge"));
+    }
+}
+
+#[test]
+fn a_missing_directory_is_named() {
+    let made_up = synthetic(InstallationForm::General);
+    let error = made_up
+        .report()
+        .write(Path::new("no/such/place"))
+        .unwrap_err();
+    assert!(error.to_string().contains("no/such/place"), "{error}");
+}
