@@ -26,8 +26,8 @@ const MERIT_RISE: f64 = 1.0;
 const INITIAL_ATTITUDE: f64 = 60.0 * ARCSEC;
 /// 1σ of the initial velocity: a table at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
-/// A parameter whose σ a run does not even halve was not observed by it.
-const OBSERVED: f64 = 0.5;
+/// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
+const DOUBTFUL: f64 = 0.2;
 
 /// Estimates both triads of a run with table aiding.
 ///
@@ -67,8 +67,7 @@ pub fn estimate(
         triads: held.estimate.triads,
         covariance: held.covariance,
     };
-    let warnings = warnings(&problem, &estimate, &passes, converged);
-    Ok(Outcome {
+    let mut outcome = Outcome {
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
@@ -79,8 +78,10 @@ pub fn estimate(
         innovations: held.innovations,
         velocity_sigma,
         passes,
-        warnings,
-    })
+        warnings: run.notes.clone(),
+    };
+    outcome.warnings.extend(warnings(&outcome));
+    Ok(outcome)
 }
 
 /// Held passes from a first point on, each linearised at the estimate of the one before.
@@ -188,31 +189,49 @@ fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
     }
 }
 
-fn warnings(
-    problem: &Problem,
-    estimate: &Estimate,
-    passes: &[Pass],
-    converged: bool,
-) -> Vec<String> {
+fn warnings(outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
-    if !converged {
+    if !outcome.converged {
         warnings.push(format!(
-            "not converged after {} passes: the last one still moved a parameter by {:.2} σ; \
-             neither values nor σ are to be trusted",
-            passes.len(),
-            passes.last().map_or(f64::NAN, |pass| pass.largest_step),
+            "Not converged: the last of {} passes still moved a parameter by {:.2} σ. Neither \
+             values nor σ may be used.",
+            outcome.passes.len(),
+            outcome
+                .passes
+                .last()
+                .map_or(f64::NAN, |pass| pass.largest_step),
         ));
     }
-    let sigma = estimate.sigma();
-    let unobserved: Vec<String> = (0..sigma.len())
-        .filter(|&i| problem.prior_sigma[i] > 0.0 && sigma[i] > OBSERVED * problem.prior_sigma[i])
-        .filter_map(|i| parameter_name(problem.form, i))
+    let unobserved: Vec<String> = outcome
+        .unobserved()
+        .into_iter()
+        .filter_map(|i| parameter_name(outcome.estimate.form(), i))
         .collect();
     if !unobserved.is_empty() {
         warnings.push(format!(
-            "not observed by this path (σ not even halved): {}",
+            "Not observed by this path, σ not even halved: {}.",
             unobserved.join(", ")
         ));
+    }
+    let rejected = outcome.innovations.iter().filter(|i| !i.accepted).count();
+    if rejected > 0 {
+        warnings.push(format!(
+            "{rejected} of {} observations were rejected as outliers.",
+            outcome.innovations.len()
+        ));
+    }
+    for (name, nis) in [
+        ("velocity", outcome.consistency.velocity),
+        ("table attitude", outcome.consistency.table),
+    ] {
+        if (nis.mean - 1.0).abs() > DOUBTFUL {
+            warnings.push(format!(
+                "Innovations of {name} are {:.2} times as large as their σ says (NIS {:.2}): noise \
+                 figures or model do not fit the data, and the σ of the parameters are as doubtful.",
+                nis.mean.sqrt(),
+                nis.mean
+            ));
+        }
     }
     warnings
 }

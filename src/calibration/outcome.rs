@@ -61,6 +61,9 @@ pub fn parameter_name(form: InstallationForm, index: usize) -> Option<String> {
     Triad::parameter_name(sensor, form, of_triad)
 }
 
+/// A run has observed a parameter if it leaves less than this part of its prior σ.
+pub const OBSERVED_BELOW: f64 = 0.5;
+
 /// The result of the filter on one run.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -86,6 +89,15 @@ pub struct Outcome {
     pub velocity_sigma: f64,
     /// What a calibration engineer must know before using the figures.
     pub warnings: Vec<String>,
+}
+
+impl Outcome {
+    /// Indices of the parameters that the run did not observe.
+    pub fn unobserved(&self) -> Vec<usize> {
+        let sigma = self.estimate.sigma();
+        let hidden = |&i: &usize| sigma[i] > OBSERVED_BELOW * self.prior_sigma[i];
+        self.estimate.estimated().filter(hidden).collect()
+    }
 }
 
 /// One pass over the record.

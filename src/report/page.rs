@@ -3,7 +3,6 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Figure, Report, facts, number, tables};
-use crate::calibration::outcome::Outcome;
 
 const STYLE: &str = include_str!("style.css");
 
@@ -81,35 +80,17 @@ fn summary(report: &Report) -> String {
 
 /// Warnings and what was not observed, before any figure.
 fn notices(report: &Report) -> Markup {
-    let notices = report.outcome.map(outcome_notices).unwrap_or_default();
+    let notices = report.outcome.map_or(&[][..], |outcome| &outcome.warnings);
     html! {
         @if notices.is_empty() {
             @if report.outcome.is_some() { p.quiet { "No warnings." } }
         } @else {
             section.warnings {
                 h2 { "Warnings" }
-                ul { @for notice in &notices { li { (notice) } } }
+                ul { @for notice in notices { li { (notice) } } }
             }
         }
     }
-}
-
-fn outcome_notices(outcome: &Outcome) -> Vec<String> {
-    let mut notices = Vec::new();
-    if !outcome.converged {
-        notices.push(
-            "The passes did not converge: neither the values nor their σ may be used.".to_owned(),
-        );
-    }
-    notices.extend(outcome.warnings.iter().cloned());
-    let weak = tables::hardly_observed(outcome);
-    if !weak.is_empty() {
-        notices.push(format!(
-            "Hardly observed by this path (more than half of the prior σ is left): {}.",
-            weak.join(", ")
-        ));
-    }
-    notices
 }
 
 fn drawn(figure: &Figure) -> Markup {

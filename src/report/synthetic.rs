@@ -143,6 +143,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
             position_sigma: ARCSEC,
             reading_sigma: 0.3 * ARCSEC,
         }),
+        notes: Vec::new(),
         segments: Vec::new(),
     }
 }
@@ -271,6 +272,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         history,
         innovations,
         consistency: Consistency {
+            all: nis(1.01, 7182),
             velocity: nis(1.002, 5985),
             table: nis(1.051, 1197),
         },

@@ -3,13 +3,10 @@
 use maud::{Markup, html};
 
 use super::Report;
-use super::group::{Group, short_name};
+use super::group::Group;
 use super::number::{self, count, sigma, three_digits, value};
-use crate::calibration::outcome::{Estimate, Outcome, parameter_name};
+use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, Outcome, parameter_name};
 use crate::imu::ParameterKind;
-
-/// A path that leaves more than this of the prior σ has hardly observed the parameter.
-pub(super) const HARDLY_OBSERVED: f64 = 0.5;
 
 /// Rows that belong together.
 type Section = Vec<Vec<String>>;
@@ -138,7 +135,7 @@ fn ratio(posterior: f64, prior: f64) -> String {
     let ratio = posterior / prior;
     if !ratio.is_finite() {
         "–".to_owned()
-    } else if ratio > HARDLY_OBSERVED {
+    } else if ratio > OBSERVED_BELOW {
         format!("{ratio:.2}, hardly observed")
     } else {
         format!("1 : {}", three_digits(1.0 / ratio))
@@ -210,17 +207,6 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
         ],
         [rows.to_vec()],
     )
-}
-
-/// Short names of the parameters that the path hardly observed.
-pub(super) fn hardly_observed(outcome: &Outcome) -> Vec<String> {
-    let sigma = outcome.estimate.sigma();
-    outcome
-        .estimate
-        .estimated()
-        .filter(|&i| sigma[i] > HARDLY_OBSERVED * outcome.prior_sigma[i])
-        .map(|i| short_name(outcome.estimate.form(), i))
-        .collect()
 }
 
 #[cfg(test)]
