@@ -19,6 +19,7 @@ mod sigma;
 #[cfg(test)]
 mod synthetic;
 mod tables;
+mod terminal;
 #[cfg(test)]
 mod tests;
 

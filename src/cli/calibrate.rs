@@ -1,0 +1,225 @@
+//! `turncal calibrate`
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+use turncal::calibration::{self, ClosedForm, Outcome, triads_of};
+use turncal::imu::{InstallationForm, PerSensor, Triad};
+use turncal::report::{self, Report};
+use turncal::run::{CalibrationRecord, Run};
+
+use super::output::{Overwrite, print};
+use super::progress::Activity;
+
+/// Estimates scale factors, installation and biases of a run
+///
+/// Writes DIR/calibration.json and DIR/report/ and prints a summary.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal calibrate my-run/run.toml
+  turncal calibrate my-run/run.toml -o result --truth my-run/truth.json
+  turncal calibrate my-run/run.toml --json | jq .gyro.scale")]
+pub struct Calibrate {
+    /// The run's run.toml
+    run: PathBuf,
+    /// Directory to write [default: NAME-calibration, or nothing with --json]
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// How to estimate
+    #[arg(long, value_enum, default_value_t = Method::Ekf)]
+    method: Method,
+    /// How installation angles make the installation matrix
+    #[arg(long, value_enum, default_value_t = Installation::General)]
+    installation: Installation,
+    /// What the filter observes beside the standstill
+    #[arg(long, value_enum, default_value_t = Aiding::Table)]
+    aiding: Aiding,
+    /// True calibration; the estimator never sees it, summary and report show errors against it
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Print the calibration as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Method {
+    /// Extended Kalman filter over the whole run
+    Ekf,
+    /// Closed form from the static positions
+    SixPosition,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Installation {
+    /// Six direction cosines, rows of unit norm
+    General,
+    /// Six off-diagonal entries, unit diagonal
+    SixAngle,
+    /// Identity plus a cross-product matrix
+    ThreeAngle,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Aiding {
+    /// Attitude of the table
+    Table,
+}
+
+impl From<Installation> for InstallationForm {
+    fn from(form: Installation) -> Self {
+        match form {
+            Installation::General => Self::General,
+            Installation::SixAngle => Self::SixAngle,
+            Installation::ThreeAngle => Self::ThreeAngle,
+        }
+    }
+}
+
+/// What a method gave.
+enum Result {
+    Filter(Box<Outcome>),
+    ClosedForm(Box<ClosedForm>),
+}
+
+impl Calibrate {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let activity = Activity::new(format!("reading {}", self.run.display()));
+        let run = Run::read(&self.run)?;
+        let form = self.installation.into();
+        let truth = self
+            .truth
+            .as_deref()
+            .map(|path| read_truth(path, &run, form))
+            .transpose()?;
+        let target = match (&self.output, self.json) {
+            (Some(directory), _) => Some(directory.clone()),
+            (None, true) => None,
+            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.name))),
+        };
+        let directory = target
+            .as_deref()
+            .map(|target| {
+                let inputs: Vec<&Path> = [Some(&self.run), self.truth.as_ref()]
+                    .into_iter()
+                    .flatten()
+                    .map(PathBuf::as_path)
+                    .collect();
+                self.overwrite.directory(target, &inputs)
+            })
+            .transpose()?;
+
+        let Aiding::Table = self.aiding;
+        let result = match self.method {
+            Method::Ekf => Result::Filter(Box::new(filter(&run, form, &activity)?)),
+            Method::SixPosition => {
+                let closed_form = calibration::six_position(&run, form)
+                    .with_context(|| self.run.display().to_string())?;
+                Result::ClosedForm(Box::new(closed_form))
+            }
+        };
+        let record = match &result {
+            Result::Filter(outcome) => outcome.record(&run),
+            Result::ClosedForm(closed_form) => closed_form.estimate.record(&run),
+        };
+        let note = match &result {
+            Result::Filter(_) => String::new(),
+            Result::ClosedForm(closed_form) => note(closed_form),
+        };
+        let dwells = dwell_times(&run);
+        let report = Report {
+            title: &run.name,
+            run: &run,
+            body_frame: BODY_FRAME,
+            outcome: match &result {
+                Result::Filter(outcome) => Some(outcome),
+                Result::ClosedForm(_) => None,
+            },
+            closed_form: match &result {
+                Result::Filter(_) => None,
+                Result::ClosedForm(closed_form) => Some(report::ClosedForm {
+                    estimate: &closed_form.estimate,
+                    note: &note,
+                }),
+            },
+            truth: truth.as_ref(),
+            dwells: &dwells,
+        };
+        activity.next("writing");
+        if let Some(directory) = directory {
+            record.write(&directory.path().join("calibration.json"), false)?;
+            write_report(&report, &directory.path().join("report"))?;
+            directory.commit()?;
+        }
+        drop(activity);
+        if self.json {
+            return print(&record.to_json(Path::new("standard output"))?);
+        }
+        print(report.summary().as_bytes())?;
+        if let Some(target) = target {
+            let page = target.join("report").join("index.html");
+            eprintln!("\nreport: {}", page.display());
+        }
+        Ok(())
+    }
+}
+
+/// What fixes the body axes with table aiding.
+pub const BODY_FRAME: &str = "mounting face of the turntable";
+
+/// Runs the filter; a run that does not converge is a failure.
+pub fn filter(run: &Run, form: InstallationForm, activity: &Activity) -> anyhow::Result<Outcome> {
+    activity.next(format!("calibrating {}", run.name));
+    let outcome = calibration::estimate(run, form, &|pass| activity.pass(pass))
+        .with_context(|| run.name.clone())?;
+    if !outcome.converged {
+        bail!("{}: {}", run.name, outcome.warnings.join(" "));
+    }
+    Ok(outcome)
+}
+
+/// What a closed form was made of, in a few words.
+pub fn note(closed_form: &ClosedForm) -> String {
+    format!(
+        "{} positions for the gyros, {} for the accelerometers, {:.0} min of standing",
+        closed_form.positions.gyro,
+        closed_form.positions.accel,
+        closed_form.standing_time / 60.0
+    )
+}
+
+/// Begin and end of each dwell, s.
+pub fn dwell_times(run: &Run) -> Vec<Range<f64>> {
+    run.dwells()
+        .into_iter()
+        .map(|dwell| run.imu.time(dwell.samples.start)..run.imu.time(dwell.samples.end))
+        .collect()
+}
+
+/// Writes a report into a new directory.
+pub fn write_report(report: &Report, directory: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir(directory)
+        .with_context(|| format!("cannot create {}", directory.display()))?;
+    Ok(report.write(directory)?)
+}
+
+fn read_truth(path: &Path, run: &Run, form: InstallationForm) -> anyhow::Result<PerSensor<Triad>> {
+    let record = CalibrationRecord::read(path)?;
+    if let Some(unit) = &record.unit
+        && *unit != run.unit
+    {
+        bail!(
+            "{}: units are {} and {}, those of the run {} and {}; give the truth of this run",
+            path.display(),
+            unit.gyro,
+            unit.accel,
+            run.unit.gyro,
+            run.unit.accel
+        );
+    }
+    Ok(triads_of(&record, &run.nominal, form))
+}

@@ -1,0 +1,91 @@
+//! `turncal demo`
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use turncal::calibration::{self, ClosedForm};
+use turncal::imu::InstallationForm;
+use turncal::report::{self, Report};
+use turncal::simulation::{Scenario, Simulated};
+
+use super::calibrate::{BODY_FRAME, dwell_times, filter, note, write_report};
+use super::output::{Overwrite, print};
+use super::progress::Activity;
+use super::simulate::{simulated, write};
+
+/// Shows the main job on an embedded scenario
+///
+/// Simulates an instrument with the paper's errors on a three-axis table, ten minutes with turns for
+/// the filter and an hour of static positions for the paper's closed form, calibrates it both ways,
+/// compares both with the truth and writes a report.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
+pub struct Demo {
+    /// Directory to write
+    #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
+    output: PathBuf,
+    /// Seed of all random numbers [default: the scenario's]
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Both installation forms of the demo are the general one.
+const FORM: InstallationForm = InstallationForm::General;
+
+impl Demo {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let directory = self.overwrite.directory(&self.output, &[])?;
+        let activity = Activity::new("simulating both runs");
+        // The same seed gives both runs the same instrument.
+        let (turning, standing) = rayon::join(
+            || simulated(&Scenario::load("demo")?, self.seed),
+            || static_positions(self.seed),
+        );
+        let (turning, (standing, closed_form)) = (turning?, standing?);
+        let run = &turning.run;
+        let outcome = filter(run, FORM, &activity)?;
+
+        let note = note(&closed_form);
+        let dwells = dwell_times(run);
+        let report = Report {
+            title: "turncal demo",
+            run,
+            body_frame: BODY_FRAME,
+            outcome: Some(&outcome),
+            closed_form: Some(report::ClosedForm {
+                estimate: &closed_form.estimate,
+                note: &note,
+            }),
+            truth: Some(&turning.truth),
+            dwells: &dwells,
+        };
+        activity.next("writing");
+        let root = directory.path();
+        write(&turning, &root)?;
+        let static_run = root.join("six-position-run");
+        std::fs::create_dir(&static_run)
+            .with_context(|| format!("cannot create {}", static_run.display()))?;
+        write(&standing, &static_run)?;
+        let record = outcome.record(run);
+        record.write(&root.join("calibration-ekf.json"), false)?;
+        let record = closed_form.estimate.record(&standing.run);
+        record.write(&root.join("calibration-six-position.json"), false)?;
+        write_report(&report, &root.join("report"))?;
+        directory.commit()?;
+        drop(activity);
+
+        print(report.summary().as_bytes())?;
+        let page = self.output.join("report").join("index.html");
+        eprintln!("\nreport: {}", page.display());
+        Ok(())
+    }
+}
+
+/// The static positions and what the closed form makes of them.
+fn static_positions(seed: Option<u64>) -> anyhow::Result<(Simulated, ClosedForm)> {
+    let standing = simulated(&Scenario::load("demo-six-position")?, seed)?;
+    let closed_form = calibration::six_position(&standing.run, FORM)?;
+    Ok((standing, closed_form))
+}

@@ -1,0 +1,41 @@
+//! Commands: each parses its arguments, calls the library and says what came of it.
+
+mod calibrate;
+mod demo;
+mod output;
+mod progress;
+mod simulate;
+
+use clap::{Parser, Subcommand};
+
+/// Calibrates an inertial measurement unit on a turntable, with honest accuracies.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    arg_required_else_help = true,
+    after_help = "\
+Begin with:  turncal demo
+Then:        turncal calibrate my-run/run.toml -o my-calibration"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    Simulate(simulate::Simulate),
+    Calibrate(calibrate::Calibrate),
+}
+
+impl Cli {
+    /// Does what the command line asks for.
+    pub fn run(&self) -> anyhow::Result<()> {
+        match &self.command {
+            Command::Demo(demo) => demo.run(),
+            Command::Simulate(simulate) => simulate.run(),
+            Command::Calibrate(calibrate) => calibrate.run(),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Progress on a terminal; nothing where standard error is a file or a pipe.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use turncal::calibration::outcome::Pass;
+
+/// What is being done, with the time it has taken.
+pub struct Activity(ProgressBar);
+
+impl Activity {
+    /// Begins to show an activity.
+    pub fn new(message: impl Into<String>) -> Self {
+        let bar = ProgressBar::new_spinner().with_message(message.into());
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed:>4}") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(100));
+        Self(bar)
+    }
+
+    /// Says what comes next.
+    pub fn next(&self, message: impl Into<String>) {
+        self.0.set_message(message.into());
+    }
+
+    /// Tells of a pass of the filter.
+    pub fn pass(&self, pass: &Pass) {
+        let kind = if pass.live { "live" } else { "held" };
+        self.next(format!(
+            "{kind} pass done, largest step {:.2} σ",
+            pass.largest_step
+        ));
+    }
+}
+
+impl Drop for Activity {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

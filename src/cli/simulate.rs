@@ -1,0 +1,66 @@
+//! `turncal simulate`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use turncal::calibration::truth_record;
+use turncal::run::write_run;
+use turncal::simulation::{Scenario, Simulated};
+
+use super::output::Overwrite;
+use super::progress::Activity;
+
+/// Makes a run directory with known truth from a scenario
+///
+/// The scenario is a TOML file or the name of an embedded one: demo, demo-six-position,
+/// nineteen-position, two-axis, mems.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7")]
+pub struct Simulate {
+    /// Scenario: a TOML file or an embedded name
+    scenario: String,
+    /// Directory to write
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Seed of all random numbers [default: the scenario's]
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Simulate {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let scenario = Scenario::load(&self.scenario)?;
+        let directory = self
+            .overwrite
+            .directory(&self.output, &[Path::new(&self.scenario)])?;
+        let activity = Activity::new(format!("simulating {}", scenario.name));
+        let simulated = simulated(&scenario, self.seed)?;
+        activity.next("writing");
+        write(&simulated, &directory.path())?;
+        directory.commit()?;
+        drop(activity);
+        eprintln!(
+            "{}: {:.0} s written to {}",
+            scenario.name,
+            simulated.run.imu.duration(),
+            self.output.display()
+        );
+        Ok(())
+    }
+}
+
+/// A simulated run with this seed or the scenario's own.
+pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simulated> {
+    scenario
+        .simulate(seed.unwrap_or(scenario.seed), 0)
+        .with_context(|| format!("scenario {} cannot be simulated", scenario.name))
+}
+
+/// Writes a simulated run with its truth into a directory that is there.
+pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
+    let truth = truth_record(&simulated.truth, &simulated.run);
+    write_run(directory, &simulated.run, simulated.output, Some(&truth))?;
+    Ok(())
+}

@@ -1,0 +1,166 @@
+//! The report as text: what a calibration engineer reads at a glance.
+
+use std::fmt::Write;
+
+use comfy_table::{CellAlignment, Table, presets};
+
+use super::Report;
+use super::group::{Group, axis_name};
+use super::number::{count, sigma, three_digits, value};
+use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
+
+impl Report<'_> {
+    /// The estimates with their σ, what the run taught, and warnings.
+    pub fn summary(&self) -> String {
+        let mut text = self.heading();
+        if let Some(estimate) = self.estimate() {
+            let _ = writeln!(text, "\n{}", self.estimates(estimate));
+        }
+        if self.truth.is_some() {
+            let _ = writeln!(text, "\n{}", self.group_errors());
+        }
+        for warning in self.outcome.map_or(&[][..], |outcome| &outcome.warnings) {
+            let _ = writeln!(text, "\nWarning: {warning}");
+        }
+        text
+    }
+
+    fn heading(&self) -> String {
+        let imu = &self.run.imu;
+        let mut text = format!(
+            "{}: {} s, {} samples at {} Hz, {} dwells",
+            self.title,
+            value(imu.duration(), 10.0),
+            count(imu.len()),
+            three_digits(1.0 / imu.period),
+            self.dwells.len(),
+        );
+        if let Some(estimate) = self.estimate() {
+            let _ = write!(text, "; {} installation", estimate.form().name());
+        }
+        let _ = writeln!(text, "; body frame: {}", self.body_frame);
+        if let Some(outcome) = self.outcome {
+            let _ = writeln!(text, "{}", passes(outcome));
+        } else if let Some(closed_form) = self.closed_form {
+            let _ = writeln!(text, "closed form: {}", closed_form.note);
+        }
+        text
+    }
+
+    fn estimates(&self, estimate: &Estimate) -> Table {
+        let (values, sigmas) = (estimate.vector(), estimate.sigma());
+        let truth = self.truth.map(to_vector);
+        let prior = self.outcome.map(|outcome| outcome.prior_sigma);
+        let mut headings = vec!["", "", "value", "", "σ", "unit"];
+        if prior.is_some() {
+            headings.extend(["prior σ", "prior : σ"]);
+        }
+        if truth.is_some() {
+            headings.extend(["error", "error/σ"]);
+        }
+        let mut table = table(&headings);
+        for group in Group::all() {
+            for (n, index) in group.estimated(estimate).into_iter().enumerate() {
+                let shown = |x: f64| x / group.unit_value();
+                let s = shown(sigmas[index]);
+                let mut row = vec![
+                    if n == 0 { group.title() } else { String::new() },
+                    axis_name(estimate.form(), index),
+                    value(group.shown(values[index]), s),
+                    "±".to_owned(),
+                    sigma(s),
+                    group.unit().to_owned(),
+                ];
+                if let Some(prior) = prior {
+                    row.push(three_digits(shown(prior[index])));
+                    row.push(three_digits(prior[index] / sigmas[index]));
+                }
+                if let Some(truth) = truth {
+                    let error = shown(values[index] - truth[index]);
+                    row.push(value(error, s));
+                    row.push(value(error / s, 1.0));
+                }
+                table.add_row(row);
+            }
+        }
+        align(table)
+    }
+
+    /// Each method's errors, group by group.
+    fn group_errors(&self) -> Table {
+        let Some(truth) = self.truth.map(to_vector) else {
+            return table(&[]);
+        };
+        let methods: Vec<(&str, &Estimate)> = self
+            .closed_form
+            .map(|closed| ("closed form", closed.estimate))
+            .into_iter()
+            .chain(self.outcome.map(|outcome| ("EKF", &outcome.estimate)))
+            .collect();
+        let mut headings = vec!["largest error".to_owned(), "unit".to_owned()];
+        for (name, _) in &methods {
+            headings.extend([(*name).to_owned(), "RMS".to_owned(), "RMS σ".to_owned()]);
+        }
+        if methods.len() == 2 {
+            headings.push("gain of σ".to_owned());
+        }
+        let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+        let mut table = table(&headings);
+        for group in Group::all() {
+            let mut row = vec![group.title(), group.unit().to_owned()];
+            let mut claimed = Vec::new();
+            for (_, estimate) in &methods {
+                let indices = group.estimated(estimate);
+                let error = estimate.vector() - truth;
+                let (largest, rms) = group.spread(&error, &indices).unwrap_or_default();
+                let (_, sigma) = group
+                    .spread(&estimate.sigma(), &indices)
+                    .unwrap_or_default();
+                claimed.push(sigma);
+                row.extend([largest, rms, sigma].map(three_digits));
+            }
+            if let [closed, filter] = claimed[..] {
+                row.push(three_digits(closed / filter));
+            }
+            table.add_row(row);
+        }
+        align(table)
+    }
+}
+
+fn passes(outcome: &Outcome) -> String {
+    let consistency = &outcome.consistency;
+    let nis = |nis: &Nis| {
+        format!(
+            "{} ({} to {})",
+            value(nis.mean, 0.01),
+            value(nis.interval.0, 0.01),
+            value(nis.interval.1, 0.01)
+        )
+    };
+    format!(
+        "{} after {} passes; NIS with its 95 % interval: velocity {}, table {}",
+        if outcome.converged {
+            "converged"
+        } else {
+            "NOT CONVERGED"
+        },
+        outcome.passes.len(),
+        nis(&consistency.velocity),
+        nis(&consistency.table),
+    )
+}
+
+/// A table without frames: first column to the left, all others to the right.
+fn table(headings: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(headings);
+    table
+}
+
+fn align(mut table: Table) -> Table {
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
