@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{SVector, Vector3};
 
 use super::error::CalibrationError;
 use super::estimator::prior_mean;
@@ -94,21 +94,18 @@ impl Equations {
         let walk = PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
         let table = run.table.as_ref().ok_or(CalibrationError::NoTable)?;
         let attitude_variance = table.position_sigma.powi(2) + run.imu.pulse.gyro.powi(2) / 12.0;
-        let leg = |from: &Matrix3<f64>, samples| -> Result<Block, CalibrationError> {
-            Ok(
-                Navigator::new(&run.imu, &run.site, walk, triads, State::at_rest(*from))
-                    .ok_or_else(|| singular(triads))?
-                    .advance(samples),
-            )
+        let at_rest = |dwell: &Dwell| {
+            let state = State::at_rest(dwell.attitude);
+            Navigator::new(&run.imu, &run.site, walk, triads, state).ok_or_else(|| singular(triads))
         };
         let mut before: Option<&Dwell> = None;
         for dwell in dwells {
             if let Some(before) = before {
-                let turn = leg(&before.attitude, before.samples.end..dwell.samples.start)?;
+                let turn = at_rest(before)?.advance(before.samples.end..dwell.samples.start);
                 let variance = 2.0 * attitude_variance + walk.gyro.powi(2) * turn.duration;
                 self.add(&turn, 0, attitude_error(&turn, dwell), variance);
             }
-            let stand = leg(&dwell.attitude, dwell.samples.clone())?;
+            let stand = at_rest(dwell)?.advance_standing(dwell.samples.clone());
             let duration = stand.duration;
             let pulses = run.imu.pulse.gyro.powi(2) / 6.0;
             let variance = pulses + walk.gyro.powi(2) * duration;

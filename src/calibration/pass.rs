@@ -163,7 +163,11 @@ impl<'a> Pass<'a> {
         let mut history: Vec<Moment> = Vec::new();
         let mut stood = false;
         for step in &self.problem.schedule.steps {
-            let block = self.navigator.advance(step.samples.clone());
+            let samples = step.samples.clone();
+            let block = match step.standing {
+                Some(_) => self.navigator.advance_standing(samples),
+                None => self.navigator.advance(samples),
+            };
             self.filter.propagate(&block);
             let time = self.problem.run.imu.time(step.samples.end);
             if let Some(standing) = &step.standing {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
+use super::increments::Increments;
 use super::site_fixed::State;
 use crate::attitude::skew;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
@@ -54,16 +55,17 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Adds a sample: attitude at its middle, increments along body axes, velocity change in `n`.
+    /// Adds a sample: attitude at its middle, increments along body axes, velocity change by
+    /// specific force in `n`.
     #[inline]
     pub(super) fn add(
         &mut self,
         attitude: &Matrix3<f64>,
-        angle: &Vector3<f64>,
-        velocity: &Vector3<f64>,
+        increments: &Increments,
         force: &Vector3<f64>,
         period: f64,
     ) {
+        let Increments { angle, velocity } = increments;
         for k in 0..4 {
             let weight = if k < 3 { angle[k] } else { period };
             let step = attitude * weight;
@@ -79,6 +81,26 @@ impl Moments {
         }
         self.force += force;
         self.duration += period;
+    }
+
+    /// Of a body that stands for a while: `rate` and `force` in `n`, rad/s and m/s².
+    pub(super) fn standing(
+        attitude: &Matrix3<f64>,
+        rate: &Vector3<f64>,
+        force: &Vector3<f64>,
+        duration: f64,
+    ) -> Self {
+        let integrals = |u: Vector3<f64>| u.push(1.0).map(|b| attitude * (b * duration));
+        let gyro: [Matrix3<f64>; 4] = integrals(attitude.tr_mul(rate)).into();
+        // A tilt that grows evenly acts on the force for half the time.
+        let tilting = skew(*force) * (0.5 * duration);
+        Self {
+            tilt: gyro.map(|moment| tilting * moment),
+            gyro,
+            accel: integrals(attitude.tr_mul(force)).into(),
+            force: force * duration,
+            duration,
+        }
     }
 
     /// The block of these integrals. `random_walk` are the noise densities of both triads, rad/√s

@@ -98,6 +98,37 @@ impl<'a> Navigator<'a> {
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let period = self.imu.period;
         let mut moments = Moments::default();
+        self.navigate(samples, |before, after, increments, change| {
+            let middle = (before + after) * 0.5;
+            moments.add(&middle, increments, change, period);
+        });
+        self.block(&moments)
+    }
+
+    /// The same where the table stands. What the instrument senses there is known, so the error
+    /// model takes it from the attitude: taken from the samples, their noise would be in both the
+    /// innovations and the sensitivity to scale factors, and the two together look like information.
+    pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
+        let duration = samples.len() as f64 * self.imu.period;
+        self.navigate(samples, |_, _, _, _| {});
+        let moments = Moments::standing(
+            &self.state.attitude,
+            &self.earth_rate,
+            &-self.gravity,
+            duration,
+        );
+        self.block(&moments)
+    }
+
+    /// Navigates through samples and tells `each` the attitude before and after it, its increments,
+    /// and the velocity change by specific force.
+    #[inline]
+    fn navigate(
+        &mut self,
+        samples: Range<usize>,
+        mut each: impl FnMut(&Matrix3<f64>, &Matrix3<f64>, &Increments, &Vector3<f64>),
+    ) {
+        let period = self.imu.period;
         let mut state = self.state;
         let mut before = samples
             .start
@@ -113,23 +144,21 @@ impl<'a> Navigator<'a> {
             // The frame turns with the Earth while the sample lasts.
             let change = in_start_frame - half_turn.cross(&in_start_frame);
             let attitude = self.earth_turn * (state.attitude * exp(motion.rotation));
+            each(&state.attitude, &attitude, &increments, &change);
+
             let coriolis = self.earth_rate.cross(&state.velocity) * 2.0;
             let velocity = state.velocity + change + (self.gravity - coriolis) * period;
-            moments.add(
-                &((state.attitude + attitude) * 0.5),
-                &increments.angle,
-                &increments.velocity,
-                &change,
-                period,
-            );
             state.position += (state.velocity + velocity) * (0.5 * period);
             state.velocity = velocity;
             state.attitude = attitude;
         }
         state.attitude = orthonormalised(&state.attitude);
         self.state = state;
+    }
+
+    fn block(&self, moments: &Moments) -> Block {
         let responses = PerSensor::from_fn(|sensor| &self.instrument.get(sensor).response);
-        moments.block(state, &self.earth_rate, responses, &self.random_walk)
+        moments.block(self.state, &self.earth_rate, responses, &self.random_walk)
     }
 }
 
@@ -300,6 +329,31 @@ mod tests {
         let end = navigator.advance(0..samples).state;
         assert_relative_eq!(end.attitude, attitude, epsilon = 1e-12);
         assert!(end.velocity.norm() < 1e-9 && end.position.norm() < 1e-7);
+    }
+
+    #[test]
+    fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
+        let site = site();
+        let attitude = start().attitude;
+        let record = ImuRecord {
+            gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; SAMPLES],
+            accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES],
+            ..record()
+        };
+        let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+        let walk = PerSensor {
+            gyro: 3e-7,
+            accel: 5e-5,
+        };
+        let at_rest = State::at_rest(attitude);
+        let navigator = Navigator::new(&record, &site, walk, &ideal, at_rest).unwrap();
+        let moving = navigator.clone().advance(0..SAMPLES);
+        let standing = navigator.clone().advance_standing(0..SAMPLES);
+        assert_relative_eq!(moving.navigation, standing.navigation, epsilon = 1e-6);
+        for sensor in crate::imu::Sensor::ALL {
+            let of = |block: &Block| *block.parameters.get(sensor);
+            assert_relative_eq!(of(&moving), of(&standing), epsilon = 1e-6);
+        }
     }
 
     #[test]
