@@ -20,12 +20,15 @@ pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 const CONVERGED: f64 = 0.02;
 /// At most this many passes.
 const PASSES: usize = 10;
-/// A merit that rises by more than this, in χ², means that the step was too long.
-const MERIT_RISE: f64 = 1.0;
+/// A merit that rises by more than this part means that the step was too long. Each pass knows the
+/// merit of its own linearised problem only, so a small rise means nothing.
+const MERIT_RISE: f64 = 0.1;
 /// 1σ of the initial attitude before anything is known of it but one reading, rad.
 const INITIAL_ATTITUDE: f64 = 60.0 * ARCSEC;
 /// 1σ of the initial velocity: a table at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
+/// More than this part of all observations beyond the gate are no outliers.
+const MOST_OUTLIERS: f64 = 0.05;
 /// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
 const DOUBTFUL: f64 = 0.2;
 
@@ -103,20 +106,13 @@ fn iterate(
         let summary = summary(&result, &at, false);
         progress(&summary);
         passes.push(summary);
-        let outliers: Vec<bool> = result
-            .innovations
-            .iter()
-            .map(|i| i.distance() > problem.gate)
-            .collect();
-        let same_gate = outliers
-            .iter()
-            .enumerate()
-            .all(|(k, &outlier)| outlier == rejected.get(k).copied().unwrap_or(false));
+        let outliers = outliers(&result, problem.gate);
+        let same_gate = outliers == rejected || (rejected.is_empty() && !outliers.contains(&true));
         if passes.len() >= PASSES || (summary.largest_step <= CONVERGED && same_gate) {
             return Ok(result);
         }
         match before {
-            Some((last, merit)) if result.merit > merit + MERIT_RISE => {
+            Some((last, merit)) if result.merit > merit * (1.0 + MERIT_RISE) => {
                 at = last.towards(&at, 0.5);
             }
             _ => {
@@ -126,6 +122,17 @@ fn iterate(
             }
         }
     }
+}
+
+/// Which observations the next pass leaves out. Where they are many it is the model that is wrong,
+/// and leaving out what contradicts it would only hide that: then none.
+fn outliers(result: &PassResult, gate: f64) -> Vec<bool> {
+    let beyond = result.innovations.iter().map(|i| i.distance() > gate);
+    let count = beyond.clone().filter(|&beyond| beyond).count();
+    if count as f64 > MOST_OUTLIERS * result.innovations.len() as f64 {
+        return Vec::new();
+    }
+    beyond.collect()
 }
 
 fn problem<'a>(

@@ -7,7 +7,8 @@ use turncal::imu::Output;
 use turncal::run::{CalibrationRecord, Run, write_run};
 use turncal::units::DEGREE;
 
-use crate::made::{assert_same, made_run, read, shared};
+use super::made::{assert_same, made_run};
+use crate::shared::{read, shared};
 
 #[test]
 fn every_shared_run_and_truth_reads() {

@@ -76,8 +76,27 @@ fn error_after(file: &str, from: &str, to: &str) -> String {
     fs::write(&path, text.replace(from, to)).unwrap();
     match Run::read(&directory.path().join("run.toml")) {
         Ok(_) => panic!("`{to}` for `{from}` in {file} was accepted"),
-        Err(error) => error.to_string(),
+        Err(error) => {
+            let message = error.to_string();
+            assert_command_says(directory.path(), &message);
+            message
+        }
     }
+}
+
+/// `calibrate` fails with status 1 and this message alone, and leaves nothing behind.
+fn assert_command_says(directory: &Path, message: &str) {
+    let output = directory.join("calibration");
+    assert_cmd::Command::new(env!("CARGO_BIN_EXE_turncal"))
+        .arg("calibrate")
+        .arg(directory.join("run.toml"))
+        .arg("-o")
+        .arg(&output)
+        .assert()
+        .code(1)
+        .stdout("")
+        .stderr(format!("turncal: {message}\n"));
+    assert!(!output.exists());
 }
 
 fn assert_says(message: &str, file: &str, words: &str) {

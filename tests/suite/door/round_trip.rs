@@ -10,7 +10,8 @@ use turncal::run::record::{
 use turncal::run::{CalibrationRecord, write_run};
 use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
 
-use crate::made::{assert_same, made_run, read, shared};
+use super::made::{assert_same, made_run};
+use crate::shared::{read, shared};
 
 fn triad_record(scale: f64) -> TriadRecord {
     TriadRecord {

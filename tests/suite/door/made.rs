@@ -1,35 +1,10 @@
-//! Runs to test with: the shared ones, and one made up with every optional part.
-
-use std::path::{Path, PathBuf};
+//! A run made up with every optional part.
 
 use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
 use turncal::imu::{Instability, Noise, Nominal, PerSensor, Prior, Sensor};
 use turncal::run::{ImuRecord, Run, Segment, Standstill, TableRecord};
-
-/// The shared runs, if they are there. Continuous integration must have them.
-pub fn shared(run: &str) -> Option<PathBuf> {
-    let data = std::env::var_os("TURNCAL_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    let directory = data.join(run);
-    if directory.is_dir() {
-        return Some(directory);
-    }
-    assert!(
-        std::env::var_os("CI").is_none_or(|ci| ci != "true"),
-        "no {}; set TURNCAL_DATA",
-        directory.display()
-    );
-    println!("skipped: no {}", directory.display());
-    None
-}
-
-pub fn read(directory: &Path) -> Run {
-    Run::read(&directory.join("run.toml")).unwrap_or_else(|error| panic!("{error}"))
-}
 
 /// A run that turns and stands, with every optional part.
 pub fn made_run(name: &str) -> Run {

@@ -1,0 +1,151 @@
+//! The commands as a user meets them.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use turncal::run::CalibrationRecord;
+
+fn turncal() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_turncal"))
+}
+
+/// Every file below a directory with its bytes.
+fn bytes_below(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(next) = open.pop() {
+        for entry in fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let name = path.strip_prefix(directory).unwrap();
+                files.insert(name.display().to_string(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+fn demo(output: &Path, threads: &str) {
+    turncal()
+        .arg("demo")
+        .arg("-o")
+        .arg(output)
+        .env("RAYON_NUM_THREADS", threads)
+        .assert()
+        .success();
+}
+
+#[test]
+fn the_demo_gives_the_same_bytes_on_one_thread_and_on_two() {
+    let directory = tempfile::tempdir().unwrap();
+    let (one, two) = (directory.path().join("one"), directory.path().join("two"));
+    demo(&one, "1");
+    demo(&two, "2");
+    let (one, two) = (bytes_below(&one), bytes_below(&two));
+    let names: Vec<&str> = one.keys().map(String::as_str).collect();
+    for expected in [
+        "run.toml",
+        "truth.json",
+        "calibration-ekf.json",
+        "calibration-six-position.json",
+        "report/index.html",
+    ] {
+        assert!(names.contains(&expected), "no {expected} in {names:?}");
+    }
+    assert!(one == two);
+}
+
+#[test]
+fn calibrate_gives_one_json_document_whose_model_card_holds() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = directory.path().join("run");
+    turncal()
+        .args(["simulate", "demo", "--seed", "5", "-o"])
+        .arg(&run)
+        .assert()
+        .success();
+    for method in [
+        &["--installation", "general"][..],
+        &["--installation", "three-angle"],
+        &["--method", "six-position"],
+    ] {
+        let output = turncal()
+            .current_dir(directory.path())
+            .arg("calibrate")
+            .arg(run.join("run.toml"))
+            .arg("--json")
+            .args(method)
+            .assert()
+            .success();
+        let document = &output.get_output().stdout;
+        let record: CalibrationRecord = serde_json::from_slice(document).unwrap();
+        assert_eq!(record.parameters.len(), record.covariance.len());
+        let correction = record.correction.unwrap();
+        for vector in &record.test_vectors {
+            // u = correction (N − bias), as a user would write it.
+            for (triad, matrix, first) in [
+                (&record.gyro, correction.gyro, 0),
+                (&record.accel, correction.accel, 3),
+            ] {
+                for row in 0..3 {
+                    let u: f64 = (0..3)
+                        .map(|j| matrix[row][j] * (vector.raw[first + j] - triad.bias[j]))
+                        .sum();
+                    assert!((u - vector.calibrated[first + row]).abs() < 1e-11);
+                }
+            }
+        }
+    }
+    // With --json and without -o nothing is written.
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn an_existing_output_is_kept_unless_forced() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = directory.path().join("out");
+    fs::create_dir(&output).unwrap();
+    fs::write(output.join("mine.txt"), "precious").unwrap();
+    let refused = turncal()
+        .args(["simulate", "demo", "-o"])
+        .arg(&output)
+        .assert();
+    let refused = refused.code(1);
+    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(message.contains("--force"), "{message}");
+    assert!(output.join("mine.txt").exists());
+    turncal()
+        .args(["simulate", "demo", "--force", "-o"])
+        .arg(&output)
+        .assert()
+        .success();
+    assert!(output.join("truth.json").exists());
+}
+
+#[test]
+fn wrong_usage_is_status_two_and_names_the_way() {
+    for arguments in [
+        &["calibrate"][..],
+        &["calibrate", "run.toml", "--installation", "four-angle"],
+        &["simulate", "demo"],
+        &["dance"],
+        &["demo", "--seed", "many"],
+    ] {
+        turncal().args(arguments).assert().code(2);
+    }
+}
+
+#[test]
+fn a_scenario_that_does_not_exist_is_named_with_those_that_do() {
+    let failed = turncal()
+        .args(["simulate", "demoo", "-o", "never-written"])
+        .assert()
+        .code(1);
+    let message = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+    assert!(message.contains("demoo") && message.contains("demo-six-position"));
+    assert!(!Path::new("never-written").exists());
+}

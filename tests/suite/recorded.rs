@@ -1,0 +1,60 @@
+//! Records that other programs made, with known truth.
+
+use turncal::calibration::outcome::to_vector;
+use turncal::calibration::states::PARAMETERS;
+use turncal::calibration::{Outcome, estimate, triads_of};
+use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
+use turncal::run::CalibrationRecord;
+use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+
+use crate::shared::{read, shared};
+
+/// Largest errors: K in ppm, E in ″, D in °/h or µg, gyro before accelerometer.
+fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
+    let directory = shared(name)?;
+    let run = read(&directory);
+    let truth = CalibrationRecord::read(&directory.join("truth.json")).unwrap();
+    let outcome = estimate(&run, InstallationForm::General, &|_| {}).unwrap();
+    let truth = triads_of(&truth, &run.nominal, InstallationForm::General);
+    let error = outcome.estimate.vector() - to_vector(&truth);
+    let mut largest = [0f64; 6];
+    for index in 0..PARAMETERS {
+        let (triad, kind) = (index / PER_TRIAD, Triad::kind(index % PER_TRIAD));
+        let (place, unit) = match kind {
+            ParameterKind::Scale => (0, PPM),
+            ParameterKind::Installation => (1, ARCSEC),
+            ParameterKind::Bias => (2, [DEG_PER_H, MICRO_G][triad]),
+        };
+        let largest = &mut largest[3 * triad + place];
+        *largest = largest.max((error[index] / unit).abs());
+    }
+    let sigmas = error.component_div(&outcome.estimate.sigma()).amax();
+    println!("{name}: largest errors {largest:.4?}, {sigmas:.2} σ");
+    Some((outcome, largest, sigmas))
+}
+
+fn assert_within(largest: [f64; 6], limits: [f64; 6]) {
+    for (found, limit) in largest.into_iter().zip(limits) {
+        assert!(found <= limit, "{largest:?} beyond {limits:?}");
+    }
+}
+
+#[test]
+fn a_three_axis_run_in_counts_is_calibrated_within_four_passes() {
+    let Some((outcome, largest, sigmas)) = calibrated("three-axis-counts") else {
+        return;
+    };
+    assert!(outcome.converged && outcome.passes.len() <= 4);
+    assert!(sigmas < 4.0);
+    assert_within(largest, [1.0, 1.2, 0.012, 1.6, 1.2, 1.5]);
+}
+
+#[test]
+fn nineteen_positions_without_noise_leave_the_floor_of_their_own_increments() {
+    let Some((_, largest, _)) = calibrated("nineteen-position-clean") else {
+        return;
+    };
+    // That file's specific force is too small by (ωT)²/6, half a ppm, while its table turns at
+    // 10°/s: the truncation of the algorithm that made it. The accelerometer scale shows it.
+    assert_within(largest, [0.03, 0.02, 0.0003, 0.1, 0.04, 0.15]);
+}

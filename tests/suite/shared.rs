@@ -1,0 +1,28 @@
+//! Runs made by other programs and by real sensors, where they are there.
+
+use std::path::{Path, PathBuf};
+
+use turncal::run::Run;
+
+/// The shared runs, if they are there. Continuous integration must have them.
+pub fn shared(run: &str) -> Option<PathBuf> {
+    let data = std::env::var_os("TURNCAL_DATA").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let directory = data.join(run);
+    if directory.is_dir() {
+        return Some(directory);
+    }
+    assert!(
+        std::env::var_os("CI").is_none_or(|ci| ci != "true"),
+        "no {}; set TURNCAL_DATA",
+        directory.display()
+    );
+    println!("skipped: no {}", directory.display());
+    None
+}
+
+pub fn read(directory: &Path) -> Run {
+    Run::read(&directory.join("run.toml")).unwrap_or_else(|error| panic!("{error}"))
+}
