@@ -1,19 +1,13 @@
 //! Calibrations side by side: differences in one form and one frame, and whether the claimed σ
 //! explain them.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
-
-use super::consistency::mean_square_interval;
 use super::frame::{Canonical, free_parameters, own_nominal};
+use super::nees::{Nees, nees};
 use super::scatter::{Scatter, scatter};
 use super::states::{ParameterMatrix, ParameterVector};
 use crate::imu::{Nominal, PerSensor, Sensor};
 use crate::run::CalibrationRecord;
 use crate::run::record::BodyFrame;
-
-/// A correlation matrix has no information in directions whose eigenvalue is below this: they are
-/// zero but for rounding, as where three angles stand for six.
-const NO_DIRECTION: f64 = 1e-11;
 
 /// A record with the name that tables and messages give it.
 #[derive(Debug, Clone, Copy)]
@@ -113,17 +107,6 @@ impl Side {
     }
 }
 
-/// Normalised estimation error squared, a mean of squares of independent numbers of σ 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Nees {
-    /// NEES/n.
-    pub mean: f64,
-    /// n: number of independent directions in which the covariance is not zero.
-    pub count: usize,
-    /// 95 % interval of NEES/n if the σ are true (χ²).
-    pub interval: (f64, f64),
-}
-
 /// Holds calibrations against the truth, or, without one, against the first of them.
 pub fn compare(
     calibrations: &[Named],
@@ -213,67 +196,92 @@ fn same_units(all: &[Named]) -> Result<(), ComparisonError> {
     Ok(())
 }
 
-fn nees(
-    difference: &ParameterVector,
-    covariance: &ParameterMatrix,
-    parameters: &[usize],
-) -> Option<Nees> {
-    let with_sigma = parameters.iter().copied();
-    let with_sigma: Vec<usize> = with_sigma.filter(|&i| covariance[(i, i)] > 0.0).collect();
-    let directions = Directions::new(covariance, &with_sigma);
-    let squares = directions.squares(difference);
-    let count = squares.len();
-    (count > 0).then(|| Nees {
-        mean: squares.iter().sum::<f64>() / count as f64,
-        count,
-        interval: mean_square_interval(count, 0.05),
-    })
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::frame::tests::{record, with_covariance};
+    use crate::imu::InstallationForm;
 
-/// The independent directions of a covariance, found on its correlation matrix so that units do not
-/// matter.
-pub(super) struct Directions {
-    indices: Vec<usize>,
-    sigma: DVector<f64>,
-    eigen: SymmetricEigen<f64, nalgebra::Dyn>,
-}
-
-impl Directions {
-    /// Of the covariance of some parameters, each of which has a σ.
-    pub(super) fn new(covariance: &ParameterMatrix, indices: &[usize]) -> Self {
-        let n = indices.len();
-        let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
-        let correlation = DMatrix::from_fn(n, n, |i, j| {
-            let (a, b) = (indices[i], indices[j]);
-            0.5 * (covariance[(a, b)] + covariance[(b, a)]) / (sigma[i] * sigma[j])
-        });
-        Self {
-            indices: indices.to_vec(),
-            sigma,
-            eigen: correlation.symmetric_eigen(),
-        }
+    fn named<'a>(name: &'a str, record: &'a CalibrationRecord) -> Named<'a> {
+        Named { name, record }
     }
 
-    /// Squares of a vector's components along the directions, each in units of its σ.
-    fn squares(&self, v: &ParameterVector) -> Vec<f64> {
-        let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
-        let along = self.eigen.eigenvectors.tr_mul(&z);
-        let squares = along.iter().zip(&self.eigen.eigenvalues);
-        squares
-            .filter(|(_, variance)| **variance > NO_DIRECTION)
-            .map(|(x, variance)| x * x / variance)
-            .collect()
+    #[test]
+    fn a_difference_is_calibration_less_reference_in_parts_of_the_reference() {
+        let truth = record();
+        let mut estimate = with_covariance(record(), InstallationForm::General);
+        estimate.gyro.scale[1] *= 1.0 + 3e-6;
+        estimate.accel.bias[0] += 2e-5 * 1.006e5;
+        let comparison = compare(&[named("a", &estimate)], Some(named("truth", &truth))).unwrap();
+        let side = &comparison.sides[0];
+        assert!((side.difference[1] - 3e-6).abs() < 1e-15);
+        assert!((side.difference[21] - 2e-5).abs() < 1e-15);
+        let sigma = side.calibration.sigma().unwrap();
+        assert_eq!(side.z(1), Some(side.difference[1] / sigma[1]));
+        let swapped = compare(&[named("t", &truth), named("a", &truth)], None).unwrap();
+        assert_eq!(swapped.sides[0].z(1), None);
+        assert_eq!(swapped.sides[0].nees, None);
     }
 
-    /// The inverse of the covariance; `None` where it has no inverse.
-    pub(super) fn information(&self) -> Option<DMatrix<f64>> {
-        let eigen = &self.eigen;
-        if eigen.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
-            return None;
+    #[test]
+    fn nees_of_the_truth_is_zero_and_of_one_sigma_along_one_axis_one_in_n() {
+        let truth = record();
+        let mut estimate = with_covariance(record(), InstallationForm::General);
+        let nees = |estimate: &CalibrationRecord| {
+            let comparison = compare(&[named("a", estimate)], Some(named("t", &truth))).unwrap();
+            comparison.sides[0].nees.unwrap()
+        };
+        assert!(nees(&estimate).mean < 1e-12);
+        assert_eq!(nees(&estimate).count, 24);
+        for (i, row) in estimate.covariance.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value *= f64::from(i == j);
+            }
         }
-        let inverse = DMatrix::from_diagonal(&eigen.eigenvalues.map(f64::recip));
-        let scale = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
-        let whitened = &scale * &eigen.eigenvectors;
-        Some(&whitened * inverse * whitened.transpose())
+        estimate.gyro.bias[2] += estimate.covariance[11][11].sqrt();
+        assert!((nees(&estimate).mean * 24.0 - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn three_angles_have_as_many_directions_as_they_have_parameters() {
+        let mut estimate = record();
+        let c = InstallationForm::ThreeAngle.matrix(&[0.003, -0.002, 0.004, 0.0, 0.0, 0.0].into());
+        for triad in [&mut estimate.gyro, &mut estimate.accel] {
+            triad.installation = [0, 1, 2].map(|i| [c[(i, 0)], c[(i, 1)], c[(i, 2)]]);
+        }
+        let truth = estimate.clone();
+        let estimate = with_covariance(estimate, InstallationForm::ThreeAngle);
+        let comparison = compare(&[named("a", &estimate)], Some(named("t", &truth))).unwrap();
+        assert_eq!(comparison.sides[0].nees.unwrap().count, 18);
+    }
+
+    #[test]
+    fn two_calibrations_differ_by_the_sigma_of_both() {
+        let (a, mut b) = (
+            with_covariance(record(), InstallationForm::General),
+            with_covariance(record(), InstallationForm::General),
+        );
+        b.unit = None;
+        let comparison = compare(&[named("a", &a), named("b", &b)], None).unwrap();
+        let own = comparison.reference.sigma().unwrap();
+        let both = comparison.sides[0].difference_sigma.unwrap();
+        assert!((both - own * 2f64.sqrt()).amax() < 1e-12 * own.amax());
+        assert!(comparison.scatter.is_none() && !comparison.against_truth);
+    }
+
+    #[test]
+    fn other_units_are_an_error_that_names_both() {
+        let a = record();
+        let mut b = record();
+        if let Some(unit) = &mut b.unit {
+            unit.accel = "m/s".to_owned();
+        }
+        let error = compare(&[named("one", &a), named("two", &b)], None).unwrap_err();
+        let text = error.to_string();
+        for part in ["one", "two", "accel", "`count`", "`m/s`"] {
+            assert!(text.contains(part), "{text}");
+        }
+        let single = compare(&[named("one", &a)], None);
+        assert_eq!(single.unwrap_err(), ComparisonError::Single);
     }
 }

@@ -280,4 +280,4 @@ fn general_tangent(triad: &Triad, da: &Matrix3<f64>, bias: Vector3<f64>) -> Tria
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::comparison::Directions;
 use super::frame::Canonical;
+use super::nees::Directions;
 use super::states::ParameterVector;
 
 /// Mean and scatter of three calibrations or more, taken as of one instrument that has not changed
@@ -140,4 +140,82 @@ fn joint(
         from_mean.dot(&(w * &from_mean))
     });
     ChiSquare::new(value.sum(), n * (calibrations.len() - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::SVector;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::calibration::frame::own_nominal;
+    use crate::calibration::frame::tests::{record, with_covariance};
+    use crate::calibration::outcome::from_vector;
+    use crate::calibration::states::PARAMETERS;
+    use crate::imu::InstallationForm::General;
+    use crate::run::record::BodyFrame;
+
+    /// Calibrations that scatter by `factor` times the σ that they claim.
+    fn drawn(count: usize, factor: f64) -> (Vec<Canonical>, ParameterVector) {
+        let record = with_covariance(record(), General);
+        let centre = Canonical::new("a", &record, &own_nominal(&record), BodyFrame::Table).unwrap();
+        let root = centre.covariance.unwrap().cholesky().unwrap().unpack();
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let draws = (0..count).map(|_| {
+            let white = SVector::<f64, PARAMETERS>::from_fn(|_, _| StandardNormal.sample(&mut rng));
+            Canonical {
+                triads: from_vector(General, &(centre.vector() + root * white * factor)),
+                ..centre.clone()
+            }
+        });
+        (draws.collect(), centre.vector())
+    }
+
+    #[test]
+    fn scatter_of_true_sigma_is_inside_its_interval_and_of_wrong_ones_is_not() {
+        let parameters: Vec<usize> = (0..PARAMETERS).collect();
+        let p = |factor| {
+            let (draws, reference) = drawn(20, factor);
+            let joint = scatter(&draws, &reference, &parameters).joint.unwrap();
+            assert_eq!(joint.freedom, 24 * 19);
+            joint.p
+        };
+        assert!((0.005..0.995).contains(&p(1.0)));
+        assert!(p(1.3) < 1e-6 && p(0.7) > 1.0 - 1e-6);
+    }
+
+    #[test]
+    fn one_parameter_has_the_mean_and_scatter_of_its_values() {
+        let (mut draws, reference) = drawn(3, 0.0);
+        let sigma = draws[0].sigma().unwrap()[9];
+        for (draw, offset) in draws.iter_mut().zip([-1.0, 0.0, 4.0]) {
+            draw.triads.gyro.bias.x += offset * sigma;
+        }
+        let of = of_parameter(&draws, &reference, 9);
+        let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+        close(of.mean, sigma);
+        close(of.mean_sigma.unwrap(), sigma / 3f64.sqrt());
+        close(of.deviation, sigma * 7f64.sqrt());
+        close(of.chi_square.unwrap().value, 14.0);
+        // Abramowitz and Stegun, Eq. 26.4.21 for two degrees of freedom: exp(−χ²/2).
+        close(of.chi_square.unwrap().p, (-7f64).exp());
+    }
+
+    #[test]
+    fn calibrations_without_sigma_have_a_mean_and_no_chi_square() {
+        let (mut draws, reference) = drawn(3, 1.0);
+        for draw in &mut draws {
+            draw.covariance = None;
+        }
+        let scatter = scatter(&draws, &reference, &[0, 1, 2]);
+        assert_eq!(scatter.joint, None);
+        assert!(
+            scatter
+                .parameters
+                .iter()
+                .all(|p| p.chi_square.is_none() && p.count == 3)
+        );
+    }
 }
