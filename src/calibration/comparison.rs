@@ -4,8 +4,8 @@
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
 use super::scatter::{Scatter, scatter};
-use super::states::{ParameterMatrix, ParameterVector};
-use crate::imu::{Nominal, PerSensor, Sensor};
+use super::states::{ParameterMatrix, ParameterVector, sensor_and_parameter};
+use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, Triad};
 use crate::run::CalibrationRecord;
 use crate::run::record::BodyFrame;
 
@@ -83,6 +83,15 @@ pub struct Comparison {
     pub sides: Vec<Side>,
     /// Scatter of all calibrations, from three on.
     pub scatter: Option<Scatter>,
+}
+
+impl Comparison {
+    /// The reference's scale factor in the file's quantity; none for other parameters.
+    pub fn scale_factor(&self, parameter: usize) -> Option<f64> {
+        let (sensor, of_triad) = sensor_and_parameter(parameter);
+        (Triad::kind(of_triad) == ParameterKind::Scale)
+            .then(|| self.nominal.get(sensor).factor(of_triad))
+    }
 }
 
 /// A calibration less the reference.

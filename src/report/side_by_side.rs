@@ -1,0 +1,300 @@
+//! Calibrations side by side: the same tables for a terminal and for a page, and one figure.
+
+mod figure;
+mod page;
+
+use std::path::Path;
+use std::{fs, io};
+
+use super::ReportError;
+use super::group::{Group, short_name};
+use super::number::{count, sigma, three_digits, value};
+use crate::calibration::states::ParameterVector;
+use crate::calibration::{ChiSquare, Comparison, Nees, Side};
+use crate::imu::{InstallationForm, Sensor};
+use crate::run::record::BodyFrame;
+
+/// Beyond this many σ a difference is flagged.
+pub const FLAGGED: f64 = 3.0;
+
+const NONE: &str = "–";
+
+/// Cells in rows, the first of each naming it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Table {
+    /// What it shows.
+    pub title: &'static str,
+    /// A heading for each column.
+    pub headings: Vec<String>,
+    /// Rows that belong together.
+    pub sections: Vec<Vec<Vec<String>>>,
+    /// How to read it.
+    pub note: String,
+}
+
+/// What is compared with what, in a sentence or two.
+pub fn summary(comparison: &Comparison) -> String {
+    let frame = match comparison.body_frame {
+        BodyFrame::Table => "the turntable's mounting face",
+        BodyFrame::Accelerometer => {
+            "the accelerometers (x along accelerometer x, y in the plane of x and y)"
+        }
+    };
+    let reference = &comparison.reference.name;
+    let reference = if comparison.against_truth {
+        format!("the truth, {reference}")
+    } else {
+        format!("the first calibration, {reference}")
+    };
+    format!("General form, body frame of {frame}. Reference: {reference}.")
+}
+
+/// All tables: parameters, groups, and from three calibrations on their scatter.
+pub fn tables(comparison: &Comparison) -> Vec<Table> {
+    let mut tables = vec![parameters(comparison), groups(comparison)];
+    tables.extend(scatter(comparison));
+    tables
+}
+
+/// Writes `index.html`, which needs nothing else, and the figure as `differences.svg` into an existing
+/// directory.
+pub fn write(comparison: &Comparison, directory: &Path) -> Result<(), ReportError> {
+    let figure = figure::figure(comparison)?;
+    let page = page::page(comparison, &figure);
+    for (name, text) in [(figure.file, &figure.svg), ("index.html", &page)] {
+        let path = directory.join(name);
+        fs::write(&path, text).map_err(|source: io::Error| ReportError::Write { path, source })?;
+    }
+    Ok(())
+}
+
+/// Indices of the compared parameters of a group.
+fn of_group(comparison: &Comparison, group: Group) -> Vec<usize> {
+    let all = comparison.parameters.iter().copied();
+    all.filter(|&index| Group::of(index) == group).collect()
+}
+
+fn name(index: usize) -> String {
+    short_name(InstallationForm::General, index)
+}
+
+/// A table with a section for each triad.
+fn by_triad(rows: impl Fn(Group) -> Vec<Vec<String>>) -> Vec<Vec<Vec<String>>> {
+    let rows: Vec<(Sensor, Vec<Vec<String>>)> = Group::all()
+        .map(|group| (group.sensor(), rows(group)))
+        .collect();
+    rows.chunk_by(|a, b| a.0 == b.0)
+        .map(|triad| triad.iter().flat_map(|(_, rows)| rows.clone()).collect())
+        .collect()
+}
+
+fn parameters(comparison: &Comparison) -> Table {
+    let reference = &comparison.reference;
+    let mut headings = vec![String::new(), reference.name.clone(), "unit".to_owned()];
+    for side in &comparison.sides {
+        headings.push(format!("{} less reference", side.calibration.name));
+        headings.push("z".to_owned());
+    }
+    let sections = by_triad(|group| {
+        let indices = of_group(comparison, group).into_iter();
+        indices
+            .map(|index| {
+                let mut row = vec![
+                    name(index),
+                    reference_value(comparison, index),
+                    group.unit().to_owned(),
+                ];
+                for side in &comparison.sides {
+                    row.push(plus_minus(
+                        side.difference[index],
+                        side.calibration.sigma().map(|s| s[index]),
+                        group,
+                    ));
+                    row.push(z(side, index));
+                }
+                row
+            })
+            .collect()
+    });
+    let exact = if comparison.against_truth {
+        ""
+    } else {
+        ", as if both came of different data"
+    };
+    Table {
+        title: "Parameters",
+        headings,
+        sections,
+        note: format!(
+            "Differences with the 1σ that the calibration claims. K of the reference is in the file's \
+             quantity, other K are parts of it. z: difference in σ of the difference{exact}; ! beyond \
+             {FLAGGED}."
+        ),
+    }
+}
+
+/// The reference's own value; scale factors in the file's quantity.
+fn reference_value(comparison: &Comparison, index: usize) -> String {
+    let group = Group::of(index);
+    let own = comparison.reference.sigma().map(|s| s[index]);
+    // Without a σ of its own, the reference is shown as finely as the others are known.
+    let finest = comparison
+        .sides
+        .iter()
+        .filter_map(|side| side.calibration.sigma())
+        .map(|s| s[index])
+        .chain(own)
+        .filter(|s| *s > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let (size, unit) = match comparison.scale_factor(index) {
+        Some(nominal) => (nominal, 1.0 / nominal.abs()),
+        None => (
+            comparison.reference.vector()[index] / group.unit_value(),
+            group.unit_value(),
+        ),
+    };
+    let finest = if finest.is_finite() {
+        finest / unit
+    } else {
+        size.abs() * 1e-6
+    };
+    let text = value(size, finest);
+    match own {
+        Some(own) if own > 0.0 => format!("{text} ± {}", sigma(own / unit)),
+        _ => text,
+    }
+}
+
+fn plus_minus(difference: f64, own: Option<f64>, group: Group) -> String {
+    let shown = difference / group.unit_value();
+    match own.map(|s| s / group.unit_value()) {
+        Some(own) if own > 0.0 => format!("{} ± {}", value(shown, own), sigma(own)),
+        _ => three_digits(shown),
+    }
+}
+
+fn z(side: &Side, index: usize) -> String {
+    side.z(index).map_or(NONE.to_owned(), |z| {
+        let flag = if z.abs() > FLAGGED { " !" } else { "" };
+        format!("{}{flag}", value(z, 1.0))
+    })
+}
+
+fn groups(comparison: &Comparison) -> Table {
+    let mut headings = vec![String::new(), "unit".to_owned()];
+    for side in &comparison.sides {
+        let name = &side.calibration.name;
+        headings.push(format!("{name}: largest"));
+        headings.push("RMS".to_owned());
+        headings.push("RMS σ".to_owned());
+    }
+    let mut sections = by_triad(|group| {
+        let indices = of_group(comparison, group);
+        let spread = |v: &ParameterVector| group.spread(v, &indices);
+        let mut row = vec![group.title(), group.unit().to_owned()];
+        for side in &comparison.sides {
+            let cell = |x: Option<f64>| x.map_or(NONE.to_owned(), three_digits);
+            let difference = spread(&side.difference);
+            row.push(cell(difference.map(|x| x.0)));
+            row.push(cell(difference.map(|x| x.1)));
+            let own = side.calibration.sigma();
+            let own = own.and_then(|s| spread(&s)).map(|x| x.1);
+            row.push(own.filter(|s| *s > 0.0).map_or(NONE.to_owned(), sigma));
+        }
+        vec![row]
+    });
+    let mut row = vec!["NEES/n".to_owned(), String::new()];
+    for side in &comparison.sides {
+        row.extend(nees(side.nees));
+    }
+    sections.push(vec![row]);
+    Table {
+        title: "Groups",
+        headings,
+        sections,
+        note:
+            "Largest and RMS of the differences to the reference, and the RMS of the claimed 1σ. \
+               NEES/n, its 95 % interval and n: one if the σ are true, correlations included."
+                .to_owned(),
+    }
+}
+
+fn nees(nees: Option<Nees>) -> [String; 3] {
+    match nees {
+        Some(Nees {
+            mean,
+            count,
+            interval: (low, high),
+        }) => [
+            value(mean, 0.1),
+            format!("{}…{}", value(low, 0.1), value(high, 0.1)),
+            format!("n = {count}"),
+        ],
+        None => [NONE; 3].map(str::to_owned),
+    }
+}
+
+fn scatter(comparison: &Comparison) -> Option<Table> {
+    let scatter = comparison.scatter.as_ref()?;
+    let headings = [
+        "",
+        "unit",
+        "mean less reference",
+        "scatter",
+        "χ²/n",
+        "n",
+        "p",
+    ];
+    let mut sections = by_triad(|group| {
+        let of_group = scatter.parameters.iter();
+        of_group
+            .filter(|p| Group::of(p.index) == group)
+            .map(|p| {
+                let mut row = vec![
+                    name(p.index),
+                    group.unit().to_owned(),
+                    plus_minus(p.mean, p.mean_sigma, group),
+                    three_digits(p.deviation / group.unit_value()),
+                ];
+                row.extend(chi_square(p.chi_square));
+                row
+            })
+            .collect()
+    });
+    let mut all = vec![
+        "all".to_owned(),
+        String::new(),
+        String::new(),
+        String::new(),
+    ];
+    all.extend(chi_square(scatter.joint));
+    sections.push(vec![all]);
+    Some(Table {
+        title: "Scatter",
+        headings: headings.map(str::to_owned).to_vec(),
+        sections,
+        note: "Mean weighted by the claimed σ, ± its 1σ; scatter: sample standard deviation. χ² of the \
+               scatter against the claimed σ, n its degrees of freedom, p the probability of as much \
+               or more: near 0 the σ are too small, near 1 too large. All: with correlations."
+            .to_owned(),
+    })
+}
+
+fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
+    match chi_square {
+        Some(ChiSquare {
+            value: x,
+            freedom,
+            p,
+        }) => [
+            value(x / freedom as f64, 0.1),
+            count(freedom),
+            if p < 1e-4 {
+                "< 0.0001".to_owned()
+            } else {
+                value(p, 0.01)
+            },
+        ],
+        None => [NONE; 3].map(str::to_owned),
+    }
+}
