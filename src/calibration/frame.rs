@@ -32,6 +32,8 @@ pub struct Canonical {
     pub covariance: Option<ParameterMatrix>,
     /// Whether the record gives correlations; if not, the covariance takes its σ for independent.
     pub correlated: bool,
+    /// False only if the record says that its method did not converge.
+    pub converged: bool,
 }
 
 impl Canonical {
@@ -83,6 +85,7 @@ impl Canonical {
             triads,
             covariance,
             correlated: !record.covariance.is_empty(),
+            converged: record.converged != Some(false),
         })
     }
 

@@ -2,6 +2,7 @@
 
 mod document;
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -79,8 +80,9 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<()> {
 
 /// File stems; where they are equal, the name of the directory; where that is, too, the whole path.
 fn short_names(paths: &[&Path]) -> Vec<String> {
-    let stem = |path: &Path| path.file_stem().map(|s| s.to_string_lossy().into_owned());
-    let parent = |path: &Path| path.parent().and_then(stem_of_directory);
+    let shown = |name: &OsStr| name.to_string_lossy().into_owned();
+    let stem = |path: &Path| path.file_stem().map(shown);
+    let parent = |path: &Path| path.parent()?.file_name().map(shown);
     let shortest = |path: &&Path| {
         let unique = |of: &dyn Fn(&Path) -> Option<String>| {
             let name = of(path)?;
@@ -94,12 +96,11 @@ fn short_names(paths: &[&Path]) -> Vec<String> {
     paths.iter().map(shortest).collect()
 }
 
-fn stem_of_directory(path: &Path) -> Option<String> {
-    path.file_name().map(|s| s.to_string_lossy().into_owned())
-}
-
 fn text(comparison: &Comparison) -> String {
     let mut text = side_by_side::summary(comparison) + "\n";
+    for warning in side_by_side::warnings(comparison) {
+        text.push_str(&format!("Warning: {warning}\n"));
+    }
     for table in side_by_side::tables(comparison) {
         text.push('\n');
         push_table(&mut text, &table);
@@ -139,8 +140,10 @@ fn push_table(text: &mut String, table: &Table) {
             text.push_str(&line(row));
         }
     }
-    text.push_str(&table.note);
-    text.push('\n');
+    for note in &table.notes {
+        text.push_str(note);
+        text.push('\n');
+    }
 }
 
 #[cfg(test)]

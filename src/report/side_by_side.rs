@@ -28,8 +28,8 @@ pub struct Table {
     pub headings: Vec<String>,
     /// Rows that belong together.
     pub sections: Vec<Vec<Vec<String>>>,
-    /// How to read it.
-    pub note: String,
+    /// How to read it, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// What is compared with what, in a sentence or two.
@@ -42,11 +42,20 @@ pub fn summary(comparison: &Comparison) -> String {
     };
     let reference = &comparison.reference.name;
     let reference = if comparison.against_truth {
-        format!("the truth, {reference}")
+        format!("{reference}, the truth")
     } else {
-        format!("the first calibration, {reference}")
+        format!("{reference}, the first calibration")
     };
     format!("General form, body frame of {frame}. Reference: {reference}.")
+}
+
+/// What forbids to trust a calibration's σ, a sentence each.
+pub fn warnings(comparison: &Comparison) -> Vec<String> {
+    std::iter::once(&comparison.reference)
+        .chain(comparison.sides.iter().map(|side| &side.calibration))
+        .filter(|calibration| !calibration.converged)
+        .map(|calibration| format!("{} did not converge: its σ mean nothing.", calibration.name))
+        .collect()
 }
 
 /// All tables: parameters, groups, and from three calibrations on their scatter.
@@ -92,7 +101,7 @@ fn parameters(comparison: &Comparison) -> Table {
     let reference = &comparison.reference;
     let mut headings = vec![String::new(), reference.name.clone(), "unit".to_owned()];
     for side in &comparison.sides {
-        headings.push(format!("{} less reference", side.calibration.name));
+        headings.push(side.calibration.name.clone());
         headings.push("z".to_owned());
     }
     let sections = by_triad(|group| {
@@ -108,6 +117,7 @@ fn parameters(comparison: &Comparison) -> Table {
                     row.push(plus_minus(
                         side.difference[index],
                         side.calibration.sigma().map(|s| s[index]),
+                        finest(comparison, &[index]),
                         group,
                     ));
                     row.push(z(side, index));
@@ -116,36 +126,37 @@ fn parameters(comparison: &Comparison) -> Table {
             })
             .collect()
     });
-    let exact = if comparison.against_truth {
-        ""
-    } else {
-        ", as if both came of different data"
-    };
+    let mut notes = vec![
+        "Calibrations: difference to the reference ± the 1σ that the calibration claims."
+            .to_owned(),
+        "K of the reference is in the file's quantity.".to_owned(),
+        format!("z: difference in σ of the difference, ! beyond {FLAGGED}."),
+    ];
+    if !comparison.against_truth {
+        notes.push("z and NEES hold if the calibrations come of different data.".to_owned());
+    }
     Table {
         title: "Parameters",
         headings,
         sections,
-        note: format!(
-            "Differences with the 1σ that the calibration claims. K of the reference is in the file's \
-             quantity, other K are parts of it. z: difference in σ of the difference{exact}; ! beyond \
-             {FLAGGED}."
-        ),
+        notes,
     }
+}
+
+/// The smallest σ that any calibration claims for some parameters: what is finer means nothing.
+fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
+    std::iter::once(&comparison.reference)
+        .chain(comparison.sides.iter().map(|side| &side.calibration))
+        .filter_map(|calibration| calibration.sigma())
+        .flat_map(|sigma| indices.iter().map(move |&index| sigma[index]))
+        .filter(|sigma| *sigma > 0.0)
+        .reduce(f64::min)
 }
 
 /// The reference's own value; scale factors in the file's quantity.
 fn reference_value(comparison: &Comparison, index: usize) -> String {
     let group = Group::of(index);
     let own = comparison.reference.sigma().map(|s| s[index]);
-    // Without a σ of its own, the reference is shown as finely as the others are known.
-    let finest = comparison
-        .sides
-        .iter()
-        .filter_map(|side| side.calibration.sigma())
-        .map(|s| s[index])
-        .chain(own)
-        .filter(|s| *s > 0.0)
-        .fold(f64::INFINITY, f64::min);
     let (size, unit) = match comparison.scale_factor(index) {
         Some(nominal) => (nominal, 1.0 / nominal.abs()),
         None => (
@@ -153,30 +164,27 @@ fn reference_value(comparison: &Comparison, index: usize) -> String {
             group.unit_value(),
         ),
     };
-    let finest = if finest.is_finite() {
-        finest / unit
-    } else {
-        size.abs() * 1e-6
-    };
-    let text = value(size, finest);
-    match own {
-        Some(own) if own > 0.0 => format!("{text} ± {}", sigma(own / unit)),
-        _ => text,
+    match (own.filter(|own| *own > 0.0), finest(comparison, &[index])) {
+        (Some(own), _) => format!("{} ± {}", value(size, own / unit), sigma(own / unit)),
+        (None, Some(finest)) => value(size, finest / unit),
+        (None, None) => value(size, size.abs() * 1e-6),
     }
 }
 
-fn plus_minus(difference: f64, own: Option<f64>, group: Group) -> String {
-    let shown = difference / group.unit_value();
-    match own.map(|s| s / group.unit_value()) {
-        Some(own) if own > 0.0 => format!("{} ± {}", value(shown, own), sigma(own)),
-        _ => three_digits(shown),
+fn plus_minus(difference: f64, own: Option<f64>, finest: Option<f64>, group: Group) -> String {
+    let unit = group.unit_value();
+    let shown = difference / unit;
+    match (own.filter(|own| *own > 0.0), finest) {
+        (Some(own), _) => format!("{} ± {}", value(shown, own / unit), sigma(own / unit)),
+        (None, Some(finest)) => value(shown, finest / unit),
+        (None, None) => three_digits(shown),
     }
 }
 
 fn z(side: &Side, index: usize) -> String {
     side.z(index).map_or(NONE.to_owned(), |z| {
-        let flag = if z.abs() > FLAGGED { " !" } else { "" };
-        format!("{}{flag}", value(z, 1.0))
+        let flag = if z.abs() > FLAGGED { "! " } else { "" };
+        format!("{flag}{}", value(z, 1.0))
     })
 }
 
@@ -192,8 +200,10 @@ fn groups(comparison: &Comparison) -> Table {
         let indices = of_group(comparison, group);
         let spread = |v: &ParameterVector| group.spread(v, &indices);
         let mut row = vec![group.title(), group.unit().to_owned()];
+        let finest = finest(comparison, &indices).map(|s| s / group.unit_value());
+        let shown = |x: f64| finest.map_or_else(|| three_digits(x), |finest| value(x, finest));
         for side in &comparison.sides {
-            let cell = |x: Option<f64>| x.map_or(NONE.to_owned(), three_digits);
+            let cell = |x: Option<f64>| x.map_or(NONE.to_owned(), shown);
             let difference = spread(&side.difference);
             row.push(cell(difference.map(|x| x.0)));
             row.push(cell(difference.map(|x| x.1)));
@@ -212,10 +222,12 @@ fn groups(comparison: &Comparison) -> Table {
         title: "Groups",
         headings,
         sections,
-        note:
-            "Largest and RMS of the differences to the reference, and the RMS of the claimed 1σ. \
-               NEES/n, its 95 % interval and n: one if the σ are true, correlations included."
-                .to_owned(),
+        notes: [
+            "Largest and RMS: of the differences to the reference. RMS σ: of the claimed 1σ.",
+            "NEES/n, its 95 % interval and n: one if the σ are true, correlations included.",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
     }
 }
 
@@ -253,8 +265,8 @@ fn scatter(comparison: &Comparison) -> Option<Table> {
                 let mut row = vec![
                     name(p.index),
                     group.unit().to_owned(),
-                    plus_minus(p.mean, p.mean_sigma, group),
-                    three_digits(p.deviation / group.unit_value()),
+                    plus_minus(p.mean, p.mean_sigma, None, group),
+                    plus_minus(p.deviation, None, finest(comparison, &[p.index]), group),
                 ];
                 row.extend(chi_square(p.chi_square));
                 row
@@ -273,10 +285,14 @@ fn scatter(comparison: &Comparison) -> Option<Table> {
         title: "Scatter",
         headings: headings.map(str::to_owned).to_vec(),
         sections,
-        note: "Mean weighted by the claimed σ, ± its 1σ; scatter: sample standard deviation. χ² of the \
-               scatter against the claimed σ, n its degrees of freedom, p the probability of as much \
-               or more: near 0 the σ are too small, near 1 too large. All: with correlations."
-            .to_owned(),
+        notes: [
+            "Mean weighted by the claimed σ, ± its 1σ; scatter: sample standard deviation.",
+            "χ² of the scatter against the claimed σ, n its degrees of freedom; p: probability of as \
+             much or more. Near 0 the σ are too small, near 1 too large.",
+            "All: with correlations; none where a calibration has none, or fewer than general form.",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
     })
 }
 

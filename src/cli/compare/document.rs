@@ -27,6 +27,7 @@ pub(super) struct Document<'a> {
 #[derive(Serialize)]
 struct Consistency<'a> {
     name: &'a str,
+    converged: bool,
     nees_per_n: Option<f64>,
     n: Option<usize>,
     nees_interval: Option<[f64; 2]>,
@@ -134,6 +135,7 @@ fn consistency(side: &Side) -> Consistency<'_> {
     let of = |f: fn(Nees) -> f64| side.nees.map(f);
     Consistency {
         name: &side.calibration.name,
+        converged: side.calibration.converged,
         nees_per_n: of(|nees| nees.mean),
         n: side.nees.map(|nees| nees.count),
         nees_interval: side.nees.map(|nees| nees.interval.into()),

@@ -47,10 +47,11 @@ fn panel(area: &Area, group: Group, comparison: &Comparison) -> Result<(), DrawE
             (side.calibration.name.as_str(), points.collect())
         })
         .collect();
+    let (y, kind) = height(&shown);
     let longest = shown.iter().map(|(name, _)| name.chars().count()).max();
     let mut panel = Panel::new(
         area,
-        &format!("{}, {}", group.title(), group.unit()),
+        &format!("{}, {}{kind}", group.title(), group.unit()),
         Margins {
             left: 60.0,
             right: 24.0 + 7.5 * longest.unwrap_or(0).min(NAME) as f64,
@@ -61,7 +62,7 @@ fn panel(area: &Area, group: Group, comparison: &Comparison) -> Result<(), DrawE
                     .iter()
                     .map(|&i| axis_name(InstallationForm::General, i)),
             ),
-            height(&shown),
+            y,
         ),
         "",
         &[],
@@ -88,8 +89,8 @@ fn panel(area: &Area, group: Group, comparison: &Comparison) -> Result<(), DrawE
     panel.finish()
 }
 
-/// Linear, unless the smallest σ or differences would vanish on it.
-fn height(shown: &[(&str, Vec<(f64, f64)>)]) -> Axis {
+/// Linear, unless the smallest σ or differences would vanish on it; with a word that says so.
+fn height(shown: &[(&str, Vec<(f64, f64)>)]) -> (Axis, &'static str) {
     let reach = |points: &Vec<(f64, f64)>| {
         let reaches = points.iter().map(|(d, s)| d.abs() + s);
         reaches.fold(0.0, f64::max)
@@ -98,9 +99,9 @@ fn height(shown: &[(&str, Vec<(f64, f64)>)]) -> Axis {
     let most = reaches().fold(0.0, f64::max);
     let least = reaches().filter(|r| *r > 0.0).fold(most, f64::min);
     if most > 20.0 * least {
-        Axis::symlog(least, 1.5 * most)
+        (Axis::symlog(0.3 * least, 1.5 * most), ", logarithmic")
     } else {
-        Axis::linear(-1.15 * most, 1.15 * most)
+        (Axis::linear(-1.15 * most, 1.15 * most), "")
     }
 }
 

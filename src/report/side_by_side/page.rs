@@ -5,7 +5,7 @@ use maud::{DOCTYPE, PreEscaped, html};
 use super::super::Figure;
 use super::super::page::{STYLE, drawn};
 use super::super::tables::table;
-use super::{Table, summary, tables};
+use super::{Table, summary, tables, warnings};
 use crate::calibration::Comparison;
 
 const TITLE: &str = "Comparison of calibrations";
@@ -22,9 +22,10 @@ pub(super) fn page(comparison: &Comparison, figure: &Figure) -> String {
             }
             body {
                 header { h1 { (TITLE) } p { (summary(comparison)) } }
+                @for warning in warnings(comparison) { p.warnings { (warning) } }
                 (drawn(figure))
-                @for Table { title, headings, sections, note } in tables(comparison) {
-                    section { h2 { (title) } (table(&headings, sections)) p.note { (note) } }
+                @for Table { title, headings, sections, notes } in tables(comparison) {
+                    section { h2 { (title) } (table(&headings, sections)) p.note { (notes.join(" ")) } }
                 }
                 footer { "turncal " (env!("CARGO_PKG_VERSION")) }
             }
