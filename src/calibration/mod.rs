@@ -4,21 +4,29 @@
 
 mod closed_form;
 mod coarse;
+mod comparison;
 mod consistency;
 mod error;
 mod estimator;
 mod filter;
+mod frame;
+mod nees;
 pub mod outcome;
 mod pass;
 mod record;
+mod scatter;
 mod schedule;
 mod standstill;
 pub mod states;
 
 pub use closed_form::{ClosedForm, Position, six_position, six_position_triad};
 pub use coarse::coarse_start;
+pub use comparison::{Comparison, ComparisonError, Named, Side, compare};
 pub use consistency::mean_square_interval;
 pub use error::CalibrationError;
 pub use estimator::{Progress, estimate};
+pub use frame::Canonical;
+pub use nees::Nees;
 pub use outcome::{Estimate, Outcome};
 pub use record::{triads_of, truth_record};
+pub use scatter::{ChiSquare, ParameterScatter, Scatter};

@@ -1,6 +1,7 @@
 //! Commands: each parses its arguments, calls the library and says what came of it.
 
 mod calibrate;
+mod compare;
 mod demo;
 mod output;
 mod progress;
@@ -27,6 +28,7 @@ enum Command {
     Demo(demo::Demo),
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
+    Compare(compare::Compare),
 }
 
 impl Cli {
@@ -36,6 +38,7 @@ impl Cli {
             Command::Demo(demo) => demo.run(),
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(),
+            Command::Compare(compare) => compare.run(),
         }
     }
 }

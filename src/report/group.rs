@@ -7,21 +7,21 @@ use crate::units;
 
 /// Parameters of one triad and kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Group {
+pub struct Group {
     sensor: Sensor,
     kind: ParameterKind,
 }
 
 impl Group {
     /// All six, in the order of the parameters.
-    pub(super) fn all() -> impl Iterator<Item = Self> {
+    pub fn all() -> impl Iterator<Item = Self> {
         Sensor::ALL
             .into_iter()
             .flat_map(|sensor| ParameterKind::ALL.map(|kind| Self { sensor, kind }))
     }
 
     /// The group of a parameter.
-    pub(super) fn of(index: usize) -> Self {
+    pub fn of(index: usize) -> Self {
         let (sensor, of_triad) = sensor_and_parameter(index);
         Self {
             sensor,
@@ -29,21 +29,31 @@ impl Group {
         }
     }
 
+    /// The triad.
+    pub fn sensor(self) -> Sensor {
+        self.sensor
+    }
+
+    /// The kind of its parameters.
+    pub fn kind(self) -> ParameterKind {
+        self.kind
+    }
+
     /// Indices of its parameters in this form.
-    pub(super) fn parameters(self, form: InstallationForm) -> Vec<usize> {
+    pub fn parameters(self, form: InstallationForm) -> Vec<usize> {
         (0..PARAMETERS)
             .filter(|&index| Self::of(index) == self && parameter_name(form, index).is_some())
             .collect()
     }
 
     /// Indices of those that were estimated.
-    pub(super) fn estimated(self, estimate: &Estimate) -> Vec<usize> {
+    pub fn estimated(self, estimate: &Estimate) -> Vec<usize> {
         let indices = estimate.estimated();
         indices.filter(|&index| Self::of(index) == self).collect()
     }
 
     /// Such as `gyro scale factor K`.
-    pub(super) fn title(self) -> String {
+    pub fn title(self) -> String {
         let kind = match self.kind {
             ParameterKind::Scale => "scale factor K",
             ParameterKind::Installation => "installation E",
@@ -53,7 +63,7 @@ impl Group {
     }
 
     /// Symbol of the unit.
-    pub(super) fn unit(self) -> &'static str {
+    pub fn unit(self) -> &'static str {
         match (self.kind, self.sensor) {
             (ParameterKind::Scale, _) => "ppm",
             (ParameterKind::Installation, _) => "″",
@@ -63,7 +73,7 @@ impl Group {
     }
 
     /// The unit in the model's normalised SI values.
-    pub(super) fn unit_value(self) -> f64 {
+    pub fn unit_value(self) -> f64 {
         match (self.kind, self.sensor) {
             (ParameterKind::Scale, _) => units::PPM,
             (ParameterKind::Installation, _) => units::ARCSEC,
@@ -73,7 +83,7 @@ impl Group {
     }
 
     /// What a reader is shown for a parameter's value: scale factors as departure from nominal.
-    pub(super) fn shown(self, value: f64) -> f64 {
+    pub fn shown(self, value: f64) -> f64 {
         match self.kind {
             ParameterKind::Scale => (value - 1.0) / self.unit_value(),
             ParameterKind::Installation | ParameterKind::Bias => value / self.unit_value(),
@@ -82,7 +92,7 @@ impl Group {
 
     /// Largest magnitude and root mean square of some of a vector's entries, in the group's unit;
     /// `None` if there are none.
-    pub(super) fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
+    pub fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
         let values = || indices.iter().map(|&i| (v[i] / self.unit_value()).abs());
         let mean_square = values().map(|x| x * x).sum::<f64>() / indices.len() as f64;
         values()
@@ -92,14 +102,14 @@ impl Group {
 }
 
 /// The end of a parameter's name, such as `x` or `xy`.
-pub(super) fn axis_name(form: InstallationForm, index: usize) -> String {
+pub fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
 }
 
 /// A short name for a figure's margin, such as `gyro E xy`.
-pub(super) fn short_name(form: InstallationForm, index: usize) -> String {
+pub fn short_name(form: InstallationForm, index: usize) -> String {
     let Group { sensor, kind } = Group::of(index);
     let letter = match kind {
         ParameterKind::Scale => 'K',

@@ -9,12 +9,13 @@ mod comparison;
 mod correlation;
 mod estimates;
 mod facts;
-mod group;
+pub mod group;
 mod innovations;
 mod number;
 mod page;
 mod panel;
 mod path;
+pub mod side_by_side;
 mod sigma;
 #[cfg(test)]
 mod synthetic;

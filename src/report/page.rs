@@ -4,7 +4,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Figure, Report, facts, number, tables};
 
-const STYLE: &str = include_str!("style.css");
+/// The style of every page.
+pub(super) const STYLE: &str = include_str!("style.css");
 
 /// The whole page as HTML.
 pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
@@ -93,7 +94,8 @@ fn notices(report: &Report) -> Markup {
     }
 }
 
-fn drawn(figure: &Figure) -> Markup {
+/// A figure within a page.
+pub(super) fn drawn(figure: &Figure) -> Markup {
     // The namespace is needed in a file of its own only.
     let svg = figure
         .svg

@@ -9,13 +9,16 @@ use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, Outcome, parameter_n
 use crate::imu::ParameterKind;
 
 /// Rows that belong together.
-type Section = Vec<Vec<String>>;
+pub(super) type Section = Vec<Vec<String>>;
 
 /// A table whose first column names the row.
-fn table(headings: &[&str], sections: impl IntoIterator<Item = Section>) -> Markup {
+pub(super) fn table<H: AsRef<str>>(
+    headings: &[H],
+    sections: impl IntoIterator<Item = Section>,
+) -> Markup {
     html! {
         table {
-            thead { tr { @for heading in headings { th scope="col" { (heading) } } } }
+            thead { tr { @for heading in headings { th scope="col" { (heading.as_ref()) } } } }
             @for section in sections {
                 tbody {
                     @for row in &section {
@@ -71,7 +74,6 @@ pub(super) fn groups(report: &Report) -> Markup {
         }
         row
     });
-    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
     let rows: Section = rows.collect();
     table(
         &headings,

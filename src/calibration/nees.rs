@@ -1,0 +1,87 @@
+//! An error measured by its covariance, correlations included.
+
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
+
+use super::consistency::mean_square_interval;
+use super::states::{ParameterMatrix, ParameterVector};
+
+/// A correlation matrix has no information in directions whose eigenvalue is below this: they are
+/// zero but for rounding, as where three angles stand for six.
+const NO_DIRECTION: f64 = 1e-11;
+
+/// Normalised estimation error squared, a mean of squares of independent numbers of σ 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nees {
+    /// NEES/n.
+    pub mean: f64,
+    /// n: number of independent directions in which the covariance is not zero.
+    pub count: usize,
+    /// 95 % interval of NEES/n if the σ are true (χ²).
+    pub interval: (f64, f64),
+}
+
+/// NEES of a difference over those of some parameters that have a σ; none if none has.
+pub(super) fn nees(
+    difference: &ParameterVector,
+    covariance: &ParameterMatrix,
+    parameters: &[usize],
+) -> Option<Nees> {
+    let with_sigma = parameters.iter().copied();
+    let with_sigma: Vec<usize> = with_sigma.filter(|&i| covariance[(i, i)] > 0.0).collect();
+    let directions = Directions::new(covariance, &with_sigma);
+    let squares = directions.squares(difference);
+    let count = squares.len();
+    (count > 0).then(|| Nees {
+        mean: squares.iter().sum::<f64>() / count as f64,
+        count,
+        interval: mean_square_interval(count, 0.05),
+    })
+}
+
+/// The independent directions of a covariance, found on its correlation matrix so that units do not
+/// matter.
+pub(super) struct Directions {
+    indices: Vec<usize>,
+    sigma: DVector<f64>,
+    eigen: SymmetricEigen<f64, Dyn>,
+}
+
+impl Directions {
+    /// Of the covariance of some parameters, each of which has a σ.
+    pub(super) fn new(covariance: &ParameterMatrix, indices: &[usize]) -> Self {
+        let n = indices.len();
+        let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
+        let correlation = DMatrix::from_fn(n, n, |i, j| {
+            let (a, b) = (indices[i], indices[j]);
+            0.5 * (covariance[(a, b)] + covariance[(b, a)]) / (sigma[i] * sigma[j])
+        });
+        Self {
+            indices: indices.to_vec(),
+            sigma,
+            eigen: correlation.symmetric_eigen(),
+        }
+    }
+
+    /// Squares of a vector's components along the directions, each in units of its σ.
+    fn squares(&self, v: &ParameterVector) -> Vec<f64> {
+        let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
+        let along = self.eigen.eigenvectors.tr_mul(&z);
+        let squares = along.iter().zip(&self.eigen.eigenvalues);
+        squares
+            .filter(|(_, variance)| **variance > NO_DIRECTION)
+            .map(|(x, variance)| x * x / variance)
+            .collect()
+    }
+
+    /// The inverse of the covariance; `None` where it has no inverse.
+    pub(super) fn information(&self) -> Option<DMatrix<f64>> {
+        let eigen = &self.eigen;
+        if eigen.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
+            return None;
+        }
+        let inverse = DMatrix::from_diagonal(&eigen.eigenvalues.map(f64::recip));
+        let scale = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
+        let whitened = &scale * &eigen.eigenvectors;
+        Some(&whitened * inverse * whitened.transpose())
+    }
+}
