@@ -8,8 +8,8 @@
 //! * SI and radians everywhere; [`units`] at the edges.
 //!
 //! # Rooms
-//! [`earth`], [`attitude`], [`imu`] and `turntable` know nobody. Data flow one way: [`run`] →
-//! [`calibration`] → `report`.
+//! Data flow one way: [`run`] → [`navigation`] and [`calibration`] → [`report`]. [`earth`],
+//! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`].
 
 pub mod attitude;
 pub mod calibration;
