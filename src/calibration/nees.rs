@@ -28,8 +28,7 @@ pub(super) fn nees(
 ) -> Option<Nees> {
     let with_sigma = parameters.iter().copied();
     let with_sigma: Vec<usize> = with_sigma.filter(|&i| covariance[(i, i)] > 0.0).collect();
-    let directions = Directions::new(covariance, &with_sigma);
-    let squares = directions.squares(difference);
+    let squares = Directions::new(covariance, &with_sigma)?.squares(difference);
     let count = squares.len();
     (count > 0).then(|| Nees {
         mean: squares.iter().sum::<f64>() / count as f64,
@@ -47,19 +46,24 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// Of the covariance of some parameters, each of which has a σ.
-    pub(super) fn new(covariance: &ParameterMatrix, indices: &[usize]) -> Self {
+    /// Of the covariance of some parameters, each of which has a σ; none if there are none, or if the
+    /// matrix cannot be a covariance.
+    pub(super) fn new(covariance: &ParameterMatrix, indices: &[usize]) -> Option<Self> {
         let n = indices.len();
         let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
         let correlation = DMatrix::from_fn(n, n, |i, j| {
             let (a, b) = (indices[i], indices[j]);
             0.5 * (covariance[(a, b)] + covariance[(b, a)]) / (sigma[i] * sigma[j])
         });
-        Self {
+        if n == 0 || !correlation.iter().all(|r| r.is_finite()) {
+            return None;
+        }
+        let eigen = SymmetricEigen::try_new(correlation, f64::EPSILON, 1000 * n)?;
+        (eigen.eigenvalues.min() > -NO_DIRECTION).then(|| Self {
             indices: indices.to_vec(),
             sigma,
-            eigen: correlation.symmetric_eigen(),
-        }
+            eigen,
+        })
     }
 
     /// Squares of a vector's components along the directions, each in units of its σ.

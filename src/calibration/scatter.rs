@@ -13,8 +13,8 @@ use super::states::ParameterVector;
 pub struct Scatter {
     /// Each parameter by itself.
     pub parameters: Vec<ParameterScatter>,
-    /// All parameters that every calibration has estimated, with their correlations; none where a
-    /// calibration gives none or leaves directions without σ.
+    /// All parameters with their correlations, over the calibrations that give them; none if fewer
+    /// than two do, or if one leaves directions without σ, as three angles do.
     pub joint: Option<ChiSquare>,
 }
 
@@ -107,29 +107,26 @@ fn joint(
     reference: &ParameterVector,
     parameters: &[usize],
 ) -> Option<ChiSquare> {
-    if !calibrations.iter().all(|c| c.correlated) {
+    let given = calibrations.iter().filter(|c| c.correlated);
+    let (vectors, covariances): (Vec<_>, Vec<_>) = given
+        .filter_map(|c| Some((c.vector(), c.covariance?)))
+        .unzip();
+    let [first, _, ..] = covariances.as_slice() else {
         return None;
-    }
-    let covariances: Vec<_> = calibrations
-        .iter()
-        .map(|c| c.covariance)
-        .collect::<Option<_>>()?;
+    };
     let estimated = |i: &usize| covariances.iter().all(|p| p[(*i, *i)] > 0.0);
     let indices: Vec<usize> = parameters.iter().copied().filter(estimated).collect();
     let n = indices.len();
     // One unit for all, a parameter's σ in the first calibration, keeps the sums well scaled.
-    let unit = DVector::from_fn(n, |i, _| covariances[0][(indices[i], indices[i])].sqrt());
+    let unit = DVector::from_fn(n, |i, _| first[(indices[i], indices[i])].sqrt());
     let scale = DMatrix::from_diagonal(&unit);
     let information: Vec<DMatrix<f64>> = covariances
         .iter()
-        .map(|p| Some(&scale * Directions::new(p, &indices).information()? * &scale))
+        .map(|p| Some(&scale * Directions::new(p, &indices)?.information()? * &scale))
         .collect::<Option<_>>()?;
-    let values: Vec<DVector<f64>> = calibrations
+    let values: Vec<DVector<f64>> = vectors
         .iter()
-        .map(|c| {
-            let difference = c.vector() - reference;
-            DVector::from_fn(n, |i, _| difference[indices[i]] / unit[i])
-        })
+        .map(|vector| DVector::from_fn(n, |i, _| (vector - reference)[indices[i]] / unit[i]))
         .collect();
     let pairs = || information.iter().zip(&values);
     let total = information.iter().fold(DMatrix::zeros(n, n), |a, b| a + b);
@@ -139,7 +136,7 @@ fn joint(
         let from_mean = x - &mean;
         from_mean.dot(&(w * &from_mean))
     });
-    ChiSquare::new(value.sum(), n * (calibrations.len() - 1))
+    ChiSquare::new(value.sum(), n * (values.len() - 1))
 }
 
 #[cfg(test)]

@@ -289,7 +289,7 @@ fn scatter(comparison: &Comparison) -> Option<Table> {
             "Mean weighted by the claimed σ, ± its 1σ; scatter: sample standard deviation.",
             "χ² of the scatter against the claimed σ, n its degrees of freedom; p: probability of as \
              much or more. Near 0 the σ are too small, near 1 too large.",
-            "All: with correlations; none where a calibration has none, or fewer than general form.",
+            "All: with correlations, over the calibrations that give them.",
         ]
         .map(str::to_owned)
         .to_vec(),

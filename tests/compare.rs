@@ -1,0 +1,118 @@
+//! `turncal compare` as a user meets it.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use turncal::imu::PerSensor;
+use turncal::run::CalibrationRecord;
+use turncal::run::record::TriadRecord;
+
+const ALIGNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+fn record() -> CalibrationRecord {
+    let triad = |scale| TriadRecord {
+        scale: [scale; 3],
+        installation: ALIGNED,
+        bias: [1.0, 2.0, 3.0],
+    };
+    CalibrationRecord {
+        unit: Some(PerSensor::from_fn(|_| "count".to_owned())),
+        ..CalibrationRecord::new(triad(2e6), triad(1e5))
+    }
+}
+
+/// A calibration of it whose gyro scale factor x is `ppm` too large, with σ 1 ppm.
+fn calibration(ppm: f64) -> CalibrationRecord {
+    let mut record = record();
+    record.gyro.scale[0] *= 1.0 + ppm * 1e-6;
+    record.parameters = vec!["gyro.scale.x".to_owned()];
+    record.covariance = vec![vec![4.0]];
+    record
+}
+
+fn written(directory: &Path, name: &str, record: &CalibrationRecord) -> PathBuf {
+    let path = directory.join(name);
+    record.write(&path, false).unwrap();
+    path
+}
+
+fn compare(arguments: &[&Path]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("turncal").unwrap();
+    command.arg("compare").args(arguments).assert()
+}
+
+fn stdout(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+}
+
+fn stderr(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+}
+
+#[test]
+fn a_scale_factor_that_is_too_large_by_four_sigma_is_flagged_and_has_its_sign() {
+    let root = tempfile::tempdir().unwrap();
+    let truth = written(root.path(), "truth.json", &record());
+    let good = written(root.path(), "good.json", &calibration(-1.0));
+    let bad = written(root.path(), "bad.json", &calibration(4.0));
+    let option = Path::new("--truth");
+    let text = stdout(&compare(&[&good, &bad, option, &truth]).success());
+    let row = text.lines().find(|l| l.starts_with("gyro K x")).unwrap();
+    assert!(row.contains("−1.0 ± 1.0  −1.0"), "{row}");
+    assert!(row.contains("4.0 ± 1.0  ! 4.0"), "{row}");
+}
+
+#[test]
+fn json_is_one_document_with_nees_and_scatter() {
+    let root = tempfile::tempdir().unwrap();
+    let paths =
+        [0.0, 3.0, -3.0].map(|ppm| written(root.path(), &format!("{ppm}.json"), &calibration(ppm)));
+    let truth = written(root.path(), "truth.json", &record());
+    let (json, option) = (Path::new("--json"), Path::new("--truth"));
+    let text = stdout(&compare(&[&paths[0], &paths[1], &paths[2], json, option, &truth]).success());
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let near = |pointer: &str, expected: f64| {
+        let found = document.pointer(pointer).and_then(|v| v.as_f64()).unwrap();
+        assert!((found - expected).abs() < 1e-3, "{pointer}: {found}");
+    };
+    near("/calibrations/1/nees_per_n", 9.0);
+    near("/groups/gyro.scale_ppm/1/largest", 3.0);
+    near("/parameters/0/calibrations/2/z", -3.0);
+    near("/scatter/parameters/0/chi2", 18.0);
+    near("/scatter/all/chi2", 18.0);
+    near("/scatter/all/degrees_of_freedom", 2.0);
+}
+
+#[test]
+fn a_report_is_written_once_and_replaced_only_with_force() {
+    let root = tempfile::tempdir().unwrap();
+    let a = written(root.path(), "a.json", &record());
+    let b = written(root.path(), "b.json", &record());
+    let report = root.path().join("report");
+    let option = Path::new("-o");
+    compare(&[&a, &b, option, &report]).success();
+    let page = std::fs::read_to_string(report.join("index.html")).unwrap();
+    assert!(page.contains("<svg") && report.join("differences.svg").exists());
+    let again = compare(&[&a, &b, option, &report]).failure().code(1);
+    assert!(stderr(&again).contains("--force"));
+    compare(&[&a, &b, option, &report, Path::new("--force")]).success();
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let a = written(root.path(), "a.json", &record());
+    let mut other = record();
+    other.unit = Some(PerSensor::from_fn(|_| "rad".to_owned()));
+    let b = written(root.path(), "b.json", &other);
+    let refused = compare(&[&a, &b]).failure().code(1);
+    let message = stderr(&refused);
+    assert!(
+        message.contains("`count`") && message.contains("`rad`"),
+        "{message}"
+    );
+    compare(&[&a]).failure().code(2);
+    compare(&[&a, &root.path().join("none.json")])
+        .failure()
+        .code(1);
+}
