@@ -91,9 +91,9 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
                 (&record.gyro, correction.gyro, 0),
                 (&record.accel, correction.accel, 3),
             ] {
-                for row in 0..3 {
+                for (row, coefficients) in matrix.iter().enumerate() {
                     let u: f64 = (0..3)
-                        .map(|j| matrix[row][j] * (vector.raw[first + j] - triad.bias[j]))
+                        .map(|j| coefficients[j] * (vector.raw[first + j] - triad.bias[j]))
                         .sum();
                     assert!((u - vector.calibrated[first + row]).abs() < 1e-11);
                 }

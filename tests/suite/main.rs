@@ -1,6 +1,7 @@
 //! What turncal promises, from the outside: one binary, so that it links once.
 
 mod cli;
+mod compare;
 mod door;
 mod recorded;
 mod shared;

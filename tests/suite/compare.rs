@@ -37,7 +37,7 @@ fn written(directory: &Path, name: &str, record: &CalibrationRecord) -> PathBuf 
 }
 
 fn compare(arguments: &[&Path]) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("turncal").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
     command.arg("compare").args(arguments).assert()
 }
 
