@@ -5,7 +5,6 @@ use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{SVector, Vector3};
 
 use super::error::CalibrationError;
-use super::estimator::prior_mean;
 use super::outcome::{from_vector, to_vector};
 use super::pass::singular;
 use super::states::{PARAMETERS, ParameterVector, parameter};
@@ -32,7 +31,7 @@ pub fn coarse_start(
     dwells: &[Dwell],
     form: InstallationForm,
 ) -> Result<PerSensor<Triad>, CalibrationError> {
-    let mean = prior_mean(run, form);
+    let mean = run.prior_mean(form);
     let mut triads = mean;
     for _ in 0..STEPS {
         let mut equations = Equations::new(run, form, &to_vector(&mean), &to_vector(&triads));

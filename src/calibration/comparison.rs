@@ -1,6 +1,7 @@
 //! Calibrations side by side: differences in one form and one frame, and whether the claimed σ
 //! explain them.
 
+use super::error::ComparisonError;
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
 use super::scatter::{Scatter, scatter};
@@ -16,54 +17,6 @@ pub struct Named<'a> {
     pub name: &'a str,
     /// The calibration, or the truth.
     pub record: &'a CalibrationRecord,
-}
-
-/// Why calibrations cannot be compared.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ComparisonError {
-    /// Nothing to compare.
-    #[error("a single calibration and no truth; give a second calibration, or a truth")]
-    Single,
-    /// Outputs of different quantities.
-    #[error(
-        "{other} has the {} unit `{found}`, {name} has `{expected}`: their numbers cannot be \
-         compared; give calibrations of outputs in the same unit", .sensor.name()
-    )]
-    Unit {
-        /// Which triad.
-        sensor: Sensor,
-        /// The first record that states a unit.
-        name: String,
-        /// Its unit.
-        expected: String,
-        /// The record that states another one.
-        other: String,
-        /// The other unit.
-        found: String,
-    },
-    /// An axis that is not near the body axis of its name.
-    #[error(
-        "{name}: the {} {axis} axis is a right angle or more away from body {axis} (by the sign of \
-         the reference's scale factor), or the matrix K·C is singular; bring the calibrations to \
-         the same body axes and signs first", .sensor.name()
-    )]
-    Turned {
-        /// The record.
-        name: String,
-        /// Which triad.
-        sensor: Sensor,
-        /// Which axis.
-        axis: char,
-    },
-    /// `parameters` and `covariance` that do not fit.
-    #[error(
-        "{name}: covariance needs one row and one column for each name in parameters, and each must \
-         be a parameter of the record's installation form; write the calibration again"
-    )]
-    Covariance {
-        /// The record.
-        name: String,
-    },
 }
 
 /// Calibrations in the general form and a common body frame, held against a reference.

@@ -9,7 +9,7 @@ use super::pass::{Linearisation, Mode, PassResult, Problem, Variance, gate, pass
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
 use super::states::ParameterVector;
-use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
 use crate::run::Run;
 use crate::units::ARCSEC;
 
@@ -83,7 +83,7 @@ pub fn estimate(
         passes,
         warnings: run.notes.clone(),
     };
-    outcome.warnings.extend(warnings(&outcome));
+    outcome.warnings.extend(warnings(run, &outcome));
     Ok(outcome)
 }
 
@@ -155,7 +155,7 @@ fn problem<'a>(
         run,
         schedule,
         form,
-        prior_mean: to_vector(&prior_mean(run, form)),
+        prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
         start: Start {
             attitude: INITIAL_ATTITUDE.max(10.0 * position_sigma),
@@ -172,11 +172,6 @@ fn problem<'a>(
         },
         gate: gate(),
     }
-}
-
-/// The prior's mean of both triads.
-pub(super) fn prior_mean(run: &Run, form: InstallationForm) -> PerSensor<Triad> {
-    PerSensor::from_fn(|sensor| run.prior.get(sensor).mean(form))
 }
 
 fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
@@ -196,7 +191,7 @@ fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
     }
 }
 
-fn warnings(outcome: &Outcome) -> Vec<String> {
+fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
     if !outcome.converged {
         warnings.push(format!(
@@ -219,6 +214,18 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
             "Not observed by this path, σ not even halved: {}.",
             unobserved.join(", ")
         ));
+    }
+    for sensor in Sensor::ALL {
+        if run.noise.get(sensor).instability.is_some() {
+            warnings.push(format!(
+                "The noise figures state a bias instability of the {}, for which the filter has no \
+                 state yet: σ do not contain it.",
+                match sensor {
+                    Sensor::Gyro => "gyros",
+                    Sensor::Accel => "accelerometers",
+                }
+            ));
+        }
     }
     let rejected = outcome.innovations.iter().filter(|i| !i.accepted).count();
     if rejected > 0 {

@@ -9,7 +9,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::comparison::ComparisonError;
+use super::error::ComparisonError;
 use super::outcome::{parameter_name, to_vector};
 use super::record::triads_of;
 use super::states::{PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter};

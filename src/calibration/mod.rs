@@ -21,9 +21,9 @@ pub mod states;
 
 pub use closed_form::{ClosedForm, Position, six_position, six_position_triad};
 pub use coarse::coarse_start;
-pub use comparison::{Comparison, ComparisonError, Named, Side, compare};
+pub use comparison::{Comparison, Named, Side, compare};
 pub use consistency::mean_square_interval;
-pub use error::CalibrationError;
+pub use error::{CalibrationError, ComparisonError};
 pub use estimator::{Progress, estimate};
 pub use frame::Canonical;
 pub use nees::Nees;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::increments::Increments;
-use super::site_fixed::State;
+use super::state::State;
 use crate::attitude::skew;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
 

@@ -11,7 +11,9 @@
 mod block;
 mod increments;
 mod site_fixed;
+mod state;
 
 pub use block::{Block, BlockMatrix, NAVIGATION, ParameterBlock};
 pub use increments::{Increments, Motion};
-pub use site_fixed::{Navigator, State};
+pub use site_fixed::Navigator;
+pub use state::State;

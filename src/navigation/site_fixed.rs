@@ -6,32 +6,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::block::{Block, CorrectedResponse, Moments};
 use super::increments::Increments;
+use super::state::State;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
 use crate::imu::{PerSensor, Triad};
 use crate::run::ImuRecord;
-
-/// Computed attitude, velocity and position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State {
-    /// `C_b_n`, body to East-North-Up.
-    pub attitude: Matrix3<f64>,
-    /// Velocity relative to the Earth, East-North-Up, m/s.
-    pub velocity: Vector3<f64>,
-    /// Position relative to the site, East-North-Up, m.
-    pub position: Vector3<f64>,
-}
-
-impl State {
-    /// At rest at the site.
-    pub fn at_rest(attitude: Matrix3<f64>) -> Self {
-        Self {
-            attitude,
-            velocity: Vector3::zeros(),
-            position: Vector3::zeros(),
-        }
-    }
-}
 
 /// Navigates through a record with given triads and accumulates the error model as it goes.
 #[derive(Debug, Clone)]

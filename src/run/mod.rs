@@ -30,7 +30,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::earth::Site;
-use crate::imu::{Noise, Nominal, PerSensor, Prior};
+use crate::imu::{InstallationForm, Noise, Nominal, PerSensor, Prior, Triad};
 
 /// Everything that a calibration needs to know of one record.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,6 +59,13 @@ pub struct Run {
     pub segments: Vec<Segment>,
     /// What the files say that has no effect yet, a sentence each.
     pub notes: Vec<String>,
+}
+
+impl Run {
+    /// Both triads as the prior has them.
+    pub fn prior_mean(&self, form: InstallationForm) -> PerSensor<Triad> {
+        PerSensor::from_fn(|sensor| self.prior.get(sensor).mean(form))
+    }
 }
 
 /// The samples of both triads.
