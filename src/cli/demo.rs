@@ -17,7 +17,8 @@ use super::simulate::{simulated, write};
 ///
 /// Simulates an instrument with the paper's errors on a three-axis table, ten minutes with turns for
 /// the filter and an hour of static positions for the paper's closed form, calibrates it both ways,
-/// compares both with the truth and writes a report.
+/// compares both with the truth and writes a report. DIR is the filter's run directory and holds ekf/
+/// with its calibration, six-position/ with the static run and its calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {
@@ -64,14 +65,18 @@ impl Demo {
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;
-        let static_run = root.join("six-position-run");
-        std::fs::create_dir(&static_run)
-            .with_context(|| format!("cannot create {}", static_run.display()))?;
-        write(&standing, &static_run)?;
+        let method = |name: &str| -> anyhow::Result<PathBuf> {
+            let path = root.join(name);
+            std::fs::create_dir(&path)
+                .with_context(|| format!("cannot create {}", path.display()))?;
+            Ok(path)
+        };
+        let (filtered, closed) = (method("ekf")?, method("six-position")?);
+        write(&standing, &closed)?;
         let record = outcome.record(run);
-        record.write(&root.join("calibration-ekf.json"), false)?;
+        record.write(&filtered.join("calibration.json"), false)?;
         let record = closed_form.estimate.record(&standing.run);
-        record.write(&root.join("calibration-six-position.json"), false)?;
+        record.write(&closed.join("calibration.json"), false)?;
         write_report(&report, &root.join("report"))?;
         directory.commit()?;
         drop(activity);

@@ -50,8 +50,8 @@ fn the_demo_gives_the_same_bytes_on_one_thread_and_on_two() {
     for expected in [
         "run.toml",
         "truth.json",
-        "calibration-ekf.json",
-        "calibration-six-position.json",
+        "ekf/calibration.json",
+        "six-position/calibration.json",
         "report/index.html",
     ] {
         assert!(names.contains(&expected), "no {expected} in {names:?}");
