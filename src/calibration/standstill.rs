@@ -45,3 +45,43 @@ pub(super) fn velocity_sigma(run: &Run, dwells: &[Dwell]) -> f64 {
         FLOOR
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::Output;
+    use crate::simulation::Scenario;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn random_walk_and_pulses_alone_are_no_unrest() {
+        let mut scenario = Scenario::load("demo").unwrap();
+        for output in [Output::Pulse, Output::Increment] {
+            scenario.output = output;
+            let run = scenario.simulate(1, 0).unwrap().run;
+            assert_eq!(velocity_sigma(&run, &run.dwells()), FLOOR);
+        }
+    }
+
+    #[test]
+    fn white_velocity_at_standstill_is_found_within_a_tenth() {
+        let mut scenario = Scenario::load("demo").unwrap();
+        scenario.output = Output::Increment;
+        let mut run = scenario.simulate(1, 0).unwrap().run;
+        // A velocity that alternates by ±σ is white at the spacing of the sums, 10 samples.
+        let sigma = 5e-5;
+        let velocity = |k: usize| {
+            let hash = (k / 10).wrapping_mul(0x9E37_79B9).rotate_left(7) as u32;
+            Vector3::repeat(if hash.count_ones().is_multiple_of(2) {
+                sigma
+            } else {
+                -sigma
+            })
+        };
+        for k in 0..run.imu.accel.len() {
+            run.imu.accel[k] += velocity(k + 1) - velocity(k);
+        }
+        let found = velocity_sigma(&run, &run.dwells());
+        assert!((found / sigma - 1.0).abs() < 0.1, "{found}");
+    }
+}

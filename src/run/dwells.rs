@@ -121,3 +121,44 @@ pub(crate) fn mean_attitude(attitudes: &[Matrix3<f64>]) -> Option<Matrix3<f64>> 
         .sum();
     Some(exp(sum / attitudes.len() as f64) * first)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Scenario;
+
+    #[test]
+    fn dwells_lie_within_the_standstills_of_the_table_and_miss_little_of_them() {
+        let scenario = Scenario::load("demo").unwrap();
+        let run = scenario.simulate(1, 0).unwrap().run;
+        let dwells = run.dwells();
+        // The path: 60 s, then 15 s after each of 17 moves but the last, 30 s after that.
+        assert_eq!(dwells.len(), 18);
+        let standing: f64 = dwells
+            .iter()
+            .map(|d| d.samples.len() as f64 * run.imu.period)
+            .sum();
+        assert!((310.0..330.0).contains(&standing), "{standing} s");
+        for dwell in &dwells {
+            let rate = |k: usize| (run.imu.gyro[k] / run.imu.period).norm();
+            // Earth rate and 25 °/h of bias; a table that turns is thousands of times faster.
+            let fastest = dwell.samples.clone().map(rate).fold(0.0, f64::max);
+            assert!(fastest < 1e-3, "{fastest} rad/s");
+        }
+    }
+
+    #[test]
+    fn a_reading_that_takes_up_the_next_position_before_the_turn_ends_the_dwell() {
+        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        let before = run.dwells()[0].clone();
+        let table = run.table.as_mut().unwrap();
+        let early = 20;
+        for reading in before.readings.end - early..before.readings.end {
+            table.attitude[reading] =
+                exp(Vector3::new(0.0, 3.0 * ARCSEC, 0.0)) * table.attitude[reading];
+        }
+        let after = &run.dwells()[0];
+        assert!(after.readings.end <= before.readings.end - early);
+        assert!(after.readings.end + early + 20 > before.readings.end);
+    }
+}
