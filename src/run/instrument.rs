@@ -104,7 +104,7 @@ impl<'a> Instrument<'a> {
                     accel: accel.nominal,
                 },
             },
-            noise: noise(&fields)?,
+            noise: noise(&fields, notes)?,
             prior: PerSensor {
                 gyro: gyro.prior,
                 accel: accel.prior,
@@ -133,7 +133,7 @@ fn no_terms(imu: &Fields) -> Result<(), RunError> {
     }
 }
 
-fn noise(imu: &Fields) -> Result<PerSensor<Noise>, RunError> {
+fn noise(imu: &Fields, notes: &mut Vec<String>) -> Result<PerSensor<Noise>, RunError> {
     let fields = imu.need_table(
         "noise",
         &[
@@ -146,13 +146,19 @@ fn noise(imu: &Fields) -> Result<PerSensor<Noise>, RunError> {
         ],
         "the noise of the instrument",
     )?;
-    let triad = |walk: &str, walk_unit, wander: &str, wander_unit, time: &str| {
+    let mut triad = |walk: &str, walk_unit, wander: &str, wander_unit, time: &str| {
         let instability = match (fields.get(wander), fields.get(time)) {
             (None, None) => None,
-            (Some(sigma), Some(time)) => Some(Instability {
-                sigma: sigma.positive()? * wander_unit,
-                correlation_time: time.positive()?,
-            }),
+            (Some(sigma), Some(time)) => {
+                notes.push(format!(
+                    "imu.noise.{wander} is read but has no effect yet: σ are those of a bias that \
+                     does not wander."
+                ));
+                Some(Instability {
+                    sigma: sigma.positive()? * wander_unit,
+                    correlation_time: time.positive()?,
+                })
+            }
             (Some(_), None) => return Err(fields.missing(time, "its correlation time")),
             (None, Some(_)) => return Err(fields.missing(wander, "the 1σ of the wandering bias")),
         };
