@@ -171,16 +171,15 @@ impl<'a> Pass<'a> {
             self.filter.propagate(&block);
             let time = self.problem.run.imu.time(step.samples.end);
             if let Some(standing) = &step.standing {
+                // The start holds what the first dwell says of table and position.
                 if standing.first && stood {
                     self.filter.redraw_table(table.sqrt());
-                }
-                stood = true;
-                if standing.first {
                     // Between positions the IMU moves by its distance from the table's centre,
                     // within one not at all: one observation a dwell, however long it is.
                     self.filter
                         .observe(Sight::POSITION, &block.state.position, position);
                 }
+                stood = true;
                 self.observe(
                     time,
                     Observation::Velocity,
