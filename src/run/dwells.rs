@@ -29,6 +29,8 @@ const MARGIN: f64 = 0.2;
 const CREEP_STRETCH: f64 = 1.0;
 /// … by this many σ.
 const CREEP_SIGMAS: f64 = 5.0;
+/// Readings at least this far apart tell a slow turn from a standstill, however dense the log, s.
+const APART: f64 = 0.05;
 /// Readings of a standing table differ by less than this many σ of their noise …
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
@@ -43,11 +45,15 @@ impl Run {
         // Two readings of three components each.
         let limit = STANDING_ANGLE.max(STANDING_SIGMAS * table.reading_sigma * 6f64.sqrt());
         let mut dwells = Vec::new();
-        let mut first = 0;
+        let (mut first, mut before) = (0, 0);
         for next in 1..=table.time.len() {
-            let stands = next < table.time.len()
-                && log(&(table.attitude[next] * table.attitude[next - 1].transpose())).norm()
-                    < limit;
+            let stands = next < table.time.len() && {
+                while before + 1 < next && table.time[next] - table.time[before + 1] >= APART {
+                    before += 1;
+                }
+                let before = &table.attitude[before.max(first)];
+                log(&(table.attitude[next] * before.transpose())).norm() < limit
+            };
             if !stands {
                 dwells.extend(self.dwell(table, first..next));
                 first = next;
@@ -120,4 +126,32 @@ pub(crate) fn mean_attitude(attitudes: &[Matrix3<f64>]) -> Option<Matrix3<f64>> 
         .map(|attitude| log(&(attitude * first.transpose())))
         .sum();
     Some(exp(sum / attitudes.len() as f64) * first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Scenario;
+    use crate::units::DEGREE;
+
+    #[test]
+    fn a_slow_turn_between_dense_readings_is_no_standstill() {
+        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        let time: Vec<f64> = (0..60_000).map(|k| f64::from(k) * 1e-3).collect();
+        // Stands for 20 s, turns by 0.5°/s for 20 s, stands again.
+        let attitude = |&t: &f64| {
+            let angle = (t - 20.0).clamp(0.0, 20.0) * 0.5 * DEGREE;
+            exp(Vector3::new(0.0, 0.0, angle))
+        };
+        run.table = Some(TableRecord {
+            attitude: time.iter().map(attitude).collect(),
+            time,
+            position_sigma: ARCSEC,
+            reading_sigma: 0.5 * ARCSEC,
+        });
+        let dwells = run.dwells();
+        assert_eq!(dwells.len(), 2);
+        assert!(run.imu.time(dwells[0].samples.end) <= 20.0);
+        assert!(run.imu.time(dwells[1].samples.start) >= 40.0);
+    }
 }
