@@ -173,11 +173,11 @@ fn what_has_no_effect_yet_is_noted() {
         },
         plain,
     );
-    assert_eq!(run.notes.len(), 3);
-    for (note, word) in run
-        .notes
-        .iter()
-        .zip(["temperature", "level_sigma", "time_sigma"])
+    assert_eq!(run.notes.len(), 4);
+    for (note, word) in
+        run.notes
+            .iter()
+            .zip(["temperature", "instability", "level_sigma", "time_sigma"])
     {
         assert!(
             note.contains(word) && note.contains("no effect yet"),
