@@ -51,6 +51,16 @@ pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {
     c * (Matrix3::identity() * 1.5 - c.tr_mul(c) * 0.5)
 }
 
+/// The mean of attitudes that lie close together; `None` of none.
+pub fn mean(attitudes: &[Matrix3<f64>]) -> Option<Matrix3<f64>> {
+    let first = attitudes.first()?;
+    let sum: Vector3<f64> = attitudes
+        .iter()
+        .map(|attitude| log(&(attitude * first.transpose())))
+        .sum();
+    Some(exp(sum / attitudes.len() as f64) * first)
+}
+
 /// `C_b_n = Rz(−heading) Rx(pitch) Ry(roll)`: body right-front-up to East-North-Up, all in radians,
 /// heading clockwise from North.
 pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f64> {

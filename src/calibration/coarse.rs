@@ -17,6 +17,8 @@ use crate::run::{Dwell, Run};
 const STEPS: usize = 6;
 /// A step below this (1 ppm, 0.2″, and as much of rad/s or m/s²) is no step.
 const SMALL: f64 = 1e-6;
+/// An instrument without noise is still not better than this, rad or m/s: an equation needs a σ.
+const ROUNDING: f64 = 1e-9;
 
 /// Both triads from the table's attitude alone: over each dwell the velocity must stay zero and the
 /// attitude must stay; over each turn between two dwells the gyros must turn by what the table says.
@@ -121,7 +123,7 @@ impl Equations {
 
     /// Three equations: `error = Φ δθ` with rows of the block from `first` on.
     fn add(&mut self, block: &Block, first: usize, error: Vector3<f64>, variance: f64) {
-        let weight = 1.0 / variance.sqrt();
+        let weight = 1.0 / (variance + ROUNDING.powi(2)).sqrt();
         for axis in 0..3 {
             let mut row = ParameterVector::zeros();
             for sensor in Sensor::ALL {

@@ -158,7 +158,8 @@ fn problem<'a>(
         prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
         start: Start {
-            attitude: INITIAL_ATTITUDE.max(10.0 * position_sigma),
+            // The one reading that gave it has both errors.
+            attitude: INITIAL_ATTITUDE.max(10.0 * position_sigma.hypot(reading_sigma)),
             velocity: INITIAL_VELOCITY,
             position: run.standstill.position_sigma,
             table: position_sigma,

@@ -6,8 +6,9 @@ use super::states::{
     ATTITUDE, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS, POSITION, ParameterMatrix,
     ParameterVector, STATES, StateMatrix, StateVector, TABLE, VELOCITY,
 };
+use crate::attitude::{exp, log};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor};
-use crate::navigation::Block;
+use crate::navigation::{Block, State};
 
 const GYRO: usize = PARAMETER;
 const ACCEL: usize = PARAMETER + PER_TRIAD;
@@ -178,6 +179,19 @@ impl Filter {
         }
     }
 
+    /// Refers the navigation errors to another computed state of the same moment. What is estimated
+    /// of the truth stays as it is, and so does the covariance.
+    pub fn refer(&mut self, from: &State, to: &State) {
+        let estimated = exp(self.x.fixed_rows::<3>(ATTITUDE).into_owned()) * from.attitude;
+        self.x
+            .fixed_rows_mut::<3>(ATTITUDE)
+            .copy_from(&log(&(estimated * to.attitude.transpose())));
+        let mut velocity = self.x.fixed_rows_mut::<3>(VELOCITY);
+        velocity += to.velocity - from.velocity;
+        let mut position = self.x.fixed_rows_mut::<3>(POSITION);
+        position += to.position - from.position;
+    }
+
     /// Estimated errors that a live pass feeds back, taken out of the mean.
     pub fn take_feedback(&mut self) -> Feedback {
         let mut take = |index: usize| {
@@ -236,7 +250,7 @@ mod tests {
     use super::super::states::parameter;
     use super::*;
     use crate::imu::Sensor;
-    use crate::navigation::{BlockMatrix, ParameterBlock, State};
+    use crate::navigation::{BlockMatrix, ParameterBlock};
     use approx::assert_relative_eq;
 
     fn filter() -> Filter {

@@ -1,12 +1,14 @@
 //! One pass of the filter over a record: live with feedback, or held at a linearisation point.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
 use super::filter::{Filter, Sight, Start};
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
-use super::schedule::Schedule;
+use super::schedule::{Schedule, Standing};
 use super::states::{ParameterMatrix, ParameterVector};
 use crate::attitude::{exp, log};
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
@@ -153,53 +155,23 @@ impl<'a> Pass<'a> {
     }
 
     fn run(mut self) -> Result<PassResult, CalibrationError> {
-        let Variance {
-            velocity,
-            position,
-            reading,
-            attitude,
-            table,
-        } = self.problem.variance;
         let mut history: Vec<Moment> = Vec::new();
         let mut stood = false;
         for step in &self.problem.schedule.steps {
-            let samples = step.samples.clone();
-            let block = match step.standing {
-                Some(_) => self.navigator.advance_standing(samples),
-                None => self.navigator.advance(samples),
-            };
-            self.filter.propagate(&block);
             let time = self.problem.run.imu.time(step.samples.end);
-            if let Some(standing) = &step.standing {
-                if standing.first && stood {
-                    self.filter.redraw_table(table.sqrt());
-                }
-                stood = true;
-                if standing.first {
-                    // Between positions the IMU moves by its distance from the table's centre,
-                    // within one not at all: one observation a dwell, however long it is.
-                    self.filter
-                        .observe(Sight::POSITION, &block.state.position, position);
-                }
-                self.observe(
-                    time,
-                    Observation::Velocity,
-                    Sight::VELOCITY,
-                    block.state.velocity,
-                    velocity,
-                )?;
-                if let Some((reading_n, count)) = &standing.reading {
-                    let difference = -log(&(block.state.attitude * reading_n.transpose()));
-                    self.observe(
+            match &step.standing {
+                Some(standing) => {
+                    self.stand(
+                        step.samples.clone(),
                         time,
-                        Observation::Table,
-                        Sight::TABLE,
-                        difference,
-                        reading / *count as f64 + attitude,
+                        standing,
+                        standing.first && stood,
                     )?;
+                    stood = true;
                 }
-                if matches!(self.mode, Mode::Live) {
-                    self.feed_back()?;
+                None => {
+                    let block = self.navigator.advance(step.samples.clone());
+                    self.filter.propagate(&block);
                 }
             }
             if history.last().is_none_or(|last| time - last.time >= MOMENT) {
@@ -213,6 +185,50 @@ impl<'a> Pass<'a> {
             innovations: self.innovations,
             history,
         })
+    }
+
+    /// A stretch of a dwell, which ends at `time`.
+    fn stand(
+        &mut self,
+        samples: Range<usize>,
+        time: f64,
+        standing: &Standing,
+        new_position: bool,
+    ) -> Result<(), CalibrationError> {
+        let variance = self.problem.variance;
+        if matches!(self.mode, Mode::Held { .. }) {
+            // The table's own mean reading is within arc seconds of the truth in every pass, so what
+            // noise adds up to over a long record never leaves the linear range.
+            let tied = State::at_rest(standing.attitude);
+            self.filter.refer(&self.navigator.state, &tied);
+            self.navigator.state = tied;
+        }
+        let block = self.navigator.advance_standing(samples);
+        self.filter.propagate(&block);
+        let State {
+            attitude,
+            velocity,
+            position,
+        } = block.state;
+        // The start holds what the first dwell says of table and position.
+        if new_position {
+            self.filter.redraw_table(variance.table.sqrt());
+            // Between positions the IMU moves by its distance from the table's centre, within one
+            // not at all: one observation a dwell, however long it is.
+            self.filter
+                .observe(Sight::POSITION, &position, variance.position);
+        }
+        let kind = Observation::Velocity;
+        self.observe(time, kind, Sight::VELOCITY, velocity, variance.velocity)?;
+        if let Some((reading, count)) = &standing.reading {
+            let difference = -log(&(attitude * reading.transpose()));
+            let variance = variance.reading / *count as f64 + variance.attitude;
+            self.observe(time, Observation::Table, Sight::TABLE, difference, variance)?;
+        }
+        match self.mode {
+            Mode::Live => self.feed_back(),
+            Mode::Held { .. } => Ok(()),
+        }
     }
 
     fn observe(

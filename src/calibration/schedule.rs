@@ -5,7 +5,8 @@ use std::ops::Range;
 use nalgebra::Matrix3;
 
 use super::CalibrationError;
-use crate::run::{Dwell, Run, TableRecord, mean_attitude};
+use crate::attitude;
+use crate::run::{Dwell, Run, TableRecord};
 
 /// A stretch of samples that one block of the error model covers.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +21,8 @@ pub(super) struct Step {
 pub(super) struct Standing {
     /// Whether it is the dwell's first.
     pub first: bool,
+    /// Mean of the table's readings during the whole dwell, `C_b_n`.
+    pub attitude: Matrix3<f64>,
     /// Mean of the table's readings during the stretch, and how many they were.
     pub reading: Option<(Matrix3<f64>, usize)>,
 }
@@ -38,15 +41,15 @@ const STRETCH: f64 = 0.1;
 impl Schedule {
     pub fn new(run: &Run, dwells: &[Dwell]) -> Result<Self, CalibrationError> {
         let table = run.table.as_ref().ok_or(CalibrationError::NoTable)?;
-        let (Some(first), true) = (dwells.first(), dwells.len() > 1) else {
+        let [start, _, ..] = dwells else {
             return Err(CalibrationError::TooFewDwells {
                 found: dwells.len(),
                 needed: 2,
             });
         };
-        let initial = first.readings.start;
+        let initial = start.readings.start;
         let mut steps = Vec::new();
-        let mut at = first.samples.start;
+        let mut at = start.samples.start;
         let stretch = ((STRETCH / run.imu.period).round() as usize).max(1);
         for dwell in dwells {
             cut(at..dwell.samples.start, stretch, |samples| {
@@ -63,11 +66,15 @@ impl Schedule {
             cut(dwell.samples.clone(), stretch, |samples| {
                 let until = run.imu.time(samples.end) + 1e-3 * run.imu.period;
                 let readings = take_until(&mut unread, table, until);
-                let reading = mean_attitude(&table.attitude[readings.clone()])
+                let reading = attitude::mean(&table.attitude[readings.clone()])
                     .map(|attitude| (attitude, readings.len()));
                 steps.push(Step {
                     samples,
-                    standing: Some(Standing { first, reading }),
+                    standing: Some(Standing {
+                        first,
+                        attitude: dwell.attitude,
+                        reading,
+                    }),
                 });
                 first = false;
             });

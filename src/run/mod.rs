@@ -19,7 +19,6 @@ mod whole;
 mod write;
 
 pub use dwells::Dwell;
-pub(crate) use dwells::mean_attitude;
 pub use error::{Place, RunError};
 pub use record::CalibrationRecord;
 pub use whole::{WholeDirectory, write_whole};
