@@ -38,6 +38,9 @@ pub struct ClosedForm {
 /// A reference vector within this cosine of a body axis makes a position of the six.
 const ALONG_AXIS: f64 = 0.9998;
 
+/// Relative σ of an output for which no noise is stated.
+const NOISELESS: f64 = 1e-9;
+
 /// Calibrates both triads from the dwells of a run.
 ///
 /// Where the dwells hold the paper's six positions of a triad (Earth rate or gravity along each body
@@ -103,7 +106,7 @@ pub fn six_position_triad(
     // Of the rows of A and of D, four numbers a row.
     let mut covariance = [Matrix4::zeros(); 3];
     for axis in 0..3 {
-        let sigma = |p: &Position| p.variance[axis].sqrt().max(f64::MIN_POSITIVE.sqrt());
+        let sigma = |p: &Position| p.variance[axis].sqrt().max(NOISELESS * size);
         let design = Mat::from_fn(positions.len(), 4, |i, j| {
             let p = &positions[i];
             (if j < 3 { p.input[j] / size } else { 1.0 }) / sigma(p)
@@ -135,6 +138,7 @@ pub fn six_position_triad(
         covariance[axis] = unscale * information.try_inverse()? * unscale;
     }
     let triad = Triad::from_sensitivity(form, &a, bias);
+    triad.correction()?;
     Some((triad, split_covariance(form, &a, &bias, &covariance)))
 }
 

@@ -53,12 +53,12 @@ pub enum CalibrationError {
         /// Dwells used.
         dwells: usize,
     },
-    /// Rounding or absurd noise figures.
+    /// Samples that no error within the prior explains, or absurd noise figures.
     #[error(
-        "the filter's covariance lost its positive definiteness at {time:.2} s: check the noise \
-         figures and σ in run.toml"
+        "the filter diverged at {time:.2} s: samples and run.toml do not fit each other; check latitude, \
+         units, noise figures (zero only without noise), the prior's σ, and the samples there"
     )]
-    NotPositive {
+    Diverged {
         /// Time in the record, s.
         time: f64,
     },

@@ -242,7 +242,7 @@ impl<'a> Pass<'a> {
         let whitened = self
             .filter
             .whitened(sight, &difference, variance)
-            .ok_or(CalibrationError::NotPositive { time })?;
+            .ok_or(CalibrationError::Diverged { time })?;
         let distance = whitened.norm_squared();
         let row = &mut self.row[observation as usize];
         let accepted = match self.mode {

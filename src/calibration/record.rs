@@ -50,10 +50,10 @@ impl Estimate {
             run.nominal.get(sensor).factor(of_triad)
         };
         let of = |sensor| triad_record(self.triads.get(sensor), run.nominal.get(sensor));
-        let corrections = PerSensor::from_fn(|sensor| {
+        let correction = |sensor| {
             let sensitivity = run.nominal.get(sensor).sensitivity(self.triads.get(sensor));
-            rows(&sensitivity.try_inverse().unwrap_or_else(Matrix3::zeros))
-        });
+            Some(rows(&sensitivity.try_inverse()?))
+        };
         CalibrationRecord {
             method: Some(Method::SixPosition),
             installation_form: Some(form),
@@ -75,7 +75,9 @@ impl Estimate {
                 .collect(),
             fixed: names(false),
             equation: Some(EQUATION.to_owned()),
-            correction: Some(corrections),
+            correction: correction(Sensor::Gyro)
+                .zip(correction(Sensor::Accel))
+                .map(|(gyro, accel)| PerSensor { gyro, accel }),
             test_vectors: TEST_INPUTS
                 .iter()
                 .map(|input| self.test_vector(run, input))
