@@ -193,7 +193,8 @@ fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
             .zip(&sigma)
             .filter(|&(_, &sigma)| sigma > 0.0)
             .map(|(step, sigma)| (step / sigma).abs())
-            .fold(0.0, f64::max),
+            .max_by(f64::total_cmp)
+            .unwrap_or(0.0),
         merit: result.merit,
         observations: 3 * result.innovations.len(),
         rejected: result.innovations.iter().filter(|i| !i.accepted).count(),

@@ -38,6 +38,11 @@ pub(super) struct Schedule {
 /// Length of a stretch, s: covariance is propagated and observations are taken at 10 Hz.
 const STRETCH: f64 = 0.1;
 
+/// Number of samples in a stretch.
+pub(super) fn stretch(period: f64) -> usize {
+    ((STRETCH / period).round() as usize).max(1)
+}
+
 impl Schedule {
     pub fn new(run: &Run, dwells: &[Dwell]) -> Result<Self, CalibrationError> {
         let table = run.table.as_ref().ok_or(CalibrationError::NoTable)?;
@@ -50,7 +55,7 @@ impl Schedule {
         let initial = start.readings.start;
         let mut steps = Vec::new();
         let mut at = start.samples.start;
-        let stretch = ((STRETCH / run.imu.period).round() as usize).max(1);
+        let stretch = stretch(run.imu.period);
         for dwell in dwells {
             cut(at..dwell.samples.start, stretch, |samples| {
                 steps.push(Step {

@@ -1,11 +1,10 @@
 //! How still the IMU is while the table stands.
 
+use super::schedule::stretch;
 use crate::run::{Dwell, Run};
 
 /// Below this the velocity at standstill is never trusted, m/s.
 const FLOOR: f64 = 1e-6;
-/// Length of the sums whose scatter is looked at, s: the filter's own rate of observation.
-const STRETCH: f64 = 0.1;
 /// Excess below this many of its own standard errors is chance.
 const SIGNIFICANT: f64 = 3.0;
 
@@ -17,7 +16,7 @@ pub(super) fn velocity_sigma(run: &Run, dwells: &[Dwell]) -> f64 {
     if let Some(given) = run.standstill.velocity_sigma {
         return given.max(FLOOR);
     }
-    let stretch = ((STRETCH / run.imu.period).round() as usize).max(1);
+    let stretch = stretch(run.imu.period);
     let (mut covariance, mut variance, mut pairs) = (0.0, 0.0, 0usize);
     for dwell in dwells {
         let sums: Vec<_> = run.imu.accel[dwell.samples.clone()]

@@ -37,7 +37,7 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
     };
     let caption = format!(
         "Thick line: estimate of the last pass less {less}; band: its ±3σ; thin line: the live pass, \
-         as the table moved. The vertical axis is linear within the final σ of the group and \
+         from the coarse start on. The vertical axis is linear within the final σ of the group and \
          logarithmic beyond, and ends at {EXTENT} times that σ; what lies beyond is drawn at its \
          edge. The thick line should stay in its band."
     );

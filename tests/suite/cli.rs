@@ -84,6 +84,15 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
         let document = &output.get_output().stdout;
         let record: CalibrationRecord = serde_json::from_slice(document).unwrap();
         assert_eq!(record.parameters.len(), record.covariance.len());
+        let sigma = record.sigma.unwrap();
+        for (name, variance) in [
+            ("gyro.scale.y", sigma.gyro.scale[1].powi(2)),
+            ("accel.bias.z", sigma.accel.bias[2].powi(2)),
+        ] {
+            let index = record.parameters.iter().position(|p| p == name).unwrap();
+            let covariance = record.covariance[index][index];
+            assert!((covariance / variance - 1.0).abs() < 1e-12, "{name}");
+        }
         let correction = record.correction.unwrap();
         for vector in &record.test_vectors {
             // u = correction (N − bias), as a user would write it.
