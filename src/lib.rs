@@ -8,7 +8,7 @@
 //! * SI and radians everywhere; [`units`] at the edges.
 //!
 //! # Rooms
-//! Data flow one way: [`run`] → [`navigation`] and [`calibration`] → [`report`]. [`earth`],
+//! Data flow one way: [`run`] → [`navigation`] and [`calibration`] → [`study`] → [`report`]. [`earth`],
 //! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`].
 
 pub mod attitude;
@@ -20,5 +20,6 @@ pub mod navigation;
 pub mod report;
 pub mod run;
 pub mod simulation;
+pub mod study;
 pub mod turntable;
 pub mod units;

@@ -51,7 +51,18 @@ const NOISELESS: f64 = 1e-9;
 /// [`CalibrationError`] without a table, or if the positions do not determine the twelve numbers of
 /// a triad.
 pub fn six_position(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
-    let dwells = run.dwells();
+    six_position_of(run, &run.dwells(), form)
+}
+
+/// The same from some dwells, or parts of them.
+///
+/// # Errors
+/// As [`six_position`].
+pub fn six_position_of(
+    run: &Run,
+    dwells: &[Dwell],
+    form: InstallationForm,
+) -> Result<ClosedForm, CalibrationError> {
     let mut covariance = ParameterMatrix::zeros();
     let mut positions = PerSensor::default();
     let mut used = vec![false; dwells.len()];

@@ -4,6 +4,7 @@ use super::coarse::coarse_start;
 use super::consistency::consistency;
 use super::error::CalibrationError;
 use super::filter::Start;
+use super::form::{FormTest, form_test};
 use super::outcome::{Estimate, Outcome, Pass, parameter_name, to_vector};
 use super::pass::{Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
 use super::schedule::Schedule;
@@ -71,7 +72,9 @@ pub fn estimate(
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
     }
+    let left_out: Vec<bool> = held.innovations.iter().map(|i| !i.accepted).collect();
     let mut outcome = Outcome {
+        form_test: form_test(&problem, &held, &left_out)?,
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
@@ -143,7 +146,7 @@ fn outliers(result: &PassResult, gate: f64) -> Vec<bool> {
     beyond.collect()
 }
 
-fn problem<'a>(
+pub(super) fn problem<'a>(
     run: &'a Run,
     schedule: Schedule,
     form: InstallationForm,
@@ -179,6 +182,7 @@ fn problem<'a>(
             attitude: quantisation(run.imu.pulse.gyro),
             table: position_sigma.powi(2),
         },
+        velocity_sigma,
         gate: gate(),
     }
 }
@@ -236,6 +240,17 @@ fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
                 }
             ));
         }
+    }
+    if let Some(test) = outcome.form_test.filter(FormTest::rejects) {
+        warnings.push(format!(
+            "The data reject the {} installation form: {} more angles, as the general form has them, \
+             lower the merit by {:.4e}, where a right form leaves less than {:.1} in 999 runs of 1000. \
+             Use the general form.",
+            outcome.estimate.form().name(),
+            test.angles,
+            test.gain,
+            test.limit
+        ));
     }
     let rejected = outcome.innovations.iter().filter(|i| !i.accepted).count();
     if rejected > 0 {

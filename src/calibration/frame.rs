@@ -10,7 +10,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::ComparisonError;
-use super::outcome::{parameter_name, to_vector};
+use super::outcome::{Estimate, parameter_name, to_vector};
 use super::record::triads_of;
 use super::states::{PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::attitude::skew;
@@ -76,7 +76,9 @@ impl Canonical {
         let triads = PerSensor::from_fn(|sensor| triads.get(sensor).1);
         let own = own_covariance(name, record, nominal)?;
         let covariance = own.map(|own| {
-            let j = jacobian(record, nominal, &triads, body_frame, &rotation);
+            let form = record.installation_form.unwrap_or_default();
+            let own_triads = triads_of(record, nominal, form);
+            let j = jacobian(&own_triads, &triads, body_frame, &rotation);
             j * own * j.transpose()
         });
         Ok(Self {
@@ -99,6 +101,29 @@ impl Canonical {
         let covariance = self.covariance.as_ref()?;
         Some(covariance.diagonal().map(|v| v.max(0.0).sqrt()))
     }
+}
+
+impl Estimate {
+    /// The same calibration in the general form; what the form held fixed gets the covariance that
+    /// follows from its own parameters.
+    pub fn in_general_form(&self) -> Self {
+        let triads = in_general_form(&self.triads);
+        let j = jacobian(
+            &self.triads,
+            &triads,
+            BodyFrame::Table,
+            &Matrix3::identity(),
+        );
+        Self {
+            triads,
+            covariance: j * self.covariance * j.transpose(),
+        }
+    }
+}
+
+/// The same triads in the general form.
+pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
+    PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }
 
 /// Indices of the parameters that a body frame leaves free, in the general form.
@@ -215,14 +240,11 @@ fn own_covariance(
 
 /// `∂canonical/∂own`: a column for each of the record's own parameters.
 fn jacobian(
-    record: &CalibrationRecord,
-    nominal: &PerSensor<Nominal>,
+    own: &PerSensor<Triad>,
     canonical: &PerSensor<Triad>,
     body_frame: BodyFrame,
     rotation: &Matrix3<f64>,
 ) -> ParameterMatrix {
-    let form = record.installation_form.unwrap_or_default();
-    let own = triads_of(record, nominal, form);
     let responses = PerSensor::from_fn(|sensor| own.get(sensor).response());
     let mut jacobian = ParameterMatrix::zeros();
     for index in 0..PARAMETERS {

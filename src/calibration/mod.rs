@@ -2,6 +2,7 @@
 //!
 //! Each takes a [`crate::run::Run`] and gives an [`Estimate`]; none prints, reads files or draws.
 
+mod bound;
 mod closed_form;
 mod coarse;
 mod comparison;
@@ -9,7 +10,9 @@ mod consistency;
 mod error;
 mod estimator;
 mod filter;
+mod form;
 mod frame;
+mod group;
 mod nees;
 pub mod outcome;
 mod pass;
@@ -19,14 +22,17 @@ mod schedule;
 mod standstill;
 pub mod states;
 
-pub use closed_form::{ClosedForm, Position, six_position, six_position_triad};
+pub use bound::{Bound, bound};
+pub use closed_form::{ClosedForm, Position, six_position, six_position_of, six_position_triad};
 pub use coarse::coarse_start;
 pub use comparison::{Comparison, Named, Side, compare};
 pub use consistency::mean_square_interval;
 pub use error::{CalibrationError, ComparisonError};
 pub use estimator::{Progress, estimate};
-pub use frame::Canonical;
-pub use nees::Nees;
+pub use form::FormTest;
+pub use frame::{Canonical, in_general_form};
+pub use group::Group;
+pub use nees::{Nees, nees};
 pub use outcome::{Estimate, Outcome};
 pub use record::{triads_of, truth_record};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};

@@ -21,7 +21,7 @@ pub struct Nees {
 }
 
 /// NEES of a difference over those of some parameters that have a σ; none if none has.
-pub(super) fn nees(
+pub fn nees(
     difference: &ParameterVector,
     covariance: &ParameterMatrix,
     parameters: &[usize],

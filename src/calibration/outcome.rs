@@ -1,5 +1,6 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
+use super::form::FormTest;
 use super::states::{ParameterMatrix, ParameterVector, parameter, sensor_and_parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
@@ -85,6 +86,8 @@ pub struct Outcome {
     pub innovations: Vec<Innovation>,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
+    /// Whether the data reject the installation form; none where they cannot.
+    pub form_test: Option<FormTest>,
     /// White 1σ of the velocity at standstill that the filter used, m/s.
     pub velocity_sigma: f64,
     /// What a calibration engineer must know before using the figures.

@@ -25,6 +25,8 @@ pub(super) struct Problem<'a> {
     pub prior_sigma: ParameterVector,
     pub start: Start,
     pub variance: Variance,
+    /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
+    pub velocity_sigma: f64,
     pub gate: f64,
 }
 

@@ -49,6 +49,11 @@ impl Triad {
         }
     }
 
+    /// The triad of another form with sensitivity nearest to this one's.
+    pub fn in_form(&self, form: InstallationForm) -> Self {
+        Self::from_sensitivity(form, &self.sensitivity(), self.bias)
+    }
+
     /// The installation matrix `C`.
     pub fn installation(&self) -> Matrix3<f64> {
         self.form.matrix(&self.angles)

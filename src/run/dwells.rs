@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Run, TableRecord};
+use super::{ImuRecord, Run, TableRecord};
 use crate::attitude::{exp, log, mean};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
 
@@ -138,6 +138,16 @@ impl Run {
 }
 
 impl Dwell {
+    /// The first seconds of it; the attitude is that of all its readings.
+    pub fn first_seconds(&self, duration: f64, imu: &ImuRecord) -> Self {
+        let samples = (duration / imu.period).round() as usize;
+        let end = self.samples.end.min(self.samples.start + samples);
+        Self {
+            samples: self.samples.start..end,
+            ..self.clone()
+        }
+    }
+
     /// Takes in a later dwell at the same position.
     fn extend(&mut self, later: &Self) {
         let share =

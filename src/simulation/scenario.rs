@@ -123,6 +123,16 @@ impl Scenario {
         Ok(Motion::new(&self.table, &self.path, &perfect)?.duration())
     }
 
+    /// For how much of that the table stands, s.
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn standing_time(&self) -> Result<f64, TableError> {
+        let perfect = Imperfection::none(&self.table);
+        let motion = Motion::new(&self.table, &self.path, &perfect)?;
+        Ok(motion.dwells().map(|(start, end)| end - start).sum())
+    }
+
     /// What would otherwise fail only when it is simulated.
     fn check(&self) -> Result<(), String> {
         // With the errors of a real table, so that a path that cannot have them is found here.

@@ -1,0 +1,45 @@
+//! The Bayesian Cramér–Rao bound of a run.
+
+use super::error::CalibrationError;
+use super::estimator::problem;
+use super::outcome::{Estimate, Moment};
+use super::pass::{Linearisation, Mode, pass};
+use super::schedule::Schedule;
+use super::standstill::velocity_sigma;
+use crate::imu::{PerSensor, Triad};
+use crate::run::Run;
+
+/// What no estimator of a run can beat.
+#[derive(Debug, Clone)]
+pub struct Bound {
+    /// The truth, with the covariance that is the bound.
+    pub estimate: Estimate,
+    /// σ against time.
+    pub history: Vec<Moment>,
+}
+
+/// The covariance of a held pass linearised at the truth, in the truth's own installation form:
+/// the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
+/// Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the first
+/// reading: an arc second there is nothing to the covariance.
+///
+/// # Errors
+/// [`CalibrationError`] as for [`super::estimate`].
+pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationError> {
+    let dwells = run.dwells();
+    let schedule = Schedule::new(run, &dwells)?;
+    let at = Linearisation {
+        triads: *truth,
+        initial_attitude: schedule.initial_attitude,
+    };
+    let form = truth.gyro.form;
+    let problem = problem(run, schedule, form, velocity_sigma(run, &dwells));
+    let result = pass(&problem, &at, Mode::Held { rejected: &[] })?;
+    Ok(Bound {
+        estimate: Estimate {
+            triads: *truth,
+            covariance: result.covariance,
+        },
+        history: result.history,
+    })
+}

@@ -1,0 +1,62 @@
+//! Whether the data reject the installation form.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::error::CalibrationError;
+use super::estimator::problem;
+use super::frame::in_general_form;
+use super::pass::{Linearisation, Mode, PassResult, Problem, pass};
+use crate::imu::InstallationForm;
+
+/// The likelihood ratio of a restricted installation form against the general one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FormTest {
+    /// By how much the merit, −2 ln of likelihood and prior, falls if the general form is allowed.
+    pub gain: f64,
+    /// Angles that the general form has more.
+    pub angles: usize,
+    /// What the gain stays below in all but one in a thousand runs if the form is right (χ²).
+    pub limit: f64,
+}
+
+/// Chance that a right form is rejected.
+const FALSE_REJECTION: f64 = 1e-3;
+
+impl FormTest {
+    /// Whether the data reject the form.
+    pub fn rejects(&self) -> bool {
+        self.gain > self.limit
+    }
+}
+
+/// Tests the form of a converged pass by one more in the general form, linearised at the same
+/// estimate (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many
+/// angles as the general one, which no data can reject.
+pub(super) fn form_test(
+    restricted: &Problem,
+    held: &PassResult,
+    rejected: &[bool],
+) -> Result<Option<FormTest>, CalibrationError> {
+    let general = InstallationForm::General;
+    let angles = |form: InstallationForm| 2 * form.angle_names().len();
+    let more = angles(general) - angles(restricted.form);
+    let Ok(chi2) = ChiSquared::new(more as f64) else {
+        return Ok(None);
+    };
+    let problem = problem(
+        restricted.run,
+        restricted.schedule.clone(),
+        general,
+        restricted.velocity_sigma,
+    );
+    let at = Linearisation {
+        triads: in_general_form(&held.estimate.triads),
+        ..held.estimate
+    };
+    let free = pass(&problem, &at, Mode::Held { rejected })?;
+    Ok(Some(FormTest {
+        gain: held.merit - free.merit,
+        angles: more,
+        limit: chi2.inverse_cdf(1.0 - FALSE_REJECTION),
+    }))
+}

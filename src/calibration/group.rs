@@ -1,0 +1,68 @@
+//! The six groups in which an engineer reads a calibration.
+
+use super::outcome::{Estimate, parameter_name};
+use super::states::{PARAMETERS, sensor_and_parameter};
+use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
+
+/// Parameters of one triad and kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Group {
+    sensor: Sensor,
+    kind: ParameterKind,
+}
+
+impl Group {
+    /// All six, in the order of the parameters.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| ParameterKind::ALL.map(|kind| Self { sensor, kind }))
+    }
+
+    /// The group of a parameter.
+    pub fn of(index: usize) -> Self {
+        let (sensor, of_triad) = sensor_and_parameter(index);
+        Self {
+            sensor,
+            kind: Triad::kind(of_triad),
+        }
+    }
+
+    /// The triad.
+    pub fn sensor(self) -> Sensor {
+        self.sensor
+    }
+
+    /// The kind of its parameters.
+    pub fn kind(self) -> ParameterKind {
+        self.kind
+    }
+
+    /// Indices of its parameters in this form.
+    pub fn parameters(self, form: InstallationForm) -> Vec<usize> {
+        (0..PARAMETERS)
+            .filter(|&index| Self::of(index) == self && parameter_name(form, index).is_some())
+            .collect()
+    }
+
+    /// Indices of those that were estimated.
+    pub fn estimated(self, estimate: &Estimate) -> Vec<usize> {
+        let indices = estimate.estimated();
+        indices.filter(|&index| Self::of(index) == self).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_is_in_exactly_one_group_in_every_form() {
+        for (form, count) in InstallationForm::ALL.into_iter().zip([24, 24, 18]) {
+            let mut all: Vec<usize> = Group::all().flat_map(|g| g.parameters(form)).collect();
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), count);
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! The baseline of the comparison: the closed form on the paper's static positions, with the same
+//! instrument and the same noise.
+
+use super::StudyError;
+use crate::calibration::states::ParameterVector;
+use crate::calibration::{in_general_form, outcome::to_vector, six_position_of};
+use crate::imu::InstallationForm;
+use crate::models::{self, ModelError, Place};
+use crate::run::Dwell;
+use crate::simulation::{Scenario, Simulated};
+use crate::turntable::{Table, TableError};
+
+/// The closed form's runs. It is also made from the first part of every dwell, as if the table had
+/// stood for less time.
+#[derive(Debug, Clone)]
+pub struct Baseline {
+    /// What is simulated for it.
+    pub scenario: Scenario,
+    /// Length of its own run, s.
+    pub table_time: f64,
+    /// Time during which the table stands in it, s.
+    standing: f64,
+    /// Part of each dwell that makes its table time that of the filter; one if the filter takes more
+    /// than the whole, none if it takes less than the moves between the positions.
+    equal: Option<f64>,
+}
+
+/// Parts of a dwell in the curve against time: this many, evenly.
+const PARTS: usize = 12;
+
+impl Baseline {
+    /// Place of the whole dwells among the parts.
+    pub(super) const OWN_TIME: usize = PARTS - 1;
+    /// Place of the filter's time among them.
+    pub(super) const EQUAL_TIME: usize = PARTS;
+
+    /// For a scenario: its instrument and table on the paper's positions, and where the table has too
+    /// few axes for them, a table with three axes and the same errors.
+    pub(super) fn new(scenario: &Scenario) -> Result<Self, StudyError> {
+        let filter_time = scenario.duration()?;
+        let scenario = match scenario.clone().with_path(PATH) {
+            Ok(on_its_table) => on_its_table,
+            Err(_) => on_three_axes(scenario)?,
+        };
+        let (table_time, standing) = (scenario.duration()?, scenario.standing_time()?);
+        let part = (filter_time - (table_time - standing)) / standing;
+        Ok(Self {
+            scenario,
+            table_time,
+            standing,
+            equal: (part > 0.0).then(|| part.min(1.0)),
+        })
+    }
+
+    /// Table time of the runs that are compared with the filter at its own time, s.
+    pub fn equal_time(&self) -> Option<f64> {
+        self.equal.map(|part| self.time_of(part))
+    }
+
+    fn time_of(&self, part: f64) -> f64 {
+        self.table_time - (1.0 - part) * self.standing
+    }
+
+    fn part(number: usize) -> f64 {
+        (number + 1) as f64 / PARTS as f64
+    }
+
+    /// The number of each part in the curve against time, with its table time in s.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (usize, f64)> {
+        (0..PARTS).map(|number| (number, self.time_of(Self::part(number))))
+    }
+
+    /// Errors of the closed form for every part and for the filter's time; `None` where it fails.
+    pub(super) fn errors(
+        &self,
+        seed: u64,
+        run: u64,
+        form: InstallationForm,
+    ) -> Result<Vec<Option<ParameterVector>>, TableError> {
+        let Simulated { run, truth, .. } = self.scenario.simulate(seed, run)?;
+        let truth = to_vector(&in_general_form(&truth));
+        let dwells = run.dwells();
+        let parts = (0..PARTS).map(|number| Some(Self::part(number)));
+        Ok(parts
+            .chain([self.equal])
+            .map(|part| {
+                let part = part?;
+                let shorter = |dwell: &Dwell| {
+                    let duration = dwell.samples.len() as f64 * run.imu.period;
+                    dwell.first_seconds(part * duration, &run.imu)
+                };
+                let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
+                let closed_form = six_position_of(&run, &dwells, form).ok()?;
+                Some(closed_form.estimate.in_general_form().vector() - truth)
+            })
+            .collect())
+    }
+}
+
+/// The paper's static positions.
+const PATH: &str = "six-position";
+
+fn on_three_axes(scenario: &Scenario) -> Result<Scenario, ModelError> {
+    let (table, table_name) = models::turntable("three-axis", &Place::CommandLine)?;
+    let with_table = Scenario {
+        table: Table {
+            errors: scenario.table.errors,
+            ..table
+        },
+        table_name,
+        ..scenario.clone()
+    };
+    with_table.with_path(PATH)
+}

@@ -1,0 +1,7 @@
+//! Studies: what many simulated runs say.
+
+pub mod accuracy;
+mod ratio;
+
+pub use accuracy::{Accuracy, AccuracyStudy};
+pub use ratio::Ratio;
