@@ -54,8 +54,9 @@ enum Method {
     SixPosition,
 }
 
+/// An installation form.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Installation {
+pub enum Installation {
     /// Six direction cosines, rows of unit norm
     General,
     /// Six off-diagonal entries, unit diagonal
@@ -64,8 +65,9 @@ enum Installation {
     ThreeAngle,
 }
 
+/// What the filter observes beside the standstill.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Aiding {
+pub enum Aiding {
     /// Attitude of the table
     Table,
 }

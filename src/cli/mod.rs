@@ -6,6 +6,7 @@ mod demo;
 mod output;
 mod progress;
 mod simulate;
+mod study;
 
 use clap::{Parser, Subcommand};
 
@@ -29,6 +30,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
     Compare(compare::Compare),
+    Study(study::Study),
 }
 
 impl Cli {
@@ -39,6 +41,7 @@ impl Cli {
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(),
             Command::Compare(compare) => compare.run(),
+            Command::Study(study) => study.run(),
         }
     }
 }

@@ -39,3 +39,29 @@ impl Drop for Activity {
         self.0.finish_and_clear();
     }
 }
+
+/// How many of a known number of runs are done.
+pub struct Runs(ProgressBar);
+
+impl Runs {
+    /// Begins to show that none is.
+    pub fn new(runs: u64) -> Self {
+        let bar = ProgressBar::new(runs);
+        let template = "{wide_bar} {pos} of {len} runs, {eta} to go";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    /// One more is done.
+    pub fn one_done(&self) {
+        self.0.inc(1);
+    }
+}
+
+impl Drop for Runs {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -259,6 +259,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         lag_one: -0.013,
     };
     let outcome = Outcome {
+        form_test: None,
         estimate,
         prior_sigma,
         prior_mean,

@@ -1,0 +1,26 @@
+//! `turncal study`
+
+mod accuracy;
+
+use clap::Subcommand;
+
+/// Answers a question with many simulated runs
+#[derive(Debug, clap::Args)]
+#[command(arg_required_else_help = true)]
+pub struct Study {
+    #[command(subcommand)]
+    question: Question,
+}
+
+#[derive(Debug, Subcommand)]
+enum Question {
+    Accuracy(accuracy::Accuracy),
+}
+
+impl Study {
+    pub fn run(&self) -> anyhow::Result<()> {
+        match &self.question {
+            Question::Accuracy(accuracy) => accuracy.run(),
+        }
+    }
+}

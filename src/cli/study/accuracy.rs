@@ -1,0 +1,114 @@
+//! `turncal study accuracy`
+
+use std::path::{Path, PathBuf};
+
+use turncal::models::{InstallationModel, Place};
+use turncal::simulation::Scenario;
+use turncal::study::AccuracyStudy;
+
+use super::super::calibrate::{Aiding, Installation};
+use super::super::output::{Overwrite, print};
+use super::super::progress::Runs;
+
+/// How accurate the filter is, and whether its σ are true
+///
+/// Simulates many runs, each with another instrument, other noise and other table errors, and
+/// calibrates each by the filter and, on the paper's static positions, by the closed form. Shows the
+/// RMS error of each group against the Cramér–Rao bound and against the closed form, and whether the
+/// filter's σ are true (NEES, NIS). A run on which the filter fails is counted, not dropped.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal study accuracy --runs 500
+  turncal study accuracy nineteen-position --runs 200 -o nineteen
+  turncal study accuracy --truth-installation three-angle --installation three-angle")]
+pub struct Accuracy {
+    /// Scenario: a TOML file or an embedded name
+    #[arg(default_value = "demo")]
+    scenario: String,
+    /// Another path for it: a TOML file or an embedded name
+    #[arg(long, value_name = "PATH")]
+    path: Option<String>,
+    /// What the filter observes beside the standstill
+    #[arg(long, value_enum, default_value_t = Aiding::Table)]
+    aiding: Aiding,
+    /// Installation form of the filter
+    #[arg(long, value_enum, default_value_t = Installation::General)]
+    installation: Installation,
+    /// Installation of the simulated instruments: a TOML file or an embedded name [default: the
+    /// scenario's]
+    #[arg(long, value_name = "MODEL")]
+    truth_installation: Option<String>,
+    /// Number of runs
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
+    runs: u64,
+    /// Seed of all random numbers [default: the scenario's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Directory for a report
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Print the figures as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Accuracy {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let Aiding::Table = self.aiding;
+        let mut scenario = Scenario::load(&self.scenario)?;
+        if let Some(path) = &self.path {
+            scenario = scenario.with_path(path)?;
+        }
+        if let Some(model) = &self.truth_installation {
+            scenario.installation = InstallationModel::load(model, &Place::CommandLine)?;
+        }
+        let study = AccuracyStudy {
+            form: self.installation.into(),
+            runs: self.runs,
+            seed: self.seed.unwrap_or(scenario.seed),
+            scenario,
+        };
+        let target = self.output.as_deref();
+        let directory = target
+            .map(|target| {
+                self.overwrite
+                    .directory(target, &[Path::new(&self.scenario)])
+            })
+            .transpose()?;
+        let runs = Runs::new(self.runs);
+        let accuracy = study.run(&|| runs.one_done())?;
+        drop(runs);
+        print(
+            format!(
+                "{:#?} {:?}",
+                accuracy
+                    .groups
+                    .iter()
+                    .map(|g| (
+                        g.group,
+                        g.filter,
+                        g.claimed,
+                        g.bound,
+                        g.ratio,
+                        g.gain,
+                        g.gain_in_equal_time
+                    ))
+                    .collect::<Vec<_>>(),
+                (
+                    accuracy.anees,
+                    accuracy.velocity,
+                    accuracy.table,
+                    accuracy.failures().collect::<Vec<_>>(),
+                    accuracy.rejections()
+                )
+            )
+            .as_bytes(),
+        )?;
+        if let Some(directory) = directory {
+            directory.commit()?;
+        }
+        Ok(())
+    }
+}
