@@ -75,6 +75,7 @@ pub fn estimate(
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
+        linearised_at: held.at,
         converged,
         consistency: consistency(&held.innovations),
         history: held.history,
@@ -143,7 +144,7 @@ fn outliers(result: &PassResult, gate: f64) -> Vec<bool> {
     beyond.collect()
 }
 
-fn problem<'a>(
+pub(super) fn problem<'a>(
     run: &'a Run,
     schedule: Schedule,
     form: InstallationForm,

@@ -2,6 +2,7 @@
 //!
 //! Each takes a [`crate::run::Run`] and gives an [`Estimate`]; none prints, reads files or draws.
 
+mod batch;
 mod closed_form;
 mod coarse;
 mod comparison;
@@ -19,6 +20,7 @@ mod schedule;
 mod standstill;
 pub mod states;
 
+pub use batch::batch_estimate;
 pub use closed_form::{ClosedForm, Position, six_position, six_position_triad};
 pub use coarse::coarse_start;
 pub use comparison::{Comparison, Named, Side, compare};
@@ -28,5 +30,6 @@ pub use estimator::{Progress, estimate};
 pub use frame::Canonical;
 pub use nees::Nees;
 pub use outcome::{Estimate, Outcome};
+pub use pass::Linearisation;
 pub use record::{triads_of, truth_record};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};

@@ -42,8 +42,9 @@ pub(super) struct Variance {
 }
 
 /// The point at which a pass linearises.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Linearisation {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linearisation {
+    /// The instrument.
     pub triads: PerSensor<Triad>,
     /// `C_b_n` at the first sample.
     pub initial_attitude: Matrix3<f64>,
@@ -51,7 +52,7 @@ pub(super) struct Linearisation {
 
 impl Linearisation {
     /// The point a fraction of the way to another.
-    pub fn towards(&self, other: &Self, fraction: f64) -> Self {
+    pub(super) fn towards(&self, other: &Self, fraction: f64) -> Self {
         let from = to_vector(&self.triads);
         let turn = log(&(other.initial_attitude * self.initial_attitude.transpose()));
         Self {
@@ -76,6 +77,8 @@ pub(super) enum Mode<'a> {
 /// What a pass gives.
 #[derive(Debug, Clone)]
 pub(super) struct PassResult {
+    /// Where it linearised; in a live pass, at its end.
+    pub at: Linearisation,
     /// The estimate: where the next pass linearises.
     pub estimate: Linearisation,
     pub covariance: ParameterMatrix,
@@ -179,6 +182,7 @@ impl<'a> Pass<'a> {
             }
         }
         Ok(PassResult {
+            at: self.at,
             estimate: self.estimate(),
             covariance: self.filter.parameter_covariance(),
             merit: self.merit,

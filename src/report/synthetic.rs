@@ -10,6 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{ClosedForm, Report};
 use crate::attitude;
+use crate::calibration::Linearisation;
 use crate::calibration::outcome::*;
 use crate::calibration::states::{
     PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
@@ -262,6 +263,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         estimate,
         prior_sigma,
         prior_mean,
+        linearised_at: Linearisation {
+            triads: from_vector(form, &(truth + drawn)),
+            initial_attitude: nalgebra::Matrix3::identity(),
+        },
         passes: vec![
             pass(true, 812.0, 9.1e5, 4),
             pass(false, 3.1, 7310.0, 9),
