@@ -4,7 +4,8 @@ use super::coarse::coarse_start;
 use super::consistency::consistency;
 use super::error::CalibrationError;
 use super::filter::Start;
-use super::outcome::{Estimate, Outcome, Pass, parameter_name, to_vector};
+use super::observability::Observability;
+use super::outcome::{Estimate, Outcome, Pass, to_vector};
 use super::pass::{Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
@@ -72,6 +73,11 @@ pub fn estimate(
         return Err(singular(&estimate.triads));
     }
     let mut outcome = Outcome {
+        observability: Observability::new(
+            &estimate,
+            &problem.prior_sigma,
+            &held.attitude_covariance,
+        ),
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
@@ -214,17 +220,9 @@ fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
                 .map_or(f64::NAN, |pass| pass.largest_step),
         ));
     }
-    let unobserved: Vec<String> = outcome
-        .unobserved()
-        .into_iter()
-        .filter_map(|i| parameter_name(outcome.estimate.form(), i))
-        .collect();
-    if !unobserved.is_empty() {
-        warnings.push(format!(
-            "Not observed by this path, σ not even halved: {}.",
-            unobserved.join(", ")
-        ));
-    }
+    let form = outcome.estimate.form();
+    let unobserved = outcome.unobserved();
+    warnings.extend(outcome.observability.warnings(form, &unobserved));
     for sensor in Sensor::ALL {
         if run.noise.get(sensor).instability.is_some() {
             warnings.push(format!(

@@ -7,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
 use super::filter::{Filter, Sight, Start};
+use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
 use super::schedule::{Schedule, Standing};
 use super::states::{ParameterMatrix, ParameterVector};
@@ -82,6 +83,7 @@ pub(super) struct PassResult {
     /// The estimate: where the next pass linearises.
     pub estimate: Linearisation,
     pub covariance: ParameterMatrix,
+    pub attitude_covariance: AttitudeCovariance,
     /// Whitened innovations squared, summed; the prior is in it, since the filter starts from it.
     /// A rejected observation counts as much as the gate lets pass.
     pub merit: f64,
@@ -185,6 +187,7 @@ impl<'a> Pass<'a> {
             at: self.at,
             estimate: self.estimate(),
             covariance: self.filter.parameter_covariance(),
+            attitude_covariance: self.filter.attitude_covariance(),
             merit: self.merit,
             innovations: self.innovations,
             history,

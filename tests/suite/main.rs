@@ -4,6 +4,7 @@ mod batch;
 mod cli;
 mod compare;
 mod door;
+mod observability;
 mod recorded;
 mod shared;
 mod simulated;
