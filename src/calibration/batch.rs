@@ -14,6 +14,7 @@ use std::ops::Range;
 use faer::{Mat, MatRef, Side};
 use nalgebra::Vector3;
 
+use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::estimator::problem;
 use super::outcome::{Estimate, Outcome, from_vector, to_vector};
@@ -61,9 +62,10 @@ pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, Calibrat
     }
     let at = to_vector(&outcome.linearised_at.triads);
     let (step, covariance) = batch.information.parameters();
+    let triads = from_vector(form, &(at + step));
     Ok(Estimate {
-        triads: from_vector(form, &(at + step)),
-        covariance,
+        covariance: covariance + curvature(&triads, &covariance),
+        triads,
     })
 }
 

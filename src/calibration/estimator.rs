@@ -2,6 +2,7 @@
 
 use super::coarse::coarse_start;
 use super::consistency::consistency;
+use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::filter::Start;
 use super::observability::Observability;
@@ -66,7 +67,7 @@ pub fn estimate(
     let (held, converged) = iterate(&problem, live.estimate, &mut passes, progress)?;
     let estimate = Estimate {
         triads: held.estimate.triads,
-        covariance: held.covariance,
+        covariance: held.covariance + curvature(&held.estimate.triads, &held.covariance),
     };
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {

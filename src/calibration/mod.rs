@@ -7,6 +7,7 @@ mod closed_form;
 mod coarse;
 mod comparison;
 mod consistency;
+mod curvature;
 mod error;
 mod estimator;
 mod filter;

@@ -42,19 +42,13 @@ fn turns_about_one_axis_say_in_words_what_they_did_not_observe() {
     let scenario = Scenario::load("single-axis").unwrap();
     let outcome = trial(&scenario, 0).outcome;
     let unobserved: Vec<String> = outcome.unobserved().into_iter().map(name).collect();
-    for direction in &outcome.observability.directions {
-        println!("{:.4} {}", direction.remaining, direction.words(FORM));
-    }
-    for i in 0..PARAMETERS {
+    for i in (0..PARAMETERS).filter(|&i| UNOBSERVED.contains(&&*name(i))) {
         let left = outcome.estimate.sigma()[i] / outcome.prior_sigma[i];
-        println!("{} {left:.5}", name(i));
-        // Gravity along z is shared between bias and installation of x and y as their priors are.
-        let whole = UNOBSERVED.contains(&&*name(i)) && i < PARAMETERS - 3;
-        assert!(!whole || left > 0.98, "{} {left}", name(i));
+        // While it turns, the table modulates what level gyros sense of Earth rate; that is little.
+        assert!(left > 0.9, "{} {left}", name(i));
     }
     assert_eq!(unobserved, UNOBSERVED);
     assert_eq!(outcome.observability.unobserved().count(), UNOBSERVED.len());
-    println!("{:?}", outcome.warnings);
     assert!(outcome.warnings.iter().any(|warning| warning.contains(
         "gyro scale x, y; gyro installation xy, yx, zx, zy; accel scale x, y; \
          accel installation xy, yx, zx, zy; accel bias x, y, z"
@@ -71,22 +65,18 @@ fn turns_about_one_axis_invent_nothing_and_get_right_what_they_observe() {
     for Trial {
         normalised,
         outcome,
-        nees,
+        ..
     } in &trials
     {
-        println!("NEES {nees:.1}");
         assert!(outcome.converged);
         let sigma = outcome.estimate.sigma();
         let moved = outcome.estimate.vector() - outcome.prior_mean;
         for i in 0..PARAMETERS {
             // What was learnt is how far the estimate may have left the prior's mean.
-            let learnt = (outcome.prior_sigma[i].powi(2) - sigma[i].powi(2)).sqrt();
-            assert!(
-                moved[i].abs() < 4.5 * learnt,
-                "{} moved by {:.2}",
-                name(i),
-                moved[i] / learnt
-            );
+            let prior = outcome.prior_sigma[i];
+            let learnt = (prior.powi(2) - sigma[i].powi(2)).max(0.0).sqrt();
+            let limit = 4.5 * learnt + 0.01 * prior;
+            assert!(moved[i].abs() < limit, "{} moved", name(i));
             assert!(
                 normalised[i].abs() < 4.5,
                 "{} is off by {:.2} σ",
