@@ -88,6 +88,7 @@ embed!(
     PATH,
     "path",
     "nineteen-position",
+    "single-axis",
     "six-position",
     "three-axis",
     "two-axis",
@@ -99,6 +100,7 @@ embed!(
     "demo-six-position",
     "mems",
     "nineteen-position",
+    "single-axis",
     "two-axis",
 );
 

@@ -2,10 +2,12 @@
 
 use super::coarse::coarse_start;
 use super::consistency::consistency;
+use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::filter::Start;
 use super::form::{FormTest, form_test};
-use super::outcome::{Estimate, Outcome, Pass, parameter_name, to_vector};
+use super::observability::Observability;
+use super::outcome::{Estimate, Outcome, Pass, to_vector};
 use super::pass::{Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
@@ -66,7 +68,7 @@ pub fn estimate(
     let (held, converged) = iterate(&problem, live.estimate, &mut passes, progress)?;
     let estimate = Estimate {
         triads: held.estimate.triads,
-        covariance: held.covariance,
+        covariance: held.covariance + curvature(&held.estimate.triads, &held.covariance),
     };
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {
@@ -75,9 +77,15 @@ pub fn estimate(
     let left_out: Vec<bool> = held.innovations.iter().map(|i| !i.accepted).collect();
     let mut outcome = Outcome {
         form_test: form_test(&problem, &held, &left_out)?,
+        observability: Observability::new(
+            &estimate,
+            &problem.prior_sigma,
+            &held.attitude_covariance,
+        ),
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
+        linearised_at: held.at,
         converged,
         consistency: consistency(&held.innovations),
         history: held.history,
@@ -218,17 +226,9 @@ fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
                 .map_or(f64::NAN, |pass| pass.largest_step),
         ));
     }
-    let unobserved: Vec<String> = outcome
-        .unobserved()
-        .into_iter()
-        .filter_map(|i| parameter_name(outcome.estimate.form(), i))
-        .collect();
-    if !unobserved.is_empty() {
-        warnings.push(format!(
-            "Not observed by this path, σ not even halved: {}.",
-            unobserved.join(", ")
-        ));
-    }
+    let form = outcome.estimate.form();
+    let unobserved = outcome.unobserved();
+    warnings.extend(outcome.observability.warnings(form, &unobserved));
     for sensor in Sensor::ALL {
         if run.noise.get(sensor).instability.is_some() {
             warnings.push(format!(

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::observability::AttitudeCovariance;
 use super::states::{
     ATTITUDE, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS, POSITION, ParameterMatrix,
     ParameterVector, STATES, StateMatrix, StateVector, TABLE, VELOCITY,
@@ -220,6 +221,14 @@ impl Filter {
         self.p
             .fixed_view::<PARAMETERS, PARAMETERS>(PARAMETER, PARAMETER)
             .into_owned()
+    }
+
+    /// Covariance of the parameter errors with the initial attitude error in units of its σ.
+    pub fn attitude_covariance(&self) -> AttitudeCovariance {
+        let sigma = |axis| self.p[(INITIAL_ATTITUDE + axis, INITIAL_ATTITUDE + axis)].sqrt();
+        AttitudeCovariance::from_fn(|i, axis| {
+            self.p[(PARAMETER + i, INITIAL_ATTITUDE + axis)] / sigma(axis)
+        })
     }
 
     /// 1σ of the parameter errors.

@@ -2,11 +2,13 @@
 //!
 //! Each takes a [`crate::run::Run`] and gives an [`Estimate`]; none prints, reads files or draws.
 
+mod batch;
 mod bound;
 mod closed_form;
 mod coarse;
 mod comparison;
 mod consistency;
+mod curvature;
 mod error;
 mod estimator;
 mod filter;
@@ -14,6 +16,7 @@ mod form;
 mod frame;
 mod group;
 mod nees;
+mod observability;
 pub mod outcome;
 mod pass;
 mod record;
@@ -22,6 +25,7 @@ mod schedule;
 mod standstill;
 pub mod states;
 
+pub use batch::batch_estimate;
 pub use bound::{Bound, bound};
 pub use closed_form::{ClosedForm, Position, six_position, six_position_of, six_position_triad};
 pub use coarse::coarse_start;
@@ -33,6 +37,8 @@ pub use form::FormTest;
 pub use frame::{Canonical, in_general_form};
 pub use group::Group;
 pub use nees::{Nees, nees};
+pub use observability::{AttitudePart, Direction, Observability, Part};
 pub use outcome::{Estimate, Outcome};
+pub use pass::Linearisation;
 pub use record::{triads_of, truth_record};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};

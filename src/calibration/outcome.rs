@@ -1,6 +1,8 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
 use super::form::FormTest;
+use super::observability::Observability;
+use super::pass::Linearisation;
 use super::states::{ParameterMatrix, ParameterVector, parameter, sensor_and_parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
@@ -74,6 +76,10 @@ pub struct Outcome {
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
     pub prior_mean: ParameterVector,
+    /// What the run showed of the parameters and what it left as it was.
+    pub observability: Observability,
+    /// Where the last pass linearised.
+    pub linearised_at: Linearisation,
     /// Each pass in order; the first is the live one.
     pub passes: Vec<Pass>,
     /// Whether the last pass moved no parameter by more than the limit.

@@ -7,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
 use super::filter::{Filter, Sight, Start};
+use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
 use super::schedule::{Schedule, Standing};
 use super::states::{ParameterMatrix, ParameterVector};
@@ -44,8 +45,9 @@ pub(super) struct Variance {
 }
 
 /// The point at which a pass linearises.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Linearisation {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linearisation {
+    /// The instrument.
     pub triads: PerSensor<Triad>,
     /// `C_b_n` at the first sample.
     pub initial_attitude: Matrix3<f64>,
@@ -53,7 +55,7 @@ pub(super) struct Linearisation {
 
 impl Linearisation {
     /// The point a fraction of the way to another.
-    pub fn towards(&self, other: &Self, fraction: f64) -> Self {
+    pub(super) fn towards(&self, other: &Self, fraction: f64) -> Self {
         let from = to_vector(&self.triads);
         let turn = log(&(other.initial_attitude * self.initial_attitude.transpose()));
         Self {
@@ -78,9 +80,12 @@ pub(super) enum Mode<'a> {
 /// What a pass gives.
 #[derive(Debug, Clone)]
 pub(super) struct PassResult {
+    /// Where it linearised; in a live pass, at its end.
+    pub at: Linearisation,
     /// The estimate: where the next pass linearises.
     pub estimate: Linearisation,
     pub covariance: ParameterMatrix,
+    pub attitude_covariance: AttitudeCovariance,
     /// Whitened innovations squared, summed; the prior is in it, since the filter starts from it.
     /// A rejected observation counts as much as the gate lets pass.
     pub merit: f64,
@@ -181,8 +186,10 @@ impl<'a> Pass<'a> {
             }
         }
         Ok(PassResult {
+            at: self.at,
             estimate: self.estimate(),
             covariance: self.filter.parameter_covariance(),
+            attitude_covariance: self.filter.attitude_covariance(),
             merit: self.merit,
             innovations: self.innovations,
             history,

@@ -2,13 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::observability::Direction;
 use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
 use super::states::{PARAMETERS, sensor_and_parameter};
 use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::Run;
 use crate::run::record::{
-    Aiding, BodyFrame, CalibrationRecord, ConsistencyRecord, EQUATION, Method, NisRecord,
-    TestVector, TriadRecord,
+    Aiding, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord, EQUATION, Method,
+    NisRecord, TestVector, TriadRecord,
 };
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -27,6 +28,7 @@ impl Outcome {
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
+            observability: direction_records(self),
             warnings: self.warnings.clone(),
             ..self.estimate.record(run)
         }
@@ -161,6 +163,25 @@ fn sigma_record(
 
 fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
+}
+
+fn direction_records(outcome: &Outcome) -> Vec<DirectionRecord> {
+    let form = outcome.estimate.form();
+    let record = |direction: &Direction| DirectionRecord {
+        remaining: direction.remaining,
+        words: direction.words(form),
+        parts: direction
+            .parts
+            .iter()
+            .filter_map(|part| Some((parameter_name(form, part.parameter)?, part.component)))
+            .collect(),
+    };
+    outcome
+        .observability
+        .directions
+        .iter()
+        .map(record)
+        .collect()
 }
 
 fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {

@@ -43,6 +43,14 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
                     section { h2 { "Passes" } (tables::passes(outcome)) }
                 }
                 @for figure in figures { (drawn(figure)) }
+                @if let Some(outcome) = report.outcome {
+                    section { h2 { "What the path saw least" } (tables::weakest(outcome))
+                        p.note {
+                            "Combinations of parameters, each in units of its prior σ, that the run saw                             independently of each other; the ratio is posterior to prior σ. " i { "With" }
+                            " joins errors of the same sign, " i { "against" } " errors of opposite sign."
+                        }
+                    }
+                }
                 section { h2 { "Model and method" } (facts::model(report)) }
                 section { h2 { "Run" } (facts::run(report.run)) }
                 footer { "turncal " (env!("CARGO_PKG_VERSION")) }

@@ -14,6 +14,7 @@ use crate::calibration::outcome::*;
 use crate::calibration::states::{
     PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
 };
+use crate::calibration::{Direction, Linearisation, Observability, Part};
 use crate::earth::Site;
 use crate::imu::*;
 use crate::run::{ImuRecord, Run, Standstill, TableRecord};
@@ -263,6 +264,27 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         estimate,
         prior_sigma,
         prior_mean,
+        observability: Observability {
+            directions: vec![Direction {
+                remaining: 0.002,
+                parts: vec![
+                    Part {
+                        parameter: 2,
+                        component: 0.8,
+                    },
+                    Part {
+                        parameter: 11,
+                        component: -0.6,
+                    },
+                ],
+                others: false,
+                attitude: Vec::new(),
+            }],
+        },
+        linearised_at: Linearisation {
+            triads: from_vector(form, &(truth + drawn)),
+            initial_attitude: nalgebra::Matrix3::identity(),
+        },
         passes: vec![
             pass(true, 812.0, 9.1e5, 4),
             pass(false, 3.1, 7310.0, 9),

@@ -11,6 +11,9 @@ use crate::imu::ParameterKind;
 /// Rows that belong together.
 pub(super) type Section = Vec<Vec<String>>;
 
+/// How many of the directions that were observed are shown.
+const WEAKEST: usize = 3;
+
 /// A table whose first column names the row.
 pub(super) fn table<H: AsRef<str>>(
     headings: &[H],
@@ -142,6 +145,16 @@ fn ratio(posterior: f64, prior: f64) -> String {
     } else {
         format!("1 : {}", three_digits(1.0 / ratio))
     }
+}
+
+/// The directions that the run observed least: all that it did not observe, and some that it did.
+pub(super) fn weakest(outcome: &Outcome) -> Markup {
+    let form = outcome.estimate.form();
+    let observability = &outcome.observability;
+    let shown = observability.unobserved().count() + WEAKEST;
+    let rows = observability.directions.iter().take(shown);
+    let rows = rows.map(|direction| vec![direction.words(form), ratio(direction.remaining, 1.0)]);
+    table(&["direction", "ratio"], [rows.collect()])
 }
 
 /// The passes of the filter.

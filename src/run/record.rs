@@ -62,6 +62,9 @@ pub struct CalibrationRecord {
     /// Whether the innovations agree with their covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyRecord>,
+    /// Independent directions of the parameters, the least observed first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub observability: Vec<DirectionRecord>,
     /// What must be known before using the values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -147,6 +150,17 @@ pub struct NisRecord {
     pub nis_interval: [f64; 2],
 }
 
+/// A combination of parameters, each in units of its prior σ, and how well a run observed it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DirectionRecord {
+    /// Posterior over prior σ.
+    pub remaining: f64,
+    /// In words, such as `gyro scale z with gyro bias z`.
+    pub words: String,
+    /// Name and component of the parameters that make up most of it; squares of all sum to one.
+    pub parts: BTreeMap<String, f64>,
+}
+
 /// A raw output of both triads and what it becomes, gyro first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TestVector {
@@ -174,6 +188,7 @@ impl CalibrationRecord {
             passes: None,
             converged: None,
             consistency: None,
+            observability: Vec::new(),
             warnings: Vec::new(),
             fixed: Vec::new(),
             equation: None,

@@ -1,8 +1,10 @@
 //! What turncal promises, from the outside: one binary, so that it links once.
 
+mod batch;
 mod cli;
 mod compare;
 mod door;
+mod observability;
 mod recorded;
 mod shared;
 mod simulated;

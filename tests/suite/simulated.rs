@@ -12,15 +12,15 @@ use turncal::simulation::Scenario;
 const SEED: u64 = 2016;
 const RUNS: u64 = 100;
 
-struct Trial {
+pub struct Trial {
     /// Error of each parameter in units of its claimed σ.
-    normalised: ParameterVector,
+    pub normalised: ParameterVector,
     /// Normalised estimation error squared over all parameters.
-    nees: f64,
-    outcome: Outcome,
+    pub nees: f64,
+    pub outcome: Outcome,
 }
 
-fn trial(scenario: &Scenario, stream: u64) -> Trial {
+pub fn trial(scenario: &Scenario, stream: u64) -> Trial {
     let simulated = scenario.simulate(SEED, stream).unwrap();
     let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);

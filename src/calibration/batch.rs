@@ -1,0 +1,347 @@
+//! Batch least squares: the linear problem of the last held pass once more, without a Kalman filter.
+//!
+//! Every fact is a row of unit variance: what was known before, each observation, each independent
+//! source of noise in a stretch. The rows are reduced stretch by stretch with Householder's QR.
+//! Unknowns that no later row sees stand first in a reduction and leave with the rows that determine
+//! them; nothing is approximated (Bierman, *Factorization Methods for Discrete Sequential
+//! Estimation*, ch. VI).
+//!
+//! It shares with the filter what makes the problem (stretches, blocks of the error model, observed
+//! differences) and nothing that solves it: it checks covariance propagation, gains and updates.
+
+use std::ops::Range;
+
+use faer::{Mat, MatRef, Side};
+use nalgebra::Vector3;
+
+use super::curvature::curvature;
+use super::error::CalibrationError;
+use super::estimator::problem;
+use super::outcome::{Estimate, Outcome, from_vector, to_vector};
+use super::pass::{Problem, singular};
+use super::schedule::{Schedule, Standing};
+use super::states::{
+    ATTITUDE, NAVIGATION, POSITION, ParameterMatrix, ParameterVector, VELOCITY,
+    sensor_and_parameter,
+};
+use crate::attitude::{exp, log};
+use crate::navigation::{Block, BlockMatrix, Navigator, State};
+use crate::run::Run;
+
+/// The attitude error at the first sample is the initial one to within this, rad: a number so small
+/// that it is none, where a row needs a σ.
+const SAME: f64 = 1e-11;
+/// A source of noise with less than this part of the largest one's variance is rounding.
+const NO_SOURCE: f64 = 1e-14;
+
+/// Estimate and covariance of an outcome's last pass, from its point of linearisation and with the
+/// observations that it let in, by batch least squares.
+///
+/// # Errors
+/// [`CalibrationError`] where the run is not the one of the outcome.
+pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
+    let form = outcome.estimate.form();
+    let schedule = Schedule::new(run, &run.dwells())?;
+    let problem = problem(run, schedule, form, outcome.velocity_sigma);
+    let mut accepted = outcome.innovations.iter().map(|i| i.accepted);
+    let mut batch = Batch::new(&problem, outcome)?;
+    let mut stood = false;
+    for step in &problem.schedule.steps {
+        match &step.standing {
+            Some(standing) => {
+                let new_position = standing.first && stood;
+                let accepted = || accepted.next().unwrap_or(true);
+                batch.stand(step.samples.clone(), standing, new_position, accepted)?;
+                stood = true;
+            }
+            None => {
+                let block = batch.navigator.advance(step.samples.clone());
+                batch.advance(&block, step.samples.end)?;
+            }
+        }
+    }
+    let at = to_vector(&outcome.linearised_at.triads);
+    let (step, covariance) = batch.information.parameters();
+    let triads = from_vector(form, &(at + step));
+    Ok(Estimate {
+        covariance: covariance + curvature(&triads, &covariance),
+        triads,
+    })
+}
+
+struct Batch<'a> {
+    problem: &'a Problem<'a>,
+    navigator: Navigator<'a>,
+    information: Information,
+}
+
+impl<'a> Batch<'a> {
+    fn new(problem: &'a Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
+        let (run, at) = (problem.run, &outcome.linearised_at);
+        let walk = crate::imu::PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
+        let start = State::at_rest(at.initial_attitude);
+        let navigator = Navigator::new(&run.imu, &run.site, walk, &at.triads, start)
+            .ok_or_else(|| singular(&at.triads))?;
+        Ok(Self {
+            problem,
+            navigator,
+            information: Information::new(
+                problem,
+                &(problem.prior_mean - to_vector(&at.triads)),
+                &log(&(problem.schedule.initial_attitude * at.initial_attitude.transpose())),
+            ),
+        })
+    }
+
+    fn advance(&mut self, block: &Block, end: usize) -> Result<(), CalibrationError> {
+        let time = self.problem.run.imu.time(end);
+        let done = self.information.advance(block);
+        done.ok_or(CalibrationError::Diverged { time })
+    }
+
+    /// A stretch of a dwell; `accepted` tells of one observation after the other.
+    fn stand(
+        &mut self,
+        samples: Range<usize>,
+        standing: &Standing,
+        new_position: bool,
+        mut accepted: impl FnMut() -> bool,
+    ) -> Result<(), CalibrationError> {
+        let variance = self.problem.variance;
+        let tied = State::at_rest(standing.attitude);
+        self.information.refer(&self.navigator.state, &tied);
+        self.navigator.state = tied;
+
+        let end = samples.end;
+        let block = self.navigator.advance_standing(samples);
+        self.advance(&block, end)?;
+        let state = &block.state;
+        if new_position {
+            self.information.new_table_position(variance.table.sqrt());
+        }
+        let mut rows = Vec::new();
+        if new_position {
+            rows.push((POSITION, state.position, variance.position));
+        }
+        if accepted() {
+            rows.push((VELOCITY, state.velocity, variance.velocity));
+        }
+        if let Some((reading, count)) = &standing.reading
+            && accepted()
+        {
+            let difference = -log(&(state.attitude * reading.transpose()));
+            let variance = variance.reading / *count as f64 + variance.attitude;
+            rows.push((ATTITUDE, difference, variance));
+        }
+        self.information.observe(&rows);
+        Ok(())
+    }
+}
+
+/// `[R | z]`: the unknowns x obey `R x = z` but for independent errors of unit variance, R upper
+/// triangular. Unknowns in order: table (three, none without position error), navigation errors now,
+/// parameter errors that are estimated, in units of their prior σ, and initial attitude error.
+struct Information {
+    rows: Mat<f64>,
+    table: usize,
+    /// Index and prior σ of each estimated parameter.
+    parameters: Vec<(usize, f64)>,
+}
+
+impl Information {
+    fn new(problem: &Problem, mean: &ParameterVector, attitude: &Vector3<f64>) -> Self {
+        let start = &problem.start;
+        let sigma = problem.prior_sigma.iter().copied().enumerate();
+        let parameters: Vec<_> = sigma.filter(|&(_, sigma)| sigma > 0.0).collect();
+        let table = if start.table > 0.0 { 3 } else { 0 };
+        let initial = table + NAVIGATION + parameters.len();
+        let z = initial + 3;
+        let mut rows = Mat::zeros(z, z + 1);
+        for axis in 0..table {
+            rows[(axis, axis)] = 1.0 / start.table;
+        }
+        for axis in 0..3 {
+            let mut know = |index: usize, sigma: f64| rows[(index, index)] = 1.0 / sigma;
+            know(table + ATTITUDE + axis, SAME);
+            know(table + VELOCITY + axis, start.velocity);
+            know(table + POSITION + axis, start.position);
+            know(initial + axis, start.attitude);
+            rows[(table + ATTITUDE + axis, initial + axis)] = -1.0 / SAME;
+            rows[(initial + axis, z)] = attitude[axis] / start.attitude;
+        }
+        for (n, &(index, sigma)) in parameters.iter().enumerate() {
+            let unknown = table + NAVIGATION + n;
+            rows[(unknown, unknown)] = 1.0;
+            rows[(unknown, z)] = mean[index] / sigma;
+        }
+        Self {
+            rows,
+            table,
+            parameters,
+        }
+    }
+
+    /// Number of unknowns, and the column of z.
+    fn unknowns(&self) -> usize {
+        self.rows.nrows()
+    }
+
+    fn triangle(&self) -> MatRef<'_, f64> {
+        self.rows.get(.., ..self.unknowns())
+    }
+
+    /// From the navigation errors x at the beginning of a stretch to those at its end,
+    /// `x⁺ = Φ x + Ψ δθ + G w` with w of unit variance: x is replaced by `Φ⁻¹ (x⁺ − Ψ δθ − G w)`,
+    /// then w leaves. `None` if Φ has no inverse.
+    fn advance(&mut self, block: &Block) -> Option<()> {
+        let back = block.navigation.try_inverse()?;
+        let back = Mat::from_fn(NAVIGATION, NAVIGATION, |i, j| back[(i, j)]);
+        let driven = Mat::from_fn(NAVIGATION, self.parameters.len(), |i, n| {
+            let (index, sigma) = self.parameters[n];
+            let (sensor, of_triad) = sensor_and_parameter(index);
+            block.parameters.get(sensor)[(i, of_triad)] * sigma
+        });
+        let sources = sources(&block.noise);
+        let (noise, n) = (sources.ncols(), self.unknowns());
+
+        let at_end = self.rows.get(.., self.navigation()) * &back;
+        let of_parameters = &at_end * &driven;
+        let of_noise = &at_end * &sources;
+        let mut stack = Mat::zeros(noise + n, noise + n + 1);
+        for source in 0..noise {
+            stack[(source, source)] = 1.0;
+        }
+        let navigation = noise + self.navigation().start..noise + self.navigation().end;
+        let parameters = navigation.end..navigation.end + self.parameters.len();
+        let mut place = |columns: Range<usize>, part: &Mat<f64>| {
+            stack.get_mut(noise.., columns).copy_from(part);
+        };
+        place(noise..noise + n + 1, &self.rows);
+        place(0..noise, &-of_noise);
+        place(navigation, &at_end);
+        let mut parameters = stack.get_mut(noise.., parameters);
+        parameters -= of_parameters;
+
+        self.rows = stack
+            .qr()
+            .thin_R()
+            .get(noise..noise + n, noise..)
+            .to_owned();
+        Some(())
+    }
+
+    /// The error of the table's position stands first: it leaves with its rows, another takes its
+    /// place.
+    fn new_table_position(&mut self, sigma: f64) {
+        for row in 0..self.table {
+            self.rows.row_mut(row).fill(0.0);
+            self.rows[(row, row)] = 1.0 / sigma;
+        }
+    }
+
+    /// Adds observed differences of three navigation errors from a first one on, each with its
+    /// variance per axis. An attitude is seen against the table's error.
+    fn observe(&mut self, observed: &[(usize, Vector3<f64>, f64)]) {
+        let n = self.unknowns();
+        let mut stack = Mat::zeros(n + 3 * observed.len(), n + 1);
+        stack.get_mut(..n, ..).copy_from(&self.rows);
+        for (k, (first, difference, variance)) in observed.iter().enumerate() {
+            let weight = 1.0 / variance.sqrt();
+            for axis in 0..3 {
+                let row = n + 3 * k + axis;
+                stack[(row, self.table + first + axis)] = weight;
+                if *first == ATTITUDE && self.table > 0 {
+                    stack[(row, axis)] = -weight;
+                }
+                stack[(row, n)] = weight * difference[axis];
+            }
+        }
+        self.rows = stack.qr().thin_R().get(..n, ..).to_owned();
+    }
+
+    /// Refers the navigation errors to another computed state of the same moment. Attitudes add up
+    /// to more than the sum of their rotation vectors, so the sum is taken at the estimate so far.
+    fn refer(&mut self, from: &State, to: &State) {
+        let estimate = self.solution();
+        let error = Vector3::from_fn(|axis, _| estimate[(self.table + ATTITUDE + axis, 0)]);
+        let turned = exp(error) * from.attitude * to.attitude.transpose();
+        let mut shift = Mat::zeros(NAVIGATION, 1);
+        for (first, by) in [
+            (ATTITUDE, log(&turned) - error),
+            (VELOCITY, to.velocity - from.velocity),
+            (POSITION, to.position - from.position),
+        ] {
+            for axis in 0..3 {
+                shift[(first + axis, 0)] = by[axis];
+            }
+        }
+        let moved = self.rows.get(.., self.navigation()) * shift;
+        let n = self.unknowns();
+        let mut z = self.rows.get_mut(.., n..);
+        z += moved;
+    }
+
+    fn navigation(&self) -> Range<usize> {
+        self.table..self.table + NAVIGATION
+    }
+
+    /// The estimate of all unknowns, one column.
+    fn solution(&self) -> Mat<f64> {
+        let mut x = self.rows.get(.., self.unknowns()..).to_owned();
+        solve_upper(self.triangle(), &mut x);
+        x
+    }
+
+    /// Estimate and covariance of the parameter errors.
+    fn parameters(&self) -> (ParameterVector, ParameterMatrix) {
+        // What stands before them leaves with its rows.
+        let corner = self
+            .triangle()
+            .get(self.navigation().end.., self.navigation().end..);
+        let mut inverse = Mat::identity(corner.nrows(), corner.nrows());
+        solve_upper(corner, &mut inverse);
+        let covariance = &inverse * inverse.transpose();
+        let solution = self.solution();
+        let mut mean = ParameterVector::zeros();
+        let mut of_all = ParameterMatrix::zeros();
+        for (m, &(i, sigma)) in self.parameters.iter().enumerate() {
+            mean[i] = sigma * solution[(self.navigation().end + m, 0)];
+            for (n, &(j, other)) in self.parameters.iter().enumerate() {
+                of_all[(i, j)] = sigma * covariance[(m, n)] * other;
+            }
+        }
+        (mean, of_all)
+    }
+}
+
+fn solve_upper(triangle: MatRef<'_, f64>, right: &mut Mat<f64>) {
+    faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+        triangle,
+        right.as_mut(),
+        faer::Par::Seq,
+    );
+}
+
+/// G of as many columns as there are independent sources of noise: `G Gᵀ = Q`.
+fn sources(noise: &BlockMatrix) -> Mat<f64> {
+    let sigma = noise.diagonal().map(f64::sqrt);
+    // Units differ by orders of magnitude, correlations do not.
+    let correlation = Mat::from_fn(NAVIGATION, NAVIGATION, |i, j| {
+        let scale = sigma[i] * sigma[j];
+        if scale > 0.0 {
+            noise[(i, j)] / scale
+        } else {
+            0.0
+        }
+    });
+    let Ok(eigen) = correlation.self_adjoint_eigen(Side::Lower) else {
+        return Mat::zeros(NAVIGATION, 0);
+    };
+    let values = eigen.S().column_vector();
+    let kept: Vec<usize> = (0..NAVIGATION)
+        .filter(|&k| values[k] > NO_SOURCE * values[NAVIGATION - 1])
+        .collect();
+    Mat::from_fn(NAVIGATION, kept.len(), |i, n| {
+        sigma[i] * eigen.U()[(i, kept[n])] * values[kept[n]].sqrt()
+    })
+}

@@ -1,0 +1,359 @@
+//! What a path showed of the parameters, and what it left as it was.
+//!
+//! In units of its prior σ everything known beforehand is a unit sphere. There the eigenvectors of the
+//! posterior covariance are the directions that the run saw independently of each other; the root of
+//! an eigenvalue is the part of the prior σ that is left (Ham and Brown 1983, "Observability,
+//! eigenvalues, and Kalman filtering", IEEE Trans. AES-19).
+
+use faer::{Mat, Side};
+use nalgebra::SMatrix;
+
+use super::outcome::{Estimate, OBSERVED_BELOW, parameter_name};
+use super::states::{PARAMETERS, ParameterVector};
+use crate::imu::InstallationForm;
+
+/// Directions left with the same part of their σ, to this part of it, are one space, in which the
+/// simplest directions are as good as any.
+const ALIKE: f64 = 0.01;
+/// A component is named if its square is at least this part of the whole.
+const NAMED: f64 = 0.1;
+/// From this correlation on, what is not known of a direction is not known of the attitude either.
+const TIED: f64 = 0.7;
+/// A turn below this, rad, leaves a pair of directions as it is.
+const SETTLED: f64 = 1e-9;
+/// Pairs are turned at most this many times each; they settle within ten.
+const SWEEPS: usize = 100;
+
+/// Covariance of each parameter error δθ with each component of the initial attitude error φ₀ in
+/// units of its σ, East-North-Up.
+pub(super) type AttitudeCovariance = SMatrix<f64, PARAMETERS, 3>;
+
+/// Independent directions of the parameters, the least observed first.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Observability {
+    /// As many as there are estimated parameters.
+    pub directions: Vec<Direction>,
+}
+
+/// A combination of parameters, each in units of its prior σ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Direction {
+    /// Posterior over prior σ of the combination, from 0 (known) to 1 (not observed).
+    pub remaining: f64,
+    /// Components worth naming, the largest first and positive; squares of all sum to one.
+    pub parts: Vec<Part>,
+    /// Whether the parts not named make up more than one that is.
+    pub others: bool,
+    /// Components of the initial attitude whose error goes with the combination's.
+    pub attitude: Vec<AttitudePart>,
+}
+
+/// A parameter's share of a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// Index of the parameter.
+    pub parameter: usize,
+    /// Component of the direction, in units of the prior σ.
+    pub component: f64,
+}
+
+/// A component of the initial attitude that goes with a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudePart {
+    /// `tilt about East`, `tilt about North` or `heading`.
+    pub name: &'static str,
+    /// Correlation of its error with the direction's, both true − estimated; heading clockwise.
+    pub correlation: f64,
+}
+
+impl Observability {
+    /// Of an estimate, from the σ that its parameters had before.
+    pub(super) fn new(
+        estimate: &Estimate,
+        prior_sigma: &ParameterVector,
+        attitude: &AttitudeCovariance,
+    ) -> Self {
+        let estimated: Vec<usize> = estimate.estimated().collect();
+        let n = estimated.len();
+        let scaled = Mat::from_fn(n, n, |i, j| {
+            let (i, j) = (estimated[i], estimated[j]);
+            estimate.covariance[(i, j)] / (prior_sigma[i] * prior_sigma[j])
+        });
+        let finite = (0..n).all(|j| (0..n).all(|i| scaled[(i, j)].is_finite()));
+        let Some(eigen) = finite
+            .then(|| scaled.self_adjoint_eigen(Side::Lower).ok())
+            .flatten()
+        else {
+            return Self::default();
+        };
+        let columns = (0..n).map(|k| (0..n).map(|i| eigen.U()[(i, k)]).collect());
+        let mut directions: Vec<Vec<f64>> = columns.collect();
+        let remaining = |v: &[f64]| {
+            let variance: f64 = (0..n)
+                .flat_map(|j| (0..n).map(move |i| (i, j)))
+                .map(|(i, j)| v[i] * scaled[(i, j)] * v[j])
+                .sum();
+            variance.max(0.0).sqrt()
+        };
+        directions.reverse();
+        for alike in
+            directions.chunk_by_mut(|a, b| remaining(a) - remaining(b) <= ALIKE * remaining(a))
+        {
+            simplify(alike);
+        }
+        let mut directions: Vec<Direction> = directions
+            .iter()
+            .map(|v| direction(&estimated, prior_sigma, attitude, v, remaining(v)))
+            .collect();
+        directions.sort_by(|a, b| b.remaining.total_cmp(&a.remaining));
+        Self { directions }
+    }
+
+    /// Directions that the run did not observe.
+    pub fn unobserved(&self) -> impl Iterator<Item = &Direction> {
+        self.directions
+            .iter()
+            .take_while(|direction| direction.remaining > OBSERVED_BELOW)
+    }
+
+    /// What was not observed, in words: parameters, and combinations of parameters each of which
+    /// was.
+    pub(super) fn warnings(&self, form: InstallationForm, hidden: &[usize]) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if !hidden.is_empty() {
+            warnings.push(format!(
+                "Not observed by this path, σ not even halved: {}.",
+                listed(form, hidden)
+            ));
+        }
+        let combinations: Vec<String> = self
+            .unobserved()
+            .filter(|d| d.parts.iter().all(|part| !hidden.contains(&part.parameter)))
+            .map(|direction| direction.words(form))
+            .collect();
+        if !combinations.is_empty() {
+            warnings.push(format!(
+                "Not observed by this path though each parameter alone was: {}.",
+                combinations.join("; ")
+            ));
+        }
+        warnings
+    }
+}
+
+impl Direction {
+    /// Such as `gyro scale z with gyro bias z` or `gyro installation xy against gyro installation yx`:
+    /// with what has the same sign, against what has the other.
+    pub fn words(&self, form: InstallationForm) -> String {
+        let mut text = String::new();
+        let mut say = |sign: f64, name: &str| {
+            if !text.is_empty() {
+                text.push_str(if sign < 0.0 { " against " } else { " with " });
+            }
+            text.push_str(name);
+        };
+        for part in &self.parts {
+            let name = parameter_name(form, part.parameter).unwrap_or_default();
+            say(part.component, &name.replace('.', " "));
+        }
+        for part in &self.attitude {
+            say(part.correlation, part.name);
+        }
+        if self.others {
+            text.push_str(" and others");
+        }
+        text
+    }
+}
+
+/// Turns directions within the space that they span until the fourth powers of their components are
+/// as large as can be, so that each has few (quartimax: Neuhaus and Wrigley 1954, "The quartimax
+/// method", Brit. J. Stat. Psych. 7).
+fn simplify(directions: &mut [Vec<f64>]) {
+    for _ in 0..SWEEPS {
+        let mut largest = 0f64;
+        for second in 1..directions.len() {
+            let (before, rest) = directions.split_at_mut(second);
+            for first in before {
+                let pairs = || first.iter().zip(&rest[0]);
+                let (sine, cosine) = pairs().fold((0.0, 0.0), |(sine, cosine), (x, y)| {
+                    let (u, v) = (x * x - y * y, 2.0 * x * y);
+                    (sine + 2.0 * u * v, cosine + u * u - v * v)
+                });
+                let turn = 0.25 * f64::atan2(sine, cosine);
+                largest = largest.max(turn.abs());
+                let (s, c) = turn.sin_cos();
+                for (x, y) in first.iter_mut().zip(&mut rest[0]) {
+                    (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+                }
+            }
+        }
+        if largest < SETTLED {
+            break;
+        }
+    }
+}
+
+fn direction(
+    estimated: &[usize],
+    prior_sigma: &ParameterVector,
+    attitude: &AttitudeCovariance,
+    v: &[f64],
+    remaining: f64,
+) -> Direction {
+    let component = |&n: &usize| v[n].abs();
+    let mut order: Vec<usize> = (0..v.len()).collect();
+    order.sort_by(|a, b| component(b).total_cmp(&component(a)));
+    let sign = order.first().map_or(1.0, |&n| v[n].signum());
+    let named = |&&n: &&usize| v[n] * v[n] >= NAMED;
+    let parts: Vec<Part> = order
+        .iter()
+        .take_while(named)
+        .map(|&n| Part {
+            parameter: estimated[n],
+            component: sign * v[n],
+        })
+        .collect();
+    let rest = 1.0 - parts.iter().map(|part| part.component.powi(2)).sum::<f64>();
+    // φ₀ is the rotation from the computed to the true attitude; heading turns the other way.
+    let attitude = [
+        ("tilt about East", 1.0),
+        ("tilt about North", 1.0),
+        ("heading", -1.0),
+    ]
+    .into_iter()
+    .enumerate()
+    .map(|(axis, (name, turn))| {
+        let of = |(n, &index): (usize, &usize)| v[n] * attitude[(index, axis)] / prior_sigma[index];
+        let covariance: f64 = estimated.iter().enumerate().map(of).sum();
+        AttitudePart {
+            name,
+            correlation: sign * turn * covariance / remaining,
+        }
+    })
+    .filter(|part| part.correlation.abs() >= TIED)
+    .collect();
+    Direction {
+        remaining,
+        others: rest > NAMED,
+        parts,
+        attitude,
+    }
+}
+
+/// Parameters by sensor and kind, such as `gyro scale x, y; accel bias z`.
+fn listed(form: InstallationForm, parameters: &[usize]) -> String {
+    let mut text = String::new();
+    let mut last = String::new();
+    for name in parameters.iter().filter_map(|&i| parameter_name(form, i)) {
+        let (group, axis) = name.rsplit_once('.').unwrap_or((&name, ""));
+        if group == last {
+            text.push_str(", ");
+        } else {
+            if !last.is_empty() {
+                text.push_str("; ");
+            }
+            text.push_str(&group.replace('.', " "));
+            text.push(' ');
+            last = group.to_owned();
+        }
+        text.push_str(axis);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::outcome::from_vector;
+    use super::super::states::{ParameterMatrix, parameter};
+    use super::*;
+    use crate::imu::Sensor;
+
+    const FORM: InstallationForm = InstallationForm::General;
+
+    /// What is left after measuring combinations of parameters, each given by its components in
+    /// units of the prior σ, a hundred times as well as they were known.
+    fn observed(combinations: &[&[(usize, f64)]]) -> Observability {
+        let prior = ParameterVector::from_fn(|i, _| 1e-3 * (1.0 + i as f64));
+        let mut information = ParameterMatrix::identity();
+        for combination in combinations {
+            let mut h = ParameterVector::zeros();
+            for &(index, component) in *combination {
+                h[index] = component;
+            }
+            information += 1e4 * h * h.transpose();
+        }
+        let scale = ParameterMatrix::from_diagonal(&prior);
+        let estimate = Estimate {
+            triads: from_vector(FORM, &ParameterVector::zeros()),
+            covariance: scale * information.try_inverse().unwrap() * scale,
+        };
+        let mut attitude = AttitudeCovariance::zeros();
+        attitude[(0, 2)] = -0.8 * prior[0];
+        Observability::new(&estimate, &prior, &attitude)
+    }
+
+    fn index(name: &str) -> usize {
+        (0..PARAMETERS)
+            .find(|&i| parameter_name(FORM, i).as_deref() == Some(name))
+            .unwrap()
+    }
+
+    #[test]
+    fn what_only_a_sum_shows_is_unobserved_as_a_difference() {
+        let (xy, yx) = (index("gyro.installation.xy"), index("gyro.installation.yx"));
+        let alone: Vec<[(usize, f64); 1]> = (1..PARAMETERS)
+            .filter(|i| ![xy, yx].contains(i))
+            .map(|i| [(i, 1.0)])
+            .collect();
+        let mut combinations: Vec<&[(usize, f64)]> = alone.iter().map(|c| &c[..]).collect();
+        let sum = [(xy, 1.0), (yx, 1.0)];
+        combinations.push(&sum);
+        let observability = observed(&combinations);
+        let mut words: Vec<String> = observability.unobserved().map(|d| d.words(FORM)).collect();
+        words.sort();
+        assert_eq!(
+            words,
+            [
+                "gyro installation xy against gyro installation yx",
+                "gyro scale x with heading"
+            ]
+        );
+        assert!(observability.directions[1].remaining > 0.999);
+        assert!(observability.directions[2].remaining < 0.011);
+    }
+
+    #[test]
+    fn many_parameters_that_were_not_observed_are_each_a_direction_of_its_own() {
+        let seen = [(parameter(Sensor::Gyro, 2), 1.0)];
+        let observability = observed(&[&seen]);
+        let unobserved: Vec<_> = observability.unobserved().collect();
+        assert_eq!(unobserved.len(), PARAMETERS - 1);
+        assert!(unobserved.iter().all(|d| d.parts.len() == 1 && !d.others));
+    }
+
+    #[test]
+    fn a_combination_of_observed_parameters_that_was_not_observed_is_named() {
+        // Of six parameters all differences are known: each alone is left with 1/√6 of its σ.
+        let six: Vec<usize> = (12..18).collect();
+        let mut combinations: Vec<Vec<(usize, f64)>> = (0..PARAMETERS)
+            .filter(|i| !six.contains(i))
+            .map(|i| vec![(i, 1.0)])
+            .collect();
+        combinations.extend(six.windows(2).map(|w| vec![(w[0], 1.0), (w[1], -1.0)]));
+        let combinations: Vec<&[(usize, f64)]> = combinations.iter().map(|c| &c[..]).collect();
+        let warnings = observed(&combinations).warnings(FORM, &[]);
+        assert_eq!(warnings.len(), 1);
+        assert!(
+            warnings[0].contains("accel scale x with")
+                || warnings[0].contains("with accel scale x"),
+            "{warnings:?}"
+        );
+    }
+
+    #[test]
+    fn parameters_are_listed_by_sensor_and_kind() {
+        let parameters = ["gyro.scale.x", "gyro.scale.y", "accel.bias.z"].map(index);
+        assert_eq!(listed(FORM, &parameters), "gyro scale x, y; accel bias z");
+    }
+}

@@ -1,0 +1,78 @@
+//! The filter against batch least squares on the same linear problem.
+
+use nalgebra::Vector3;
+use turncal::attitude::exp;
+use turncal::calibration::states::PARAMETERS;
+use turncal::calibration::{Outcome, batch_estimate, estimate};
+use turncal::imu::InstallationForm;
+use turncal::run::Run;
+use turncal::simulation::Scenario;
+use turncal::units::ARCSEC;
+
+/// Largest difference of estimate and of covariance, in σ and its products.
+fn difference(run: &Run, outcome: &Outcome) -> (f64, f64) {
+    let batch = batch_estimate(run, outcome).unwrap();
+    let sigma = batch.sigma();
+    let filter = &outcome.estimate;
+    let apart = filter.vector() - batch.vector();
+    let (mut estimate, mut covariance) = (0f64, 0f64);
+    for i in (0..PARAMETERS).filter(|&i| sigma[i] > 0.0) {
+        estimate = estimate.max((apart[i] / sigma[i]).abs());
+        for j in (0..PARAMETERS).filter(|&j| sigma[j] > 0.0) {
+            let apart = filter.covariance[(i, j)] - batch.covariance[(i, j)];
+            covariance = covariance.max((apart / (sigma[i] * sigma[j])).abs());
+        }
+    }
+    println!("estimate {estimate:.1e} σ, covariance {covariance:.1e}");
+    (estimate, covariance)
+}
+
+#[test]
+fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
+    let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
+    let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+    assert!(outcome.converged);
+    let (estimate, covariance) = difference(&simulated.run, &outcome);
+    assert!(estimate < 1e-6 && covariance < 1e-6);
+}
+
+/// The first 200 s of the demo's run.
+fn short() -> Run {
+    let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+    run.imu.gyro.truncate(20_000);
+    run.imu.accel.truncate(20_000);
+    if let Some(table) = &mut run.table {
+        let readings = table.time.partition_point(|&t| t <= 200.0);
+        table.time.truncate(readings);
+        table.attitude.truncate(readings);
+    }
+    run
+}
+
+#[test]
+fn it_agrees_on_what_the_gate_leaves_out() {
+    let mut run = short();
+    if let Some(table) = &mut run.table {
+        let outlier = exp(Vector3::new(0.0, 30.0 * ARCSEC, 0.0));
+        table.attitude[300] = outlier * table.attitude[300];
+    }
+    let outcome = estimate(&run, InstallationForm::SixAngle, &|_| {}).unwrap();
+    assert!(outcome.innovations.iter().any(|i| !i.accepted));
+    let (estimate, covariance) = difference(&run, &outcome);
+    assert!(estimate < 1e-6 && covariance < 1e-6);
+}
+
+#[test]
+fn it_agrees_where_gyros_or_table_have_no_error_and_the_problem_fewer_unknowns() {
+    let mut quiet = short();
+    quiet.noise.gyro.random_walk = 0.0;
+    let mut exact = short();
+    if let Some(table) = &mut exact.table {
+        table.position_sigma = 0.0;
+    }
+    for run in [quiet, exact] {
+        let outcome = estimate(&run, InstallationForm::General, &|_| {}).unwrap();
+        let (estimate, covariance) = difference(&run, &outcome);
+        assert!(estimate < 1e-6 && covariance < 1e-6);
+    }
+}
