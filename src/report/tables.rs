@@ -135,13 +135,13 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
     table(&headings, sections)
 }
 
-/// Posterior over prior σ, with words where the path hardly observed the parameter.
+/// Posterior over prior σ, with words where the path did not observe it.
 fn ratio(posterior: f64, prior: f64) -> String {
     let ratio = posterior / prior;
     if !ratio.is_finite() {
         "–".to_owned()
     } else if ratio > OBSERVED_BELOW {
-        format!("{ratio:.2}, hardly observed")
+        format!("{ratio:.2}, not observed")
     } else {
         format!("1 : {}", three_digits(1.0 / ratio))
     }

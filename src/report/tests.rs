@@ -96,9 +96,9 @@ fn warnings_stand_before_every_figure_and_text_is_escaped() {
 #[test]
 fn a_parameter_that_keeps_its_prior_sigma_is_marked() {
     let mut made_up = synthetic(InstallationForm::General);
-    assert!(!page::page(&made_up.report(), &[]).contains("hardly observed"));
+    assert!(!page::page(&made_up.report(), &[]).contains("not observed"));
     made_up.outcome.prior_sigma[2] = 1.5 * made_up.outcome.estimate.sigma()[2];
-    assert!(page::page(&made_up.report(), &[]).contains("hardly observed"));
+    assert!(page::page(&made_up.report(), &[]).contains("not observed"));
 }
 
 #[test]
