@@ -3,7 +3,7 @@
 use super::error::CalibrationError;
 use super::estimator::problem;
 use super::outcome::{Estimate, Moment};
-use super::pass::{Linearisation, Mode, pass};
+use super::pass::{Gate, Linearisation, Mode, pass};
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
 use crate::imu::{PerSensor, Triad};
@@ -34,7 +34,7 @@ pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationEr
     };
     let form = truth.gyro.form;
     let problem = problem(run, schedule, form, velocity_sigma(run, &dwells));
-    let result = pass(&problem, &at, Mode::Held { rejected: &[] })?;
+    let result = pass(&problem, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {
             triads: *truth,

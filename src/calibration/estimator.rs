@@ -7,8 +7,8 @@ use super::error::CalibrationError;
 use super::filter::Start;
 use super::form::{FormTest, form_test};
 use super::observability::Observability;
-use super::outcome::{Estimate, Outcome, Pass, to_vector};
-use super::pass::{Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
+use super::outcome::{Estimate, Innovation, Outcome, Pass, to_vector};
+use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
 use super::states::ParameterVector;
@@ -74,9 +74,8 @@ pub fn estimate(
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
     }
-    let left_out: Vec<bool> = held.innovations.iter().map(|i| !i.accepted).collect();
     let mut outcome = Outcome {
-        form_test: form_test(&problem, &held, &left_out)?,
+        form_test: form_test(&problem, &held)?,
         observability: Observability::new(
             &estimate,
             &problem.prior_sigma,
@@ -108,50 +107,49 @@ fn iterate(
     progress: Progress,
 ) -> Result<(PassResult, bool), CalibrationError> {
     let mut at = from;
-    let mut rejected = Vec::new();
-    // Where the last pass with this gate linearised, and its merit.
-    let mut before: Option<(Linearisation, f64)> = None;
+    let mut gate = Gate::Innovations;
+    let mut before: Option<PassResult> = None;
     loop {
-        let mode = Mode::Held {
-            rejected: &rejected,
-        };
-        let result = pass(problem, &at, mode)?;
+        let result = pass(problem, &at, Mode::Held(gate))?;
         let summary = summary(&result, &at, false);
         progress(&summary);
         passes.push(summary);
-        let outliers = outliers(&result, problem.gate);
-        let same_gate = outliers == rejected || (rejected.is_empty() && !outliers.contains(&true));
-        let converged = summary.largest_step <= CONVERGED && same_gate;
-        if converged || passes.len() >= PASSES {
-            return Ok((result, converged));
+        let same_data = before
+            .as_ref()
+            .is_some_and(|before| same_data(before, &result));
+        let settled = summary.largest_step <= CONVERGED
+            && (same_data || (before.is_none() && summary.rejected == 0));
+        let doubtful = beyond(&result, problem.gate) > MOST_OUTLIERS;
+        if passes.len() >= PASSES || (settled && (gate == Gate::Open || !doubtful)) {
+            return Ok((result, settled));
         }
-        match before {
-            Some((last, merit)) if result.merit > merit * (1.0 + MERIT_RISE) => {
-                at = last.towards(&at, 0.5);
-            }
-            _ => {
-                before = same_gate.then_some((at, result.merit));
-                rejected = outliers;
-                at = result.estimate;
-            }
+        // Where many observations contradict the model it is the model that is wrong, and leaving
+        // them out would only hide that.
+        if doubtful {
+            gate = Gate::Open;
         }
+        let too_far =
+            before.filter(|before| same_data && result.merit > before.merit * (1.0 + MERIT_RISE));
+        at = match &too_far {
+            Some(before) => before.at.towards(&at, 0.5),
+            None => result.estimate,
+        };
+        before = Some(too_far.unwrap_or(result));
     }
 }
 
-/// Which observations the next pass leaves out. Where they are many it is the model that is wrong,
-/// and leaving out what contradicts it would only hide that: then none. One that is left out comes
-/// back only well within the gate, lest it go in and out for ever.
-fn outliers(result: &PassResult, gate: f64) -> Vec<bool> {
-    let limit = |accepted: bool| if accepted { gate } else { 0.5 * gate };
-    let beyond = result
-        .innovations
-        .iter()
-        .map(|i| i.distance() > limit(i.accepted));
-    let count = beyond.clone().filter(|&beyond| beyond).count();
-    if count as f64 > MOST_OUTLIERS * result.innovations.len() as f64 {
-        return Vec::new();
-    }
-    beyond.collect()
+/// Whether two passes let the same observations in.
+fn same_data(a: &PassResult, b: &PassResult) -> bool {
+    let accepted = |result: &PassResult| -> Vec<bool> {
+        result.innovations.iter().map(|i| i.accepted).collect()
+    };
+    accepted(a) == accepted(b)
+}
+
+/// Part of all observations that are beyond the gate or were left out.
+fn beyond(result: &PassResult, gate: f64) -> f64 {
+    let beyond = |i: &&Innovation| !i.accepted || i.distance() > gate;
+    result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
 }
 
 pub(super) fn problem<'a>(
@@ -302,7 +300,7 @@ mod tests {
                 triads: from_vector(form, &problem.prior_mean.add_scalar(shift * PPM)),
                 initial_attitude: exp(Vector3::new(1.0, -2.0, 3.0) * (shift * ARCSEC)) * reading,
             };
-            let mode = Mode::Held { rejected: &[] };
+            let mode = Mode::Held(Gate::Open);
             pass(&problem, &at, mode).unwrap()
         };
         let (here, there) = (estimate(0.0), estimate(2.0));

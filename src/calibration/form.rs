@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::error::CalibrationError;
 use super::estimator::problem;
 use super::frame::in_general_form;
-use super::pass::{Linearisation, Mode, PassResult, Problem, pass};
+use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, pass};
 use crate::imu::InstallationForm;
 
 /// The likelihood ratio of a restricted installation form against the general one.
@@ -35,7 +35,6 @@ impl FormTest {
 pub(super) fn form_test(
     restricted: &Problem,
     held: &PassResult,
-    rejected: &[bool],
 ) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();
@@ -53,7 +52,7 @@ pub(super) fn form_test(
         triads: in_general_form(&held.estimate.triads),
         ..held.estimate
     };
-    let free = pass(&problem, &at, Mode::Held { rejected })?;
+    let free = pass(&problem, &at, Mode::Held(Gate::As(&held.innovations)))?;
     Ok(Some(FormTest {
         gain: held.merit - free.merit,
         angles: more,

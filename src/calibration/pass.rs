@@ -71,10 +71,21 @@ impl Linearisation {
 /// How a pass treats its estimates and its gate.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Mode<'a> {
-    /// Estimates are fed back as they come; the gate judges each observation as it comes.
+    /// Estimates are fed back as they come.
     Live,
-    /// Nothing is fed back; these observations, in their order, are left out (none if empty).
-    Held { rejected: &'a [bool] },
+    /// Nothing is fed back.
+    Held(Gate<'a>),
+}
+
+/// Which observations a pass lets in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Gate<'a> {
+    /// All.
+    Open,
+    /// Those that its innovations do not make outliers.
+    Innovations,
+    /// Those of another pass, in their order.
+    As(&'a [Innovation]),
 }
 
 /// What a pass gives.
@@ -95,8 +106,10 @@ pub(super) struct PassResult {
 
 /// Chance that the gate rejects a sound observation.
 const FALSE_REJECTION: f64 = 1e-6;
-/// After this many rejections in a row the live gate doubts itself rather than the data.
+/// After this many rejections in a row the gate doubts itself rather than the data.
 const REOPEN: usize = 5;
+/// At most this many observations of a dwell are left out for having shut the gate.
+const MOST_SHUTTING: usize = 3;
 /// Spacing of the history, s.
 const MOMENT: f64 = 1.0;
 
@@ -123,9 +136,24 @@ struct Pass<'a> {
     navigator: Navigator<'a>,
     filter: Filter,
     innovations: Vec<Innovation>,
+    history: Vec<Moment>,
     merit: f64,
     /// Rejections in a row of velocity and of table observations.
     row: [usize; 2],
+    /// Observations of this dwell that are left out because they shut the gate on those after them.
+    shutting: Vec<usize>,
+}
+
+/// Where a dwell begins, to come back to: after a turn the innovations' covariance is wide, and an
+/// outlier that it lets in shuts the gate on the good observations that follow.
+struct Begin<'a> {
+    step: usize,
+    at: Linearisation,
+    navigator: Navigator<'a>,
+    filter: Filter,
+    innovations: usize,
+    history: usize,
+    merit: f64,
 }
 
 impl<'a> Pass<'a> {
@@ -143,7 +171,7 @@ impl<'a> Pass<'a> {
         // point it is given and finds its way from there.
         let (parameters, attitude) = match mode {
             Mode::Live => (ParameterVector::zeros(), Vector3::zeros()),
-            Mode::Held { .. } => (
+            Mode::Held(_) => (
                 problem.prior_mean - to_vector(&at.triads),
                 log(&(problem.schedule.initial_attitude * at.initial_attitude.transpose())),
             ),
@@ -156,34 +184,45 @@ impl<'a> Pass<'a> {
             navigator,
             filter,
             innovations: Vec::new(),
+            history: Vec::new(),
             merit: 0.0,
             row: [0; 2],
+            shutting: Vec::new(),
         })
     }
 
     fn run(mut self) -> Result<PassResult, CalibrationError> {
-        let mut history: Vec<Moment> = Vec::new();
-        let mut stood = false;
-        for step in &self.problem.schedule.steps {
+        let steps = &self.problem.schedule.steps;
+        let mut begin: Option<Begin> = None;
+        let mut next = 0;
+        while let Some(step) = steps.get(next) {
             let time = self.problem.run.imu.time(step.samples.end);
-            match &step.standing {
-                Some(standing) => {
-                    self.stand(
-                        step.samples.clone(),
-                        time,
-                        standing,
-                        standing.first && stood,
-                    )?;
-                    stood = true;
+            if let Some(standing) = &step.standing {
+                if standing.first && begin.as_ref().is_none_or(|begin| begin.step != next) {
+                    begin = Some(self.begin(next));
                 }
-                None => {
-                    let block = self.navigator.advance(step.samples.clone());
-                    self.filter.propagate(&block);
+                // The start holds what the first dwell says of table and position.
+                let new_position = standing.first && next > 0;
+                self.stand(step.samples.clone(), time, standing, new_position)?;
+                if let Some(begin) = &begin
+                    && let Some(shutting) = self.shutting(begin)
+                {
+                    self.come_back(begin, shutting);
+                    next = begin.step;
+                    continue;
                 }
+            } else {
+                let block = self.navigator.advance(step.samples.clone());
+                self.filter.propagate(&block);
             }
-            if history.last().is_none_or(|last| time - last.time >= MOMENT) {
-                history.push(self.moment(time));
+            if self
+                .history
+                .last()
+                .is_none_or(|last| time - last.time >= MOMENT)
+            {
+                self.history.push(self.moment(time));
             }
+            next += 1;
         }
         Ok(PassResult {
             at: self.at,
@@ -192,8 +231,47 @@ impl<'a> Pass<'a> {
             attitude_covariance: self.filter.attitude_covariance(),
             merit: self.merit,
             innovations: self.innovations,
-            history,
+            history: self.history,
         })
+    }
+
+    fn begin(&mut self, step: usize) -> Begin<'a> {
+        self.row = [0; 2];
+        self.shutting.clear();
+        Begin {
+            step,
+            at: self.at,
+            navigator: self.navigator.clone(),
+            filter: self.filter.clone(),
+            innovations: self.innovations.len(),
+            history: self.history.len(),
+            merit: self.merit,
+        }
+    }
+
+    /// The observation that shut the gate: where several in a row were rejected, the dwell's first of
+    /// their kind that was not. None if there is no such thing, or were too many already.
+    fn shutting(&self, begin: &Begin) -> Option<usize> {
+        if self.shutting.len() >= MOST_SHUTTING {
+            return None;
+        }
+        let of_dwell = self.innovations.iter().enumerate().skip(begin.innovations);
+        let row = |i: &Innovation| self.row[i.observation as usize];
+        of_dwell
+            .filter(|(_, i)| i.accepted && row(i) >= REOPEN)
+            .map(|(index, _)| index)
+            .next()
+    }
+
+    fn come_back(&mut self, begin: &Begin<'a>, shutting: usize) {
+        self.at = begin.at;
+        self.navigator = begin.navigator.clone();
+        self.filter = begin.filter.clone();
+        self.innovations.truncate(begin.innovations);
+        self.history.truncate(begin.history);
+        self.merit = begin.merit;
+        self.row = [0; 2];
+        self.shutting.push(shutting);
     }
 
     /// A stretch of a dwell, which ends at `time`.
@@ -205,7 +283,7 @@ impl<'a> Pass<'a> {
         new_position: bool,
     ) -> Result<(), CalibrationError> {
         let variance = self.problem.variance;
-        if matches!(self.mode, Mode::Held { .. }) {
+        if matches!(self.mode, Mode::Held(_)) {
             // The table's own mean reading is within arc seconds of the truth in every pass, so what
             // noise adds up to over a long record never leaves the linear range.
             let tied = State::at_rest(standing.attitude);
@@ -219,7 +297,6 @@ impl<'a> Pass<'a> {
             velocity,
             position,
         } = block.state;
-        // The start holds what the first dwell says of table and position.
         if new_position {
             self.filter.redraw_table(variance.table.sqrt());
             // Between positions the IMU moves by its distance from the table's centre, within one
@@ -236,7 +313,7 @@ impl<'a> Pass<'a> {
         }
         match self.mode {
             Mode::Live => self.feed_back(),
-            Mode::Held { .. } => Ok(()),
+            Mode::Held(_) => Ok(()),
         }
     }
 
@@ -253,13 +330,15 @@ impl<'a> Pass<'a> {
             .whitened(sight, &difference, variance)
             .ok_or(CalibrationError::Diverged { time })?;
         let distance = whitened.norm_squared();
+        let index = self.innovations.len();
         let row = &mut self.row[observation as usize];
         let accepted = match self.mode {
-            Mode::Live => distance <= self.problem.gate || *row >= REOPEN,
-            Mode::Held { rejected } => !rejected
-                .get(self.innovations.len())
-                .copied()
-                .unwrap_or(false),
+            Mode::Held(Gate::Open) => true,
+            Mode::Held(Gate::As(other)) => other.get(index).is_none_or(|i| i.accepted),
+            Mode::Held(Gate::Innovations) | Mode::Live => {
+                let sound = distance <= self.problem.gate && !self.shutting.contains(&index);
+                sound || *row >= REOPEN
+            }
         };
         if accepted {
             *row = 0;

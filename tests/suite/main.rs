@@ -5,6 +5,7 @@ mod cli;
 mod compare;
 mod door;
 mod observability;
+mod outliers;
 mod recorded;
 mod shared;
 mod simulated;

@@ -1,0 +1,141 @@
+//! Wild observations: one in a hundred costs little, and none shuts the filter's gate on the others.
+
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, UnitSphere};
+use rayon::prelude::*;
+use turncal::attitude::exp;
+use turncal::calibration::outcome::{Observation, to_vector};
+use turncal::calibration::states::{PARAMETERS, ParameterVector};
+use turncal::calibration::{Outcome, estimate};
+use turncal::imu::InstallationForm;
+use turncal::run::Run;
+use turncal::simulation::{Scenario, Simulated};
+
+/// Fixed before the first run was made.
+const SEED: u64 = 1616;
+const RUNS: u64 = 24;
+/// Size of an outlier in σ of its observation.
+const SIZE: f64 = 20.0;
+/// One in so many.
+const ONE_IN: f64 = 100.0;
+
+fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from(UnitSphere.sample(rng))
+}
+
+fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng) {
+    let table = run.table.as_mut().unwrap();
+    let turn = exp(direction(rng) * (size * table.reading_sigma));
+    table.attitude[reading] = turn * table.attitude[reading];
+}
+
+/// The IMU jerks: at the end of a stretch of a tenth of a second it has a velocity, right after it
+/// none.
+fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
+    // What a velocity is known to after a stretch: the walk since the last one, and a pulse's share.
+    let variance = run.noise.accel.random_walk.powi(2) * 0.1 + run.imu.pulse.accel.powi(2) / 12.0;
+    let velocity = direction(rng) * (SIZE * variance.sqrt());
+    run.imu.accel[sample] += velocity;
+    run.imu.accel[sample + 1] -= velocity;
+}
+
+fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
+    let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+    assert!(outcome.converged);
+    let error = outcome.estimate.vector() - to_vector(&simulated.truth);
+    let normalised = error.component_div(&outcome.estimate.sigma());
+    (outcome, normalised)
+}
+
+fn rejected(outcome: &Outcome, observation: Observation) -> usize {
+    let of_kind = outcome
+        .innovations
+        .iter()
+        .filter(|i| i.observation == observation);
+    of_kind.filter(|i| !i.accepted).count()
+}
+
+#[test]
+fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
+    let scenario = Scenario::load("demo").unwrap();
+    let squares = |spoilt: bool| -> (f64, usize, usize, usize) {
+        (0..RUNS)
+            .into_par_iter()
+            .map(|stream| {
+                let mut simulated = scenario.simulate(SEED, stream).unwrap();
+                let mut rng = ChaCha8Rng::seed_from_u64(stream);
+                let mut made = 0;
+                if spoilt {
+                    let run = &mut simulated.run;
+                    for dwell in run.dwells() {
+                        for reading in dwell.readings {
+                            if rng.random_bool(1.0 / ONE_IN) {
+                                spoil_reading(run, reading, SIZE, &mut rng);
+                                made += 1;
+                            }
+                        }
+                        for last in dwell.samples.skip(9).step_by(10) {
+                            if rng.random_bool(1.0 / ONE_IN) {
+                                jerk(run, last, &mut rng);
+                                made += 1;
+                            }
+                        }
+                    }
+                }
+                let (outcome, error) = error(&simulated);
+                let [velocity, table] = [Observation::Velocity, Observation::Table]
+                    .map(|observation| rejected(&outcome, observation));
+                (error.norm_squared(), made, velocity, table)
+            })
+            .reduce(
+                || (0.0, 0, 0, 0),
+                |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3),
+            )
+    };
+    let (clean, ..) = squares(false);
+    let (spoilt, made, velocity, table) = squares(true);
+    let ratio = (spoilt / clean).sqrt();
+    println!(
+        "RMS/σ {:.3} clean, {:.3} with outliers, ratio {ratio:.4} over {RUNS} runs; {made} outliers, \
+         rejected {velocity} velocities and {table} readings",
+        (clean / (RUNS as f64 * PARAMETERS as f64)).sqrt(),
+        (spoilt / (RUNS as f64 * PARAMETERS as f64)).sqrt(),
+    );
+    assert!(ratio < 1.1, "{ratio}");
+    let share = (velocity + table) as f64 / made as f64;
+    assert!(
+        (0.9..1.1).contains(&share),
+        "{share} of the outliers rejected"
+    );
+}
+
+#[test]
+fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out() {
+    let mut simulated = Scenario::load("demo").unwrap().simulate(SEED, 0).unwrap();
+    let (_, clean) = error(&simulated);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    // A larger one would still be taken for part of the turn.
+    const HIDDEN: f64 = 12.0;
+    let run = &mut simulated.run;
+    for dwell in &run.dwells()[1..] {
+        spoil_reading(run, dwell.readings.start, HIDDEN, &mut rng);
+    }
+    let dwells = run.dwells();
+    for dwell in &dwells[1..] {
+        jerk(run, dwell.samples.start + 9, &mut rng);
+    }
+    let (outcome, spoilt) = error(&simulated);
+    let shift = (spoilt - clean).amax();
+    let [velocity, table] =
+        [Observation::Velocity, Observation::Table].map(|kind| rejected(&outcome, kind));
+    println!(
+        "{} dwells, rejected {velocity} velocities and {table} readings, shift {shift:.3} σ",
+        dwells.len()
+    );
+    assert!(shift < 1.0, "{shift} σ");
+    // The readings are partly taken for the end of the turn; the velocities only the gate can find.
+    assert_eq!(velocity, dwells.len() - 1);
+    assert!(table < dwells.len());
+}
