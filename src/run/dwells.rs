@@ -24,13 +24,11 @@ const SHORTEST: f64 = 0.5;
 /// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and one that stops still rings.
 const MARGIN: f64 = 0.2;
-/// A table that creeps, or takes up its next position before it turns, shows it in the median of this
+/// A table that creeps, or takes up its next position before it turns, shows it in the mean of this
 /// long a stretch at an end of the dwell, s …
 const CREEP_STRETCH: f64 = 1.0;
 /// … by this many σ.
 const CREEP_SIGMAS: f64 = 5.0;
-/// σ of the median of normal numbers in σ of their mean.
-const MEDIAN: f64 = 1.2533;
 /// Readings at least this far apart tell a slow turn from a standstill, however dense the log, s.
 const APART: f64 = 0.05;
 /// Readings of a standing table differ by less than this many σ of their noise …
@@ -161,17 +159,7 @@ impl Dwell {
     }
 }
 
-/// Component by component; one wild reading does not move it.
-fn median(vectors: &[Vector3<f64>]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = vectors.iter().map(|v| v[axis]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
-    })
-}
-
-/// Cuts off the ends of a standstill at which the median of the readings is not the mean of its
-/// middle.
+/// Cuts off the ends of a standstill at which the mean of the readings is not that of its middle.
 fn settled(table: &TableRecord, standing: Range<usize>) -> Range<usize> {
     let quarter = standing.len() / 4;
     let middle = standing.start + quarter..standing.end - quarter;
@@ -185,12 +173,10 @@ fn settled(table: &TableRecord, standing: Range<usize>) -> Range<usize> {
         return standing;
     }
     let stretch = stretch as usize;
-    let share = MEDIAN.powi(2) / stretch as f64 + 1.0 / middle.len() as f64;
-    let limit = CREEP_SIGMAS * table.reading_sigma * share.sqrt();
+    let sigma = table.reading_sigma * (1.0 / stretch as f64 + 1.0 / middle.len() as f64).sqrt();
     let creeps = |readings: Range<usize>| {
-        let offsets = table.attitude[readings].iter();
-        let offsets: Vec<_> = offsets.map(|a| log(&(a * level.transpose()))).collect();
-        median(&offsets).norm() > limit
+        mean(&table.attitude[readings])
+            .is_some_and(|mean| log(&(mean * level.transpose())).norm() > CREEP_SIGMAS * sigma)
     };
     let mut settled = standing;
     while settled.start + stretch <= middle.start && creeps(settled.start..settled.start + stretch)
