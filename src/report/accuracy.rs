@@ -24,8 +24,8 @@ use crate::study::Accuracy;
 
 pub use document::document;
 
-/// The study as text: what was done, the tables, and a verdict in sentences, those that say that
-/// something is not as it should be with an exclamation mark.
+/// The study as text: what was done, the tables, and a verdict in sentences, those that a user
+/// must know before trusting the figures with an exclamation mark.
 pub fn summary(accuracy: &Accuracy) -> String {
     let mut text = title(accuracy) + "\n";
     let facts = facts::facts(accuracy);
@@ -36,7 +36,7 @@ pub fn summary(accuracy: &Accuracy) -> String {
         let _ = writeln!(text, "  {name:<width$}  {value}");
     }
     for table in tables::tables(accuracy) {
-        let _ = writeln!(text, "\n{}\n{}", table.title, terminal::columns(&table));
+        let _ = write!(text, "\n{}\n{}", table.title, terminal::columns(&table));
     }
     text.push_str("\nVerdict\n");
     for sentence in verdict::verdict(accuracy) {
@@ -74,7 +74,7 @@ fn page(accuracy: &Accuracy, figures: &[Figure]) -> String {
     let body = html! {
         header { h1 { (title) } }
         @if !bad.is_empty() {
-            section.warnings { h2 { "What is not as it should be" } ul { @for s in bad { li { (s.text) } } } }
+            section.warnings { h2 { "To be noted" } ul { @for s in bad { li { (s.text) } } } }
         }
         section { h2 { "What holds" } ul { @for s in good { li { (s.text) } } } }
         section { h2 { "The study" } (pairs::facts(facts::facts(accuracy))) }

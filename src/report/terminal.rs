@@ -156,9 +156,13 @@ pub(super) fn columns(of: &side_by_side::Table) -> String {
     let headings: Vec<&str> = of.headings.iter().map(String::as_str).collect();
     let mut table = table(&headings);
     table.add_rows(of.sections.iter().flatten());
-    let mut text = align(table).to_string();
+    let rows = align(table).to_string();
+    let mut text: String = rows
+        .lines()
+        .map(|row| row.trim_end().to_owned() + "\n")
+        .collect();
     for note in &of.notes {
-        let _ = write!(text, "\n{note}");
+        let _ = writeln!(text, "{note}");
     }
     text
 }

@@ -9,7 +9,7 @@ use super::super::{Figure, ReportError};
 use super::facts::minutes;
 use super::tables;
 use crate::calibration::Group;
-use crate::study::{Accuracy, Ratio};
+use crate::study::{Accuracy, GroupAccuracy, Ratio};
 
 const MARGINS: Margins = Margins {
     left: 56.0,
@@ -42,19 +42,12 @@ pub(super) fn ratio(accuracy: &Accuracy) -> Result<Figure, ReportError> {
                    the best there can be."
         .to_owned();
     let title = "Error over bound";
-    Figure::draw("ratio.svg", title, caption, (1200, 380), |area| {
+    Figure::draw("ratio.svg", title, caption, (1200, 400), |area| {
         let mut panel = by_group(area, &format!("RMS error / RMS bound{kind}"), y)?;
         for (place, ratio) in &ratios {
             whisker(&mut panel, *place, ratio)?;
             panel.marks(&[(*place, ratio.value)], Mark::Dot, Pen::nth(0, 3.0))?;
-            let beside = (12.0, 0.0);
-            let text = tables::ratio(ratio);
-            panel.text(
-                (*place, ratio.value),
-                beside,
-                &text,
-                (HPos::Left, VPos::Center),
-            )?;
+            value_above(&panel, *place, ratio)?;
         }
         panel.finish()
     })
@@ -92,10 +85,7 @@ pub(super) fn gain(accuracy: &Accuracy) -> Result<Figure, ReportError> {
 }
 
 /// Ratios with the place of their group on the axis.
-fn of(
-    accuracy: &Accuracy,
-    ratio: impl Fn(&crate::study::accuracy::GroupAccuracy) -> Option<Ratio>,
-) -> Vec<(f64, Ratio)> {
+fn of(accuracy: &Accuracy, ratio: impl Fn(&GroupAccuracy) -> Option<Ratio>) -> Vec<(f64, Ratio)> {
     let groups = accuracy.groups.iter().enumerate();
     groups
         .filter_map(|(place, g)| Some((place as f64, ratio(g)?)))
@@ -140,11 +130,25 @@ fn bar(panel: &mut Panel, x: f64, ratio: &Ratio, shaded: bool) -> Result<(), Dra
     }
     panel.line(&[foot[0], head[0], head[1], foot[1]], Pen::nth(0, 1.25))?;
     whisker(panel, x, ratio)?;
-    let text = tables::ratio(ratio);
-    let (low, high) = ratio.interval;
     if ratio.value >= 1.0 {
-        panel.text((x, high), (0.0, -5.0), &text, (HPos::Center, VPos::Bottom))
-    } else {
-        panel.text((x, low), (0.0, 5.0), &text, (HPos::Center, VPos::Top))
+        return value_above(panel, x, ratio);
     }
+    let below = (HPos::Center, VPos::Top);
+    panel.text(
+        (x, ratio.interval.0),
+        (0.0, 5.0),
+        &tables::ratio(ratio),
+        below,
+    )
+}
+
+/// The value above its interval.
+fn value_above(panel: &Panel, x: f64, ratio: &Ratio) -> Result<(), DrawError> {
+    let above = (HPos::Center, VPos::Bottom);
+    panel.text(
+        (x, ratio.interval.1),
+        (0.0, -5.0),
+        &tables::ratio(ratio),
+        above,
+    )
 }

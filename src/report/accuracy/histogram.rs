@@ -6,9 +6,10 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::axis::Axis;
 use super::super::canvas::{Area, DrawError, INK, Pen};
-use super::super::number::{count, value};
+use super::super::number::count;
 use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
+use super::tables;
 use crate::calibration::Group;
 use crate::calibration::states::PARAMETERS;
 use crate::study::Accuracy;
@@ -16,14 +17,14 @@ use crate::study::Accuracy;
 /// Half the width of the axis in σ, unless more than one error in twenty lies beyond.
 const REACH: f64 = 5.0;
 const BEYOND: f64 = 0.05;
-const BINS: usize = 40;
+const BINS: usize = 24;
 const CURVE: usize = 400;
 
 pub(super) fn figure(accuracy: &Accuracy) -> Result<Figure, ReportError> {
     let caption = String::from(
         "Density of every parameter's error over the σ that the filter claims for it, all runs. Line: \
-         the standard normal density, which it follows if the σ are true; RMS is then 1. An axis that \
-         ends beyond ±5 says that they are not.",
+         the standard normal density, which it follows if the σ are true; RMS is then 1. Where \
+         the axis ends beyond ±5 they are not, and the line is a spike at zero.",
     );
     Figure::draw(
         "errors.svg",
@@ -81,12 +82,18 @@ fn panel(area: &Area, group: Group, values: &[f64]) -> Result<(), DrawError> {
     let reach = reach(values);
     let steps = steps(values, reach);
     let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
-    let top = steps.iter().map(|step| step.1).fold(normal(0.0), f64::max);
+    let highest = steps.iter().map(|step| step.1).fold(0.0, f64::max);
+    // Errors far beyond their σ are lower than the curve by far: it leaves the panel then.
+    let top = if reach > REACH {
+        highest
+    } else {
+        highest.max(normal(0.0))
+    };
     let mut panel = Panel::new(
         area,
         &format!("{}: density", group.title()),
         Margins {
-            left: 46.0,
+            left: 60.0,
             right: 24.0,
         },
         (Axis::linear(-reach, reach), Axis::linear(0.0, 1.08 * top)),
@@ -104,7 +111,7 @@ fn panel(area: &Area, group: Group, values: &[f64]) -> Result<(), DrawError> {
     let beyond = values.iter().filter(|z| z.abs() > reach).count();
     let mut notes = vec![
         format!("{} values", count(values.len())),
-        format!("RMS {}", value(mean_square.sqrt(), 0.1)),
+        format!("RMS {}", tables::factor(mean_square.sqrt())),
     ];
     if beyond > 0 {
         notes.push(format!("{} beyond ±{REACH}", count(beyond)));
@@ -124,8 +131,9 @@ mod tests {
     fn a_histogram_holds_each_value_once_in_its_own_bin() {
         let steps = steps(&[-0.1, 0.1, 0.1, 7.0, -7.0], 5.0);
         let at = |z: f64| steps.iter().rev().find(|step| step.0 <= z).unwrap().1;
-        assert!((at(0.1) - 2.0 / (5.0 * 0.25)).abs() < 1e-12);
-        assert!((at(-0.1) - 1.0 / (5.0 * 0.25)).abs() < 1e-12);
+        let width = 10.0 / BINS as f64;
+        assert!((at(0.1) - 2.0 / (5.0 * width)).abs() < 1e-12);
+        assert!((at(-0.1) - 1.0 / (5.0 * width)).abs() < 1e-12);
         assert_eq!(at(4.9), 0.0);
     }
 

@@ -5,7 +5,7 @@ use super::super::canvas::{INK, Pen, QUIET};
 use super::super::number::{count, value};
 use super::super::panel::{Margins, Mark, Panel};
 use super::super::{Figure, ReportError};
-use super::tables::interval;
+use super::tables::{self, interval};
 use crate::study::Accuracy;
 
 /// Runs this many times above the upper end of the interval make the axis logarithmic.
@@ -32,7 +32,7 @@ pub(super) fn figure(accuracy: &Accuracy) -> Result<Figure, ReportError> {
     if let Some(anees) = accuracy.anees {
         caption.push_str(&format!(
             " Line: the average over all runs, {}; dashed: its 95 % interval {}.",
-            value(anees.mean, 0.01),
+            tables::mean(anees.mean, anees.interval_95),
             interval(anees.interval_95)
         ));
     }
@@ -81,11 +81,11 @@ pub(super) fn figure(accuracy: &Accuracy) -> Result<Figure, ReportError> {
                 panel.line(&level(anees.mean), Pen::solid(INK, 1.5))?;
                 panel.label(
                     anees.mean,
-                    format!("average {}", value(anees.mean, 0.01)),
+                    format!("average {}", tables::mean(anees.mean, anees.interval_95)),
                     INK,
                 );
             }
-            panel.marks(&converged, Mark::Dot, Pen::nth(0, 1.0))?;
+            panel.marks(&converged, Mark::Dot, Pen::nth(0, 1.75))?;
             panel.marks(&failed, Mark::Cross, Pen::nth(1, 1.75))?;
             panel.finish()
         },

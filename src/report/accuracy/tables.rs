@@ -20,6 +20,20 @@ pub(super) fn interval((low, high): (f64, f64)) -> String {
     format!("{}…{}", value(low, fine), value(high, fine))
 }
 
+/// What ought to be one, with the digits that the width of its interval leaves meaning to.
+pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
+    if mean < 10.0 {
+        value(mean, 0.5 * (high - low))
+    } else {
+        three_digits(mean)
+    }
+}
+
+/// A factor that ought to be one.
+pub(super) fn factor(factor: f64) -> String {
+    mean(factor, (0.99, 1.01))
+}
+
 /// A ratio with the digits that its interval leaves meaning to.
 pub(super) fn ratio(ratio: &Ratio) -> String {
     value(ratio.value, 0.5 * (ratio.interval.1 - ratio.interval.0))
@@ -84,11 +98,11 @@ fn gain(accuracy: &Accuracy) -> Table {
     let headings = vec![
         String::new(),
         "unit".to_owned(),
-        format!("EKF {}", minutes(accuracy.table_time)),
-        format!("closed form {own}"),
+        format!("EKF\n{}", minutes(accuracy.table_time)),
+        format!("closed form\n{own}"),
         "gain".to_owned(),
         "99 % interval".to_owned(),
-        format!("closed form {equal}"),
+        format!("closed form\n{equal}"),
         "gain".to_owned(),
         "99 % interval".to_owned(),
     ];
@@ -118,14 +132,14 @@ fn consistency(accuracy: &Accuracy) -> Table {
         "95 % interval",
         "99.8 % interval",
         "numbers",
-        "lag-one correlation",
-        "99 % if white",
+        "lag-one\ncorrelation",
+        "99 % if\nwhite",
     ];
     let mut rows = Vec::new();
     rows.extend(accuracy.anees.map(|anees| {
         [
             format!("NEES/{}", anees.directions),
-            value(anees.mean, 0.01),
+            mean(anees.mean, anees.interval_95),
             interval(anees.interval_95),
             interval(anees.interval_998),
             count(nees_numbers(accuracy)),
@@ -165,7 +179,7 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
     let white = white_within(nis);
     vec![
         name.to_owned(),
-        value(nis.mean, 0.5 * (nis.interval.1 - nis.interval.0)),
+        mean(nis.mean, nis.interval),
         NONE.to_owned(),
         interval(nis.interval),
         count(nis.count),

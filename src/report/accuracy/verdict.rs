@@ -2,7 +2,7 @@
 
 use super::super::number::{count, value};
 use super::facts::minutes;
-use super::tables::{interval, ratio};
+use super::tables::{self, interval, ratio};
 use crate::calibration::outcome::Nis;
 use crate::imu::Output;
 use crate::study::{Accuracy, GroupAccuracy, Ratio};
@@ -10,7 +10,7 @@ use crate::study::{Accuracy, GroupAccuracy, Ratio};
 /// One thing that the study says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Sentence {
-    /// Whether it is as it should be.
+    /// Whether it is as one would wish.
     pub(super) good: bool,
     /// The sentence.
     pub(super) text: String,
@@ -127,8 +127,8 @@ fn against_bound(accuracy: &Accuracy) -> Sentence {
     }
     let outside = named(accuracy, of, |ratio| beside_one(ratio).is_ne());
     let text = if outside.is_empty() {
-        "The RMS error of every group is the bound's within its 99 % interval: no estimator gets more \
-         out of these runs."
+        "RMS error over bound is 1 within its 99 % interval in every group: nothing shows the filter to \
+         be worse than the best there can be."
             .to_owned()
     } else {
         format!(
@@ -151,7 +151,7 @@ fn nees(accuracy: &Accuracy) -> Sentence {
         };
     };
     let within = |(low, high): (f64, f64)| (low..=high).contains(&anees.mean);
-    let mean = value(anees.mean, 0.01);
+    let mean = tables::mean(anees.mean, anees.interval_95);
     let (inner, outer) = (interval(anees.interval_95), interval(anees.interval_998));
     let (good, text) = if within(anees.interval_95) {
         (
@@ -175,7 +175,7 @@ fn nees(accuracy: &Accuracy) -> Sentence {
         } else {
             ("below", "large")
         };
-        let factor = value(anees.mean.sqrt(), 0.1);
+        let factor = tables::factor(anees.mean.sqrt());
         (
             false,
             format!(
@@ -189,7 +189,7 @@ fn nees(accuracy: &Accuracy) -> Sentence {
 
 fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Sentence {
     let (low, high) = nis.interval;
-    let mean = value(nis.mean, 0.5 * (high - low));
+    let mean = tables::mean(nis.mean, nis.interval);
     let shown = interval(nis.interval);
     if (low..=high).contains(&nis.mean) {
         return Sentence {
@@ -198,7 +198,7 @@ fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Sentence {
         };
     }
     let side = if nis.mean > high { "above" } else { "below" };
-    let factor = value(nis.mean.sqrt(), 0.01);
+    let factor = tables::factor(nis.mean.sqrt());
     let mut text = format!(
         "NIS of {name} {mean} lies {side} its 99.8 % interval {shown}: innovations are {factor} times \
          as large as the filter takes them to be."
