@@ -52,7 +52,7 @@ pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
         "rejected observations",
         match observations {
             0 => "none".to_owned(),
-            _ => format!("{} in {} runs", count(observations), count(runs)),
+            _ => format!("{} in {} of the runs", count(observations), count(runs)),
         },
     ));
     if let (rejections, tested @ 1..) = accuracy.rejections() {
