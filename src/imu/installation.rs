@@ -46,6 +46,11 @@ impl InstallationForm {
         }
     }
 
+    /// Whether every installation in the other form has its equal in this one.
+    pub fn holds(self, other: Self) -> bool {
+        self == other || self != Self::ThreeAngle
+    }
+
     /// The installation matrix of these angles (pure numbers, direction cosines or radians).
     pub fn matrix(self, angles: &SVector<f64, ANGLES>) -> Matrix3<f64> {
         match self {

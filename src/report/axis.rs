@@ -79,6 +79,25 @@ impl Axis {
         }
     }
 
+    /// A logarithmic axis between two positive numbers, ticks at 1, 2 and 5 of each decade.
+    pub(super) fn log_between(low: f64, high: f64) -> Self {
+        if !(low > 0.0 && high.is_finite() && high > low) {
+            return Self::log([low, high].into_iter());
+        }
+        let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
+        let ticks =
+            decades.flat_map(|k| [1.0, 2.0, 5.0].map(|m| (m * 10f64.powi(k), 10f64.powi(k))));
+        Self {
+            scale: Scale::Log,
+            low,
+            high,
+            ticks: ticks
+                .filter(|(x, _)| (low..=high).contains(x))
+                .map(|(x, decade)| (x, number::tick(x, decade)))
+                .collect(),
+        }
+    }
+
     /// An axis to ±`extent` that is linear below `linear` and logarithmic beyond.
     pub(super) fn symlog(linear: f64, extent: f64) -> Self {
         let linear = if linear.is_finite() && linear > 0.0 {
@@ -221,6 +240,8 @@ mod tests {
             Axis::log(std::iter::empty()),
             Axis::symlog(0.0, f64::NAN),
             Axis::places([]),
+            Axis::log_between(f64::INFINITY, 0.0),
+            Axis::log_between(3.0, 3.0),
         ] {
             assert!(axis.high() > axis.low());
             assert!((0..=100).contains(&axis.map(&1.0, (0, 100))));

@@ -11,7 +11,7 @@ use crate::units::{
 };
 
 /// Pairs of a name and a value.
-fn facts(rows: impl IntoIterator<Item = (String, String)>) -> Markup {
+pub(super) fn facts(rows: impl IntoIterator<Item = (String, String)>) -> Markup {
     html! {
         dl { @for (name, value) in rows { div { dt { (name) } dd { (value) } } } }
     }

@@ -18,6 +18,17 @@ impl Group {
         format!("{} {kind}", self.sensor().name())
     }
 
+    /// Its key in documents, such as `gyro.scale_ppm`.
+    pub fn key(self) -> String {
+        let quantity = match (self.kind(), self.sensor()) {
+            (ParameterKind::Scale, _) => "scale_ppm",
+            (ParameterKind::Installation, _) => "installation_arcsec",
+            (ParameterKind::Bias, Sensor::Gyro) => "bias_deg_per_h",
+            (ParameterKind::Bias, Sensor::Accel) => "bias_ug",
+        };
+        format!("{}.{quantity}", self.sensor().name())
+    }
+
     /// Symbol of the unit.
     pub fn unit(self) -> &'static str {
         match (self.kind(), self.sensor()) {

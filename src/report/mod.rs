@@ -3,6 +3,7 @@
 //! Nothing is estimated here. The report draws and lays out what it is given; what it works out is
 //! what showing needs (differences, units, extremes).
 
+pub mod accuracy;
 mod axis;
 mod canvas;
 mod comparison;
@@ -100,16 +101,7 @@ impl Report<'_> {
     /// holds the figures, too, and needs neither the files nor a network.
     pub fn write(&self, directory: &Path) -> Result<(), ReportError> {
         let figures = self.figures()?;
-        let page = page::page(self, &figures);
-        let files = figures
-            .iter()
-            .map(|figure| (figure.file, figure.svg.as_str()))
-            .chain([("index.html", page.as_str())]);
-        for (name, text) in files {
-            let path = directory.join(name);
-            fs::write(&path, text).map_err(|source| ReportError::Write { path, source })?;
-        }
-        Ok(())
+        write_files(directory, &page::page(self, &figures), &figures)
     }
 
     fn figures(&self) -> Result<Vec<Figure>, ReportError> {
@@ -152,6 +144,16 @@ impl Report<'_> {
         let filter = self.outcome.map(|outcome| ("EKF", &outcome.estimate));
         closed.into_iter().chain(filter).collect()
     }
+}
+
+/// Writes a page as `index.html` and its figures into an existing directory.
+fn write_files(directory: &Path, page: &str, figures: &[Figure]) -> Result<(), ReportError> {
+    let figures = figures.iter().map(|f| (f.file, f.svg.as_str()));
+    for (name, text) in figures.chain([("index.html", page)]) {
+        let path = directory.join(name);
+        fs::write(&path, text).map_err(|source| ReportError::Write { path, source })?;
+    }
+    Ok(())
 }
 
 impl Figure {

@@ -5,56 +5,62 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::{Figure, Report, facts, number, tables};
 
 /// The style of every page.
-pub(super) const STYLE: &str = include_str!("style.css");
+const STYLE: &str = include_str!("style.css");
 
 /// The whole page as HTML.
 pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
+    let body = html! {
+        header { h1 { (report.title) } p { (summary(report)) } }
+        (notices(report))
+        section {
+            h2 { "Accuracy of each group" }
+            (tables::groups(report))
+            p.note {
+                "RMS σ is the root mean square of the 1σ that the method claims in the group. "
+                @if report.truth.is_some() { "Errors are estimate less truth. " }
+                @if let Some(closed) = report.closed_form { "Closed form: " (closed.note) "." }
+            }
+        }
+        @if let Some(estimate) = report.estimate() {
+            section { h2 { "Parameters" } (tables::estimates(report, estimate)) }
+        }
+        @if let Some(outcome) = report.outcome {
+            section { h2 { "Consistency" } (tables::consistency(outcome))
+                p.note {
+                    "A NIS within its interval and a correlation near zero say that the innovations \
+                    are as large and as white as the filter claims."
+                }
+            }
+            section { h2 { "Passes" } (tables::passes(outcome)) }
+        }
+        @for figure in figures { (drawn(figure)) }
+        @if let Some(outcome) = report.outcome {
+            section { h2 { "What the path saw least" } (tables::weakest(outcome))
+                p.note {
+                    "Combinations of parameters, each in units of its prior σ, that the run saw \
+                    independently of each other; the ratio is posterior to prior σ. " i { "With" }
+                    " joins errors of the same sign, " i { "against" } " errors of opposite sign."
+                }
+            }
+        }
+        section { h2 { "Model and method" } (facts::model(report)) }
+        section { h2 { "Run" } (facts::run(report.run)) }
+    };
+    document(report.title, &body)
+}
+
+/// A page as HTML that needs nothing else.
+pub(super) fn document(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (report.title) }
+                title { (title) }
                 style { (PreEscaped(STYLE)) }
             }
-            body {
-                header { h1 { (report.title) } p { (summary(report)) } }
-                (notices(report))
-                section {
-                    h2 { "Accuracy of each group" }
-                    (tables::groups(report))
-                    p.note {
-                        "RMS σ is the root mean square of the 1σ that the method claims in the group. "
-                        @if report.truth.is_some() { "Errors are estimate less truth. " }
-                        @if let Some(closed) = report.closed_form { "Closed form: " (closed.note) "." }
-                    }
-                }
-                @if let Some(estimate) = report.estimate() {
-                    section { h2 { "Parameters" } (tables::estimates(report, estimate)) }
-                }
-                @if let Some(outcome) = report.outcome {
-                    section { h2 { "Consistency" } (tables::consistency(outcome))
-                        p.note {
-                            "A NIS within its interval and a correlation near zero say that the innovations \
-                            are as large and as white as the filter claims."
-                        }
-                    }
-                    section { h2 { "Passes" } (tables::passes(outcome)) }
-                }
-                @for figure in figures { (drawn(figure)) }
-                @if let Some(outcome) = report.outcome {
-                    section { h2 { "What the path saw least" } (tables::weakest(outcome))
-                        p.note {
-                            "Combinations of parameters, each in units of its prior σ, that the run saw                             independently of each other; the ratio is posterior to prior σ. " i { "With" }
-                            " joins errors of the same sign, " i { "against" } " errors of opposite sign."
-                        }
-                    }
-                }
-                section { h2 { "Model and method" } (facts::model(report)) }
-                section { h2 { "Run" } (facts::run(report.run)) }
-                footer { "turncal " (env!("CARGO_PKG_VERSION")) }
-            }
+            body { (body) footer { "turncal " (env!("CARGO_PKG_VERSION")) } }
         }
     };
     page.into_string()

@@ -148,6 +148,22 @@ impl<'a, 'b> Panel<'a, 'b> {
         Ok(())
     }
 
+    /// Writes text beside a point, moved by some shown pixels to the right and down.
+    pub(super) fn text(
+        &self,
+        point: (f64, f64),
+        (right, down): (f64, f64),
+        text: &str,
+        anchor: (HPos, VPos),
+    ) -> Result<(), DrawError> {
+        let (at, base) = (self.chart.backend_coord(&point), self.area.get_base_pixel());
+        let place = (
+            f64::from(at.0 - base.0) / FINE + right,
+            f64::from(at.1 - base.1) / FINE + down,
+        );
+        write(self.area, text, place, anchor, &INK, 0.95)
+    }
+
     /// Notes a label for the right margin at a height.
     pub(super) fn label(&mut self, y: f64, text: impl Into<String>, color: RGBColor) {
         if y.is_finite() {

@@ -4,11 +4,10 @@ mod figure;
 mod page;
 
 use std::path::Path;
-use std::{fs, io};
 
-use super::ReportError;
 use super::group::{Group, short_name};
 use super::number::{count, sigma, three_digits, value};
+use super::{ReportError, write_files};
 use crate::calibration::states::ParameterVector;
 use crate::calibration::{ChiSquare, Comparison, Nees, Side};
 use crate::imu::{InstallationForm, Sensor};
@@ -70,11 +69,7 @@ pub fn tables(comparison: &Comparison) -> Vec<Table> {
 pub fn write(comparison: &Comparison, directory: &Path) -> Result<(), ReportError> {
     let figure = figure::figure(comparison)?;
     let page = page::page(comparison, &figure);
-    for (name, text) in [(figure.file, &figure.svg), ("index.html", &page)] {
-        let path = directory.join(name);
-        fs::write(&path, text).map_err(|source: io::Error| ReportError::Write { path, source })?;
-    }
-    Ok(())
+    write_files(directory, &page, &[figure])
 }
 
 /// Indices of the compared parameters of a group.

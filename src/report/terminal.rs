@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::Report;
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
+use super::{Report, side_by_side};
 use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
@@ -149,6 +149,22 @@ fn passes(outcome: &Outcome) -> String {
         nis(&consistency.velocity),
         nis(&consistency.table),
     )
+}
+
+/// A table in columns, its sections apart, with its notes.
+pub(super) fn columns(of: &side_by_side::Table) -> String {
+    let headings: Vec<&str> = of.headings.iter().map(String::as_str).collect();
+    let mut table = table(&headings);
+    table.add_rows(of.sections.iter().flatten());
+    let rows = align(table).to_string();
+    let mut text: String = rows
+        .lines()
+        .map(|row| row.trim_end().to_owned() + "\n")
+        .collect();
+    for note in &of.notes {
+        let _ = writeln!(text, "{note}");
+    }
+    text
 }
 
 /// A table without frames: first column to the left, all others to the right.

@@ -3,5 +3,5 @@
 pub mod accuracy;
 mod ratio;
 
-pub use accuracy::{Accuracy, AccuracyStudy};
+pub use accuracy::{Accuracy, AccuracyStudy, GroupAccuracy};
 pub use ratio::Ratio;

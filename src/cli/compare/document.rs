@@ -6,7 +6,7 @@ use serde::Serialize;
 use turncal::calibration::outcome::parameter_name;
 use turncal::calibration::states::ParameterVector;
 use turncal::calibration::{ChiSquare, Comparison, Nees, Side};
-use turncal::imu::{InstallationForm, ParameterKind, Sensor};
+use turncal::imu::InstallationForm;
 use turncal::report::group::Group;
 use turncal::run::record::BodyFrame;
 
@@ -100,7 +100,7 @@ impl<'a> Document<'a> {
                 .map(|group| {
                     let sides = comparison.sides.iter();
                     let spreads = sides.map(|side| spread(comparison, group, side));
-                    (key(group), spreads.collect())
+                    (group.key(), spreads.collect())
                 })
                 .collect(),
             parameters: comparison
@@ -114,17 +114,6 @@ impl<'a> Document<'a> {
             }),
         }
     }
-}
-
-/// Such as `gyro.scale_ppm`, as in every document of the program.
-fn key(group: Group) -> String {
-    let quantity = match (group.kind(), group.sensor()) {
-        (ParameterKind::Scale, _) => "scale_ppm",
-        (ParameterKind::Installation, _) => "installation_arcsec",
-        (ParameterKind::Bias, Sensor::Gyro) => "bias_deg_per_h",
-        (ParameterKind::Bias, Sensor::Accel) => "bias_ug",
-    };
-    format!("{}.{quantity}", group.sensor().name())
 }
 
 fn name(index: usize) -> String {
@@ -166,7 +155,7 @@ fn parameter(comparison: &Comparison, index: usize) -> Parameter<'_> {
     let value = comparison.reference.vector()[index];
     Parameter {
         name: name(index),
-        group: key(group),
+        group: group.key(),
         reference_value: comparison.scale_factor(index).unwrap_or(value / unit),
         reference_sigma: at(comparison.reference.sigma()),
         calibrations: comparison
@@ -188,7 +177,7 @@ fn of_parameter(scatter: &turncal::calibration::ParameterScatter) -> ParameterSc
     let unit = group.unit_value();
     ParameterScatter {
         name: name(scatter.index),
-        group: key(group),
+        group: group.key(),
         count: scatter.count,
         mean_less_reference: scatter.mean / unit,
         mean_sigma: scatter.mean_sigma.map(|s| s / unit),

@@ -87,10 +87,10 @@ impl AccuracyStudy {
 
     /// The filter's form if it can hold the truth, else the general one, which is what could be had.
     fn bound_form(&self, truth: &PerSensor<Triad>) -> InstallationForm {
-        if self.form == InstallationForm::ThreeAngle && truth.gyro.form != self.form {
-            InstallationForm::General
-        } else {
+        if self.form.holds(truth.gyro.form) {
             self.form
+        } else {
+            InstallationForm::General
         }
     }
 }

@@ -1,0 +1,189 @@
+//! The tables, for terminal and page alike.
+
+use super::super::number::{count, three_digits, value};
+use super::super::side_by_side::Table;
+use super::facts::minutes;
+use super::verdict::white_within;
+use crate::calibration::outcome::Nis;
+use crate::imu::ParameterKind;
+use crate::study::{Accuracy, GroupAccuracy, Ratio};
+
+const NONE: &str = "–";
+
+pub(super) fn tables(accuracy: &Accuracy) -> Vec<Table> {
+    vec![bound(accuracy), gain(accuracy), consistency(accuracy)]
+}
+
+/// An interval with the digits that its width leaves meaning to.
+pub(super) fn interval((low, high): (f64, f64)) -> String {
+    let fine = 0.5 * (high - low);
+    format!("{}…{}", value(low, fine), value(high, fine))
+}
+
+/// What ought to be one, with the digits that the width of its interval leaves meaning to.
+pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
+    if mean < 10.0 {
+        value(mean, 0.5 * (high - low))
+    } else {
+        three_digits(mean)
+    }
+}
+
+/// A factor that ought to be one.
+pub(super) fn factor(factor: f64) -> String {
+    mean(factor, (0.99, 1.01))
+}
+
+/// A ratio with the digits that its interval leaves meaning to.
+pub(super) fn ratio(ratio: &Ratio) -> String {
+    value(ratio.value, 0.5 * (ratio.interval.1 - ratio.interval.0))
+}
+
+fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
+    of.map_or([NONE; 2].map(str::to_owned), |of| {
+        [ratio(of), interval(of.interval)]
+    })
+}
+
+/// A row for each group, a section for each triad.
+fn by_group(
+    accuracy: &Accuracy,
+    cells: impl Fn(&GroupAccuracy) -> Vec<String>,
+) -> Vec<Vec<Vec<String>>> {
+    let row = |of: &GroupAccuracy| {
+        let mut row = vec![of.group.title(), of.group.unit().to_owned()];
+        row.extend(cells(of));
+        row
+    };
+    let triads = accuracy.groups.chunks(ParameterKind::ALL.len());
+    triads
+        .map(|groups| groups.iter().map(row).collect())
+        .collect()
+}
+
+fn bound(accuracy: &Accuracy) -> Table {
+    let headings = [
+        "",
+        "unit",
+        "RMS error",
+        "RMS σ",
+        "RMS bound",
+        "error/bound",
+        "99 % interval",
+    ];
+    Table {
+        title: "EKF against the Cramér–Rao bound",
+        headings: headings.map(str::to_owned).to_vec(),
+        sections: by_group(accuracy, |of| {
+            let unit = of.group.unit_value();
+            [of.filter, of.claimed, of.bound]
+                .map(|rms| three_digits(rms / unit))
+                .into_iter()
+                .chain(ratio_cells(of.ratio.as_ref()))
+                .collect()
+        }),
+        notes: [
+            "RMS over all runs and the parameters of a group; σ: what the filter claims.",
+            "Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    }
+}
+
+fn gain(accuracy: &Accuracy) -> Table {
+    let baseline = &accuracy.baseline;
+    let equal = baseline.equal_time().map_or(NONE.to_owned(), minutes);
+    let own = minutes(baseline.table_time);
+    let headings = vec![
+        String::new(),
+        "unit".to_owned(),
+        format!("EKF\n{}", minutes(accuracy.table_time)),
+        format!("closed form\n{own}"),
+        "gain".to_owned(),
+        "99 % interval".to_owned(),
+        format!("closed form\n{equal}"),
+        "gain".to_owned(),
+        "99 % interval".to_owned(),
+    ];
+    Table {
+        title: "EKF against the closed form, RMS error",
+        headings,
+        sections: by_group(accuracy, |of| {
+            let shown = |rms: f64| three_digits(rms / of.group.unit_value());
+            let some = |rms: Option<f64>| rms.map_or(NONE.to_owned(), shown);
+            let mut row = vec![shown(of.filter), some(of.closed_form)];
+            row.extend(ratio_cells(of.gain.as_ref()));
+            row.push(some(of.closed_form_in_equal_time));
+            row.extend(ratio_cells(of.gain_in_equal_time.as_ref()));
+            row
+        }),
+        notes: vec![
+            "Gain: error of the closed form over error of the EKF, above 1 where the EKF is better."
+                .to_owned(),
+        ],
+    }
+}
+
+fn consistency(accuracy: &Accuracy) -> Table {
+    let headings = [
+        "",
+        "mean",
+        "95 % interval",
+        "99.8 % interval",
+        "numbers",
+        "lag-one\ncorrelation",
+        "99 % if\nwhite",
+    ];
+    let mut rows = Vec::new();
+    rows.extend(accuracy.anees.map(|anees| {
+        [
+            format!("NEES/{}", anees.directions),
+            mean(anees.mean, anees.interval_95),
+            interval(anees.interval_95),
+            interval(anees.interval_998),
+            count(nees_numbers(accuracy)),
+            NONE.to_owned(),
+            NONE.to_owned(),
+        ]
+        .to_vec()
+    }));
+    for (name, nis) in [
+        ("NIS zero velocity", &accuracy.velocity),
+        ("NIS table attitude", &accuracy.table),
+    ] {
+        if nis.count > 0 {
+            rows.push(nis_row(name, nis));
+        }
+    }
+    Table {
+        title: "Consistency",
+        headings: headings.map(str::to_owned).to_vec(),
+        sections: vec![rows],
+        notes: [
+            "NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.",
+            "Both are one if σ are true; the intervals are χ².",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    }
+}
+
+/// Number of independent directions in all runs.
+fn nees_numbers(accuracy: &Accuracy) -> usize {
+    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
+    filtered.filter_map(|f| Some(f.nees?.count)).sum()
+}
+
+fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
+    let white = white_within(nis);
+    vec![
+        name.to_owned(),
+        mean(nis.mean, nis.interval),
+        NONE.to_owned(),
+        interval(nis.interval),
+        count(nis.count),
+        value(nis.lag_one, white),
+        format!("±{}", value(white, white)),
+    ]
+}

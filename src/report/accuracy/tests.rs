@@ -1,0 +1,154 @@
+//! What holds of the report of any study.
+
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+use super::*;
+use crate::calibration::Group;
+use crate::imu::InstallationForm;
+use crate::simulation::Scenario;
+use crate::study::AccuracyStudy;
+
+/// Three runs of the demo at a low sample rate.
+fn small() -> Accuracy {
+    static STUDY: OnceLock<Accuracy> = OnceLock::new();
+    let study = || {
+        let mut scenario = Scenario::load("demo").unwrap();
+        scenario.integrator.period = 0.05;
+        let (form, runs, seed) = (InstallationForm::General, 3, 7);
+        let study = AccuracyStudy {
+            scenario,
+            form,
+            runs,
+            seed,
+        };
+        study.run(&|| {}).unwrap()
+    };
+    STUDY.get_or_init(study).clone()
+}
+
+/// The same as if the filter had failed on every run.
+fn all_failed() -> Accuracy {
+    let mut accuracy = small();
+    for trial in &mut accuracy.trials {
+        trial.failure = Some("singular <IMU>".to_owned());
+        trial.filtered = None;
+    }
+    for group in &mut accuracy.groups {
+        (group.filter, group.claimed) = (f64::NAN, f64::NAN);
+        (group.ratio, group.gain, group.gain_in_equal_time) = (None, None, None);
+        for point in &mut group.filter_against_time {
+            point.1 = f64::NAN;
+        }
+    }
+    accuracy.anees = None;
+    for nis in [&mut accuracy.velocity, &mut accuracy.table] {
+        (nis.mean, nis.lag_one, nis.count) = (f64::NAN, f64::NAN, 0);
+    }
+    accuracy
+}
+
+fn json(accuracy: &Accuracy) -> Value {
+    serde_json::to_value(document(accuracy)).unwrap()
+}
+
+/// Sentences that say that something is wrong.
+fn doubts(accuracy: &Accuracy) -> String {
+    let doubts = verdict::verdict(accuracy).into_iter().filter(|s| !s.good);
+    doubts.map(|s| s.text + "\n").collect()
+}
+
+#[test]
+fn every_figure_is_a_file_and_on_the_page_whether_the_filter_works_or_not() {
+    for accuracy in [small(), all_failed()] {
+        let directory = tempfile::tempdir().unwrap();
+        write(&accuracy, directory.path()).unwrap();
+        let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
+        let page = read("index.html");
+        for name in ["errors", "ratio", "nees", "gain", "time"] {
+            let svg = read(&format!("{name}.svg"));
+            assert!(svg.starts_with("<svg width=\"1200\""), "{name}");
+            assert!(svg.matches("<text").count() > 5, "{name} has labels");
+            assert!(page.contains(&format!("{name}.svg")), "{name}");
+        }
+        assert!(!page.contains("<IMU>"), "text is escaped");
+        for text in [page, summary(&accuracy)] {
+            assert!(!text.contains("NaN") && !text.contains("inf"));
+        }
+    }
+}
+
+#[test]
+fn a_document_gives_every_group_in_the_unit_of_its_key() {
+    let accuracy = small();
+    let document = json(&accuracy);
+    assert_eq!(document["runs"], 3);
+    assert_eq!(document["failures"], 0);
+    for (group, key) in Group::all().zip([
+        "gyro.scale_ppm",
+        "gyro.installation_arcsec",
+        "gyro.bias_deg_per_h",
+        "accel.scale_ppm",
+        "accel.installation_arcsec",
+        "accel.bias_ug",
+    ]) {
+        let of = accuracy.groups.iter().find(|g| g.group == group).unwrap();
+        let number = |name: &str| document[key][name].as_f64().unwrap();
+        assert_eq!(number("ekf_rms"), of.filter / group.unit_value());
+        let (ekf, bound) = (number("ekf_rms"), number("bound_rms"));
+        assert!((ekf / bound / number("ratio") - 1.0).abs() < 1e-9);
+        let (closed, gain) = (number("six_position_rms"), number("gain"));
+        assert!((closed / ekf / gain - 1.0).abs() < 1e-9);
+        assert_eq!(number("ekf_table_time_s"), accuracy.table_time);
+    }
+    assert!(document["anees_interval"][1].as_f64().unwrap() > 1.0);
+}
+
+#[test]
+fn a_study_without_an_estimate_counts_its_failures_and_has_null_for_what_it_cannot_say() {
+    let accuracy = all_failed();
+    let document = json(&accuracy);
+    assert_eq!(document["failures"], 3);
+    assert_eq!(document["failure_reasons"][1]["run"], 1);
+    assert!(document["anees"].is_null() && document["gyro.scale_ppm"]["ekf_rms"].is_null());
+    assert!(doubts(&accuracy).contains("3 of 3 runs failed"));
+    assert!(summary(&accuracy).contains("run 0: singular"));
+}
+
+#[test]
+fn sigma_that_are_too_small_are_called_so() {
+    let mut accuracy = small();
+    let anees = accuracy.anees.as_mut().unwrap();
+    anees.mean = 1.0;
+    assert!(!doubts(&accuracy).contains("ANEES"));
+    accuracy.anees.as_mut().unwrap().mean = 4.0;
+    let doubts = doubts(&accuracy);
+    assert!(doubts.contains("too small"), "{doubts}");
+    assert!(doubts.contains("2.000 times"), "{doubts}");
+}
+
+#[test]
+fn a_group_in_which_the_closed_form_is_better_is_named() {
+    let mut accuracy = small();
+    let gain = accuracy.groups[5].gain.as_mut().unwrap();
+    (gain.value, gain.interval) = (0.5, (0.4, 0.6));
+    let doubts = doubts(&accuracy);
+    let line = doubts
+        .lines()
+        .find(|l| l.contains("less accurate"))
+        .unwrap();
+    assert!(line.contains("accel bias D 0.50 (0.40…0.60)"), "{line}");
+    assert!(!line.contains("gyro scale"), "{line}");
+}
+
+#[test]
+fn a_form_that_cannot_hold_the_truth_is_charged_with_what_it_costs() {
+    let mut accuracy = small();
+    assert!(!doubts(&accuracy).contains("cannot hold"));
+    accuracy.study.form = InstallationForm::ThreeAngle;
+    assert!(doubts(&accuracy).contains("three-angle form cannot hold the truth, which is general"));
+    assert_eq!(json(&accuracy)["form_holds_truth"], false);
+    accuracy.study.scenario.installation.form = InstallationForm::ThreeAngle;
+    assert!(!doubts(&accuracy).contains("cannot hold"));
+}
