@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use turncal::models::{InstallationModel, Place};
+use turncal::report;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
@@ -80,34 +81,17 @@ impl Accuracy {
         let runs = Runs::new(self.runs);
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);
-        print(
-            format!(
-                "{:#?} {:?}",
-                accuracy
-                    .groups
-                    .iter()
-                    .map(|g| (
-                        g.group,
-                        g.filter,
-                        g.claimed,
-                        g.bound,
-                        g.ratio,
-                        g.gain,
-                        g.gain_in_equal_time
-                    ))
-                    .collect::<Vec<_>>(),
-                (
-                    accuracy.anees,
-                    accuracy.velocity,
-                    accuracy.table,
-                    accuracy.failures().collect::<Vec<_>>(),
-                    accuracy.rejections()
-                )
-            )
-            .as_bytes(),
-        )?;
         if let Some(directory) = directory {
+            report::accuracy::write(&accuracy, &directory.path())?;
             directory.commit()?;
+        }
+        if self.json {
+            let document = report::accuracy::document(&accuracy);
+            return print((serde_json::to_string_pretty(&document)? + "\n").as_bytes());
+        }
+        print(report::accuracy::summary(&accuracy).as_bytes())?;
+        if let Some(target) = target {
+            eprintln!("\nreport: {}", target.join("index.html").display());
         }
         Ok(())
     }
