@@ -3,6 +3,7 @@
 mod cli;
 mod compare;
 mod door;
+mod navigation;
 mod recorded;
 mod shared;
 mod simulated;
