@@ -1,4 +1,5 @@
 use nalgebra::{Complex, SMatrix, SVector, Vector3};
+use serde_json::Value;
 use turncal::attitude::{exp, from_pitch_roll_heading};
 use turncal::earth::{Curvature, ROTATION_RATE, normal_gravity};
 use turncal::imu::{InstallationForm, PerSensor, Sensor, Triad, TriadVector};
@@ -7,14 +8,39 @@ use turncal::navigation::{
     ErrorModel, ErrorVector, Height, Increments, NavigationError, Sensitivity, Solution, Strapdown,
     sensed_errors,
 };
-use turncal::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
+use turncal::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, NAUTICAL_MILE, PPM};
 
-use super::{HOUR, Sensed, hourly, standing};
+use super::{HOUR, Sensed, hourly, numbers, standing};
 
 const HELD: Height = Height::Held {
     height: 0.0,
     velocity: 0.0,
 };
+
+/// Largest differences of the linear model from hourly pitch, roll, heading (°), velocity (m/s) and
+/// position (nmile) of a body that stands.
+pub fn apart_from(expected: &Value, truth: &Solution, error: Sensed) -> [f64; 3] {
+    let (_, force) = truth.steady();
+    let step = ErrorModel::about(truth, &force, HELD).over(HOUR);
+    let h = NavigationError::by_state(truth).unwrap();
+    let mut sensitivity = Sensitivity::<INPUTS>::new();
+    let mut apart = [0f64; 3];
+    for row in expected.as_array().unwrap() {
+        let row = numbers(row);
+        let found = h * sensitivity.errors(&error.input());
+        let attitude = found.fixed_rows::<3>(0) / DEGREE;
+        let differences = [
+            (attitude - Vector3::new(row[0], row[1], row[2])).amax(),
+            found.fixed_rows::<2>(3).norm() - row[3],
+            found.fixed_rows::<2>(6).norm() / NAUTICAL_MILE - row[4],
+        ];
+        for (apart, difference) in apart.iter_mut().zip(differences) {
+            *apart = apart.max(difference.abs());
+        }
+        sensitivity.advance(&step, &SMatrix::identity());
+    }
+    apart
+}
 
 /// Periods in s of the natural motions of the held model.
 fn periods(truth: &Solution) -> Vec<f64> {
@@ -141,9 +167,7 @@ fn linear_and_nonlinear_models_agree_within_one_percent_of_the_largest_error() {
     ];
     for (gyro, accel) in cases {
         let nonlinear = hourly(&truth, &truth, Sensed { gyro, accel }, 10.0, 40);
-        let mut input = SVector::<f64, INPUTS>::zeros();
-        input.fixed_rows_mut::<3>(0).copy_from(&gyro);
-        input.fixed_rows_mut::<3>(3).copy_from(&accel);
+        let input = Sensed { gyro, accel }.input();
         let mut sensitivity = Sensitivity::<INPUTS>::new();
         let mut largest = SVector::<f64, STATES>::zeros();
         let mut apart = largest;
