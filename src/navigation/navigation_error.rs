@@ -112,10 +112,10 @@ mod tests {
 
     fn truth() -> Solution {
         Solution {
-            attitude: from_pitch_roll_heading(0.4, -0.9, 3.1415),
+            attitude: from_pitch_roll_heading(0.4, -0.9, PI - 5e-5),
             velocity: Vector3::new(10.0, -20.0, 1.0),
             latitude: -0.6,
-            longitude: 3.1415,
+            longitude: PI - 5e-5,
             height: 500.0,
         }
     }
