@@ -67,6 +67,17 @@ pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f
     exp(Vector3::z() * -heading) * exp(Vector3::x() * pitch) * exp(Vector3::y() * roll)
 }
 
+/// Pitch, roll and heading in radians of `C_b_n`, the inverse of [`from_pitch_roll_heading`]. Pitch is
+/// within ±π/2, the others within ±π; at a pitch of ±π/2 roll and heading are not apart.
+pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
+    // The hypotenuse keeps digits near ±π/2 that an arcsine loses.
+    [
+        c[(2, 1)].atan2(c[(2, 0)].hypot(c[(2, 2)])),
+        (-c[(2, 0)]).atan2(c[(2, 2)]),
+        c[(0, 1)].atan2(c[(1, 1)]),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,6 +108,15 @@ mod tests {
         let nose = from_pitch_roll_heading(0.1, 0.0, 0.7) * Vector3::y();
         let right = from_pitch_roll_heading(0.0, 0.1, 0.7) * Vector3::x();
         assert!(nose.z > 0.0 && right.z < 0.0);
+    }
+
+    #[test]
+    fn pitch_roll_and_heading_come_back_from_the_matrix() {
+        for angles in [[0.3, -0.2, 2.9], [-1.5, 3.0, -1.7], [0.0, 0.0, 0.0]] {
+            let [pitch, roll, heading] = angles;
+            let back = to_pitch_roll_heading(&from_pitch_roll_heading(pitch, roll, heading));
+            assert_relative_eq!(back[..], angles[..], epsilon = 1e-14);
+        }
     }
 
     #[test]

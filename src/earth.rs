@@ -1,4 +1,4 @@
-//! The Earth as seen by a laboratory that stands still on it.
+//! The Earth as seen by an instrument on it.
 //!
 //! WGS-84 (NIMA TR8350.2, 3rd ed., tables 3.1 and 3.4): ellipsoid, rotation rate and normal gravity
 //! (Somigliana's closed form, continued in height by TR8350.2 Eq. 4-3).
@@ -28,6 +28,65 @@ pub fn normal_gravity(latitude: f64, height: f64) -> f64 {
     surface
         * (1.0 - 2.0 * h * (1.0 + FLATTENING + CENTRIFUGAL_RATIO - 2.0 * FLATTENING * s2)
             + 3.0 * h * h)
+}
+
+/// Derivatives of [`normal_gravity`] by latitude, m/s² per rad, and by height, m/s² per m.
+pub fn normal_gravity_gradient(latitude: f64, height: f64) -> (f64, f64) {
+    let (s, c) = latitude.sin_cos();
+    let s2 = s * s;
+    let surface = normal_gravity(latitude, 0.0);
+    let h = height / SEMI_MAJOR_AXIS;
+    let fall = 2.0 * (1.0 + FLATTENING + CENTRIFUGAL_RATIO - 2.0 * FLATTENING * s2);
+    let of_surface = surface
+        * (SOMIGLIANA / (1.0 + SOMIGLIANA * s2)
+            + 0.5 * ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED * s2));
+    let by_s2 = of_surface * (1.0 - h * fall + 3.0 * h * h) + surface * 4.0 * FLATTENING * h;
+    (
+        by_s2 * 2.0 * s * c,
+        surface * (6.0 * h - fall) / SEMI_MAJOR_AXIS,
+    )
+}
+
+/// Earth rotation `ω_ie` in East-North-Up, rad/s.
+#[inline]
+pub fn earth_rate_n(latitude: f64) -> Vector3<f64> {
+    let (s, c) = latitude.sin_cos();
+    Vector3::new(0.0, ROTATION_RATE * c, ROTATION_RATE * s)
+}
+
+/// Radii of curvature of the ellipsoid in m. (The paper's Eq. 13 calls them polar and equatorial
+/// radius; meridian and prime vertical are meant.)
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curvature {
+    /// Of the meridian, `R_M`: north and south.
+    pub meridian: f64,
+    /// Of the prime vertical, `R_N`: east and west.
+    pub prime_vertical: f64,
+}
+
+impl Curvature {
+    /// The radii at a geodetic latitude in radians (Groves, *Principles of GNSS, Inertial, and
+    /// Multisensor Integrated Navigation Systems*, 2nd ed., Eqs. 2.105 and 2.106).
+    #[inline]
+    pub fn at(latitude: f64) -> Self {
+        let w2 = 1.0 - ECCENTRICITY_SQUARED * latitude.sin().powi(2);
+        let prime_vertical = SEMI_MAJOR_AXIS / w2.sqrt();
+        Self {
+            meridian: prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / w2,
+            prime_vertical,
+        }
+    }
+
+    /// Derivatives of the radii by latitude, m per rad.
+    pub fn slope(latitude: f64) -> Self {
+        let (s, c) = latitude.sin_cos();
+        let at = Self::at(latitude);
+        let relative = ECCENTRICITY_SQUARED * s * c / (1.0 - ECCENTRICITY_SQUARED * s * s);
+        Self {
+            meridian: 3.0 * at.meridian * relative,
+            prime_vertical: at.prime_vertical * relative,
+        }
+    }
 }
 
 /// A place on the Earth where a turntable stands.
@@ -61,8 +120,7 @@ impl Site {
 
     /// Earth rotation `ω_ie` in East-North-Up, rad/s.
     pub fn earth_rate_n(&self) -> Vector3<f64> {
-        let (s, c) = self.latitude.sin_cos();
-        Vector3::new(0.0, ROTATION_RATE * c, ROTATION_RATE * s)
+        earth_rate_n(self.latitude)
     }
 }
 
@@ -88,5 +146,42 @@ mod tests {
         // 0.3086 mGal/m, Torge, Geodesy, 4th ed., §4.2.1.
         let fall = normal_gravity(45.0 * DEGREE, 0.0) - normal_gravity(45.0 * DEGREE, 100.0);
         assert_abs_diff_eq!(fall, 30.86e-5, epsilon = 0.02e-5);
+    }
+
+    #[test]
+    fn radii_of_curvature_meet_the_axes_of_the_ellipsoid() {
+        // b²/a and a at the equator, a²/b at the pole (TR8350.2, table 3.3: b and c).
+        let equator = Curvature::at(0.0);
+        assert_abs_diff_eq!(equator.meridian, 6_335_439.327_3, epsilon = 1e-4);
+        assert_abs_diff_eq!(equator.prime_vertical, SEMI_MAJOR_AXIS);
+        let pole = Curvature::at(90.0 * DEGREE);
+        assert_abs_diff_eq!(pole.meridian, 6_399_593.625_8, epsilon = 1e-4);
+        assert_abs_diff_eq!(pole.prime_vertical, 6_399_593.625_8, epsilon = 1e-4);
+    }
+
+    #[test]
+    fn gradients_are_the_derivatives_of_gravity_and_radii() {
+        let (latitude, height, step) = (-0.6, 9000.0, 1e-4);
+        let by_latitude =
+            |f: &dyn Fn(f64) -> f64| (f(latitude + step) - f(latitude - step)) / (2.0 * step);
+        let (north, up) = normal_gravity_gradient(latitude, height);
+        assert_abs_diff_eq!(
+            north,
+            by_latitude(&|l| normal_gravity(l, height)),
+            epsilon = 1e-9
+        );
+        let rise = normal_gravity(latitude, height + 1.0) - normal_gravity(latitude, height - 1.0);
+        assert_abs_diff_eq!(up, 0.5 * rise, epsilon = 1e-14);
+        let slope = Curvature::slope(latitude);
+        assert_abs_diff_eq!(
+            slope.meridian,
+            by_latitude(&|l| Curvature::at(l).meridian),
+            epsilon = 1e-2
+        );
+        assert_abs_diff_eq!(
+            slope.prime_vertical,
+            by_latitude(&|l| Curvature::at(l).prime_vertical),
+            epsilon = 1e-2
+        );
     }
 }

@@ -216,4 +216,9 @@ impl CorrectedResponse {
     pub(super) fn new(triad: &Triad, correction: &Matrix3<f64>) -> Self {
         Self(triad.response().map(|w| correction * w))
     }
+
+    /// Error of the computed input by one parameter's error, at an input.
+    pub(super) fn error(&self, parameter: usize, u: &Vector3<f64>) -> Vector3<f64> {
+        self.0[parameter] * u.push(1.0)
+    }
 }

@@ -1,19 +1,29 @@
-//! Strapdown navigation and its error model.
+//! Strapdown navigation and its error model, twice.
 //!
-//! Mechanisation and errors refer to a frame that is fixed to the Earth at the site (East-North-Up
+//! [`Navigator`] serves calibration: its frame is fixed to the Earth at the site (East-North-Up
 //! there). A turntable stays where it is, so gravity and Earth rate are those of the site, not of
 //! the computed position, and no transport rate arises: the equations are exact for the truth
 //! (`V = 0` at rest) and linear in velocity and position.
 //!
-//! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13 at a
-//! standing site.
+//! [`Strapdown`] goes over the ellipsoid, nonlinear, and shows what a calibration is worth;
+//! [`ErrorModel`] is its linear error model, [`NavigationError`] what is reported.
+//!
+//! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13.
 
 mod block;
+pub mod error_model;
 mod increments;
+mod navigation_error;
 mod site_fixed;
 mod state;
+mod strapdown;
 
 pub use block::{Block, BlockMatrix, NAVIGATION, ParameterBlock};
+pub use error_model::{
+    ErrorMatrix, ErrorModel, ErrorVector, InputMatrix, Sensitivity, Transition, sensed_errors,
+};
 pub use increments::{Increments, Motion};
+pub use navigation_error::NavigationError;
 pub use site_fixed::Navigator;
 pub use state::State;
+pub use strapdown::{Height, LARGEST_LATITUDE, NearPole, Solution, Strapdown};
