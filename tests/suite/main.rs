@@ -10,3 +10,4 @@ mod outliers;
 mod recorded;
 mod shared;
 mod simulated;
+mod table1;
