@@ -97,8 +97,10 @@ pub struct Table1 {
 pub struct Column {
     /// The paper's.
     pub published: &'static Published,
-    /// One for each reading, in their order.
-    pub rows: Vec<Row>,
+    /// As the paper states it.
+    pub stated: Row,
+    /// Under its other readings.
+    pub others: Vec<Row>,
     /// What can be said of the paper's figures.
     pub verdict: Verdict,
     /// How errors went over time, as stated.
@@ -122,6 +124,13 @@ pub struct Row {
     /// Errors of the sensed rate (rad/s) or specific force (m/s²) along body axes, computed − true, of
     /// each sample of the study.
     pub sensed: Vec<Vector3<f64>>,
+}
+
+impl Column {
+    /// All rows, that as stated first.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        std::iter::once(&self.stated).chain(&self.others)
+    }
 }
 
 impl Row {
@@ -197,25 +206,32 @@ impl Table1Study {
         published: &'static Published,
         triads: &[PerSensor<Triad>],
     ) -> Result<Column, Table1Error> {
-        let rows = published.readings.iter();
-        let rows: Vec<Row> = rows
+        let stated = self.row(published, &published.stated, triads)?;
+        let others = published.others.iter();
+        let others: Vec<Row> = others
             .map(|reading| self.row(published, reading, triads))
             .collect::<Result<_, _>>()?;
-        let differences: Vec<_> = rows.iter().map(|row| row.difference).collect();
         let three_angle = paper::TABLE
             .iter()
             .find(|other| {
                 other.sensor == published.sensor && other.form == InstallationForm::ThreeAngle
             })
             .unwrap_or(published);
+        let of_others: Vec<_> = others
+            .iter()
+            .map(|row| (row.reading, row.difference))
+            .collect();
         Ok(Column {
             published,
-            verdict: verdict::verdict(published, three_angle, &differences),
-            courses: match rows.first() {
-                Some(stated) => self.courses(published.sensor, stated)?,
-                None => Courses::default(),
-            },
-            rows,
+            verdict: verdict::verdict(
+                published,
+                three_angle,
+                (&stated.population, &stated.difference),
+                &of_others,
+            ),
+            courses: self.courses(published.sensor, &stated)?,
+            stated,
+            others,
         })
     }
 

@@ -36,7 +36,7 @@ fn column(table: &Table1, sensor: Sensor, form: InstallationForm) -> &Column {
 
 /// The row of a reading with angles and hours as stated.
 fn row(table: &Table1, sensor: Sensor, form: InstallationForm, installation: Installation) -> &Row {
-    let mut rows = column(table, sensor, form).rows.iter();
+    let mut rows = column(table, sensor, form).rows();
     rows.find(|row| row.reading.installation == installation && row.reading.angles == 1.0)
         .unwrap()
 }
@@ -126,7 +126,7 @@ fn fifty_samples_are_judged_as_the_population_is_whatever_the_seed() {
             Verdict::UnderAnotherReading(reading)
                 if reading.angles == 2.0 && reading.hours == Some(48.0)
         ));
-        let wide = column(&table, Gyro, ThreeAngle).rows.iter();
+        let wide = column(&table, Gyro, ThreeAngle).rows();
         let wide = wide.filter(|r| r.reading.angles == 2.0 && r.reading.hours.is_none());
         for row in wide {
             let apart = Quantity::ALL.into_iter().filter(|&q| !row.agrees(q));
@@ -177,7 +177,7 @@ fn the_linear_courses_are_those_of_nonlinear_navigation_within_one_percent_of_th
     let table = study(8, 11);
     for column in &table.columns {
         let sensor = column.published.sensor;
-        for row in &column.rows {
+        for row in column.rows() {
             if row.sample[0].mean < 1e-15 {
                 continue;
             }
@@ -201,4 +201,35 @@ fn the_linear_courses_are_those_of_nonlinear_navigation_within_one_percent_of_th
             );
         }
     }
+}
+
+fn command(arguments: &[&str]) -> assert_cmd::Command {
+    let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_turncal"));
+    command.args(["study", "table1"]).args(arguments);
+    command
+}
+
+#[test]
+fn the_table_is_the_same_on_one_thread_and_on_two_and_changes_with_the_seed() {
+    let bytes = |threads: &str, seed: &str| {
+        let mut command = command(&["--samples", "3", "--json", "--seed", seed]);
+        let run = command.env("RAYON_NUM_THREADS", threads).assert().success();
+        run.get_output().stdout.clone()
+    };
+    let one = bytes("1", "5");
+    assert!(one == bytes("2", "5"));
+    assert!(one != bytes("2", "6"));
+    let document: serde_json::Value = serde_json::from_slice(&one).unwrap();
+    assert_eq!(document["samples"], 3);
+    assert_eq!(document["latitude_deg"], 45.78);
+    assert_eq!(document["rows"].as_array().unwrap().len(), 12);
+}
+
+#[test]
+fn a_table_at_the_pole_or_of_no_time_is_refused() {
+    let failed = command(&["--latitude-deg", "-90"]).assert().code(1);
+    let message = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+    assert!(message.contains("-90.000°"), "{message}");
+    command(&["--hours", "0"]).assert().code(2);
+    command(&["--samples", "1"]).assert().code(2);
 }

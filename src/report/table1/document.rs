@@ -64,7 +64,7 @@ pub fn document(table: &Table1) -> impl Serialize + use<> {
         population: table.population,
         agreement_z: AGREEMENT,
         rows: columns()
-            .flat_map(|column| column.rows.iter().map(|row| reading(column, row)))
+            .flat_map(|column| column.rows().map(|row| reading(column, row)))
             .collect(),
         verdicts: columns()
             .map(|column| ColumnVerdict {

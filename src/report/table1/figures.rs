@@ -1,7 +1,7 @@
 //! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
 
 use super::super::axis::Axis;
-use super::super::canvas::{Area, BAND, DrawError, INK, Pen, QUIET};
+use super::super::canvas::{Area, DrawError, INK, Pen};
 use super::super::number::count;
 use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
@@ -102,10 +102,10 @@ fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
     } else {
         format!("all {drawn} samples")
     });
-    text.push_str(&format!(
-        " thin, mean of all thick, mean ± one standard deviation dashed. {}",
-        "The axes are the same for both forms of a triad."
-    ));
+    text.push_str(
+        " thin, mean of all thick, mean ± one standard deviation dashed. The axes are the same for both \
+         forms of a triad.",
+    );
     if flat(table, column, quantities) {
         let largest: Vec<String> = quantities
             .iter()
@@ -187,22 +187,22 @@ fn panel(
     )?;
     for sample in &courses.samples {
         let course = line(&mut sample.iter().map(|errors| errors[q]));
-        panel.line(&course, Pen::solid(BAND, 0.5))?;
+        panel.line(&course, Pen::nth(3, 0.4))?;
     }
     let moments = || courses.moments.iter().map(|moments| moments[q]);
     let mut labels = Vec::new();
     for (sign, name) in [(1.0, "mean + σ"), (-1.0, "mean − σ"), (0.0, "mean")] {
         let course = line(&mut moments().map(|m| m.mean + sign * m.std));
         let pen = if sign == 0.0 {
-            Pen::nth(0, 2.0)
+            Pen::solid(INK, 2.25)
         } else {
-            Pen::dashed(INK, 1.5)
+            Pen::dashed(INK, 1.25)
         };
         panel.line(&course, pen)?;
         labels.extend(course.last().map(|end| (end.1, name, pen.color)));
     }
     if flat(table, column, &[quantity]) {
-        panel.label(0.0, "all", QUIET);
+        panel.label(0.0, "all samples", INK);
     } else {
         for (y, name, color) in labels {
             panel.label(y, name, color);

@@ -46,7 +46,7 @@ fn of_column(table: &Table1, column: &Column) -> Table {
     let paper = column.published.moments();
     let paper_name = format!("paper, {} samples", paper::SAMPLES);
     let mut sections = vec![pair(&paper_name, &paper, "")];
-    for row in &column.rows {
+    for row in column.rows() {
         sections.push(of_row(table, row, &verdict::of_row(column, row)));
     }
     Table {

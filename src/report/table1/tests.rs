@@ -69,6 +69,6 @@ fn a_document_gives_every_reading_in_the_units_of_its_keys() {
         (Some("gyro"), Some("three-angle"))
     );
     assert_eq!(stated["paper_mean"]["position_nmile"], 39.42);
-    let mean = small().columns[1].rows[0].sample[4].mean;
+    let mean = small().columns[1].stated.sample[4].mean;
     assert_eq!(stated["mean"]["position_nmile"], mean / 1852.0);
 }

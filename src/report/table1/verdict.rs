@@ -1,6 +1,7 @@
 //! What can be said of the paper's figures, in words.
 
 use super::tables::title;
+use crate::imu::InstallationForm;
 use crate::study::Table1;
 use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
 
@@ -63,7 +64,7 @@ pub(super) fn sentence(column: &Column) -> String {
                 "not reproduced as stated, but under another reading: {}.",
                 reading.name
             );
-            let partly = column.rows.iter().filter(|row| {
+            let partly = column.others.iter().filter(|row| {
                 let (agree, apart) = split(row);
                 !apart.is_empty() && apart.len() < agree.len()
             });
@@ -73,15 +74,8 @@ pub(super) fn sentence(column: &Column) -> String {
             text
         }
         Verdict::NotReproducible(slip) => {
-            let exact = column.rows.iter().any(|row| {
-                row.reading.kind == Kind::Stated
-                    && Quantity::ALL.iter().all(|&q| {
-                        row.population[q as usize].mean
-                            < 1e-6 * column.published.moments()[q as usize].mean
-                    })
-            });
             let mut text = "not reproducible by a correct program".to_owned();
-            if exact {
+            if column.published.form.holds(InstallationForm::General) {
                 text.push_str(", which gives zero as K C comes back exactly");
             }
             match slip {
