@@ -1,6 +1,7 @@
 //! `turncal study`
 
 mod accuracy;
+mod table1;
 
 use clap::Subcommand;
 
@@ -15,12 +16,14 @@ pub struct Study {
 #[derive(Debug, Subcommand)]
 enum Question {
     Accuracy(accuracy::Accuracy),
+    Table1(table1::Table1),
 }
 
 impl Study {
     pub fn run(&self) -> anyhow::Result<()> {
         match &self.question {
             Question::Accuracy(accuracy) => accuracy.run(),
+            Question::Table1(table1) => table1.run(),
         }
     }
 }

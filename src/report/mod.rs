@@ -20,6 +20,7 @@ pub mod side_by_side;
 mod sigma;
 #[cfg(test)]
 mod synthetic;
+pub mod table1;
 mod tables;
 mod terminal;
 #[cfg(test)]

@@ -2,6 +2,8 @@
 
 pub mod accuracy;
 mod ratio;
+pub mod table1;
 
 pub use accuracy::{Accuracy, AccuracyStudy, GroupAccuracy};
 pub use ratio::Ratio;
+pub use table1::{Table1, Table1Study};

@@ -11,3 +11,4 @@ mod recorded;
 mod shared;
 mod simulated;
 mod study;
+mod table1;

@@ -1,0 +1,91 @@
+//! What can be said of the paper's figures, in words.
+
+use super::tables::title;
+use crate::imu::InstallationForm;
+use crate::study::Table1;
+use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
+
+/// A verdict in a few words.
+pub(super) fn short(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Reproduced => "reproduced",
+        Verdict::Zero => "zero; the paper's are rounding",
+        Verdict::UnderAnotherReading(_) => "reproduced under another reading",
+        Verdict::NotReproducible(_) => "not reproducible",
+    }
+}
+
+/// The last column of the table: the verdict where the reading is as stated, otherwise whether it gives
+/// the paper's figures.
+pub(super) fn of_row(column: &Column, row: &Row) -> String {
+    match row.reading.kind {
+        Kind::Stated => short(&column.verdict).to_owned(),
+        Kind::Assumption | Kind::Slip => of_reading(row),
+    }
+}
+
+fn of_reading(row: &Row) -> String {
+    let (agree, apart) = split(row);
+    match (agree.len(), apart.len()) {
+        (_, 0) => "all agree".to_owned(),
+        (0, _) => "none agrees".to_owned(),
+        (more, few) if few < more => format!("all agree but {}", apart.join(", ")),
+        _ => format!("only {} agree", agree.join(", ")),
+    }
+}
+
+/// Names of the quantities that agree and of those that do not.
+fn split(row: &Row) -> (Vec<&'static str>, Vec<&'static str>) {
+    let (agree, apart): (Vec<Quantity>, Vec<Quantity>) =
+        Quantity::ALL.into_iter().partition(|&q| row.agrees(q));
+    let names = |quantities: Vec<Quantity>| quantities.into_iter().map(Quantity::name).collect();
+    (names(agree), names(apart))
+}
+
+/// A sentence for each of the paper's columns.
+pub(super) fn sentences(table: &Table1) -> Vec<String> {
+    let columns = table.columns.iter();
+    columns
+        .map(|column| format!("{}: {}", title(column.published), sentence(column)))
+        .collect()
+}
+
+/// A verdict with what it rests on.
+pub(super) fn sentence(column: &Column) -> String {
+    match &column.verdict {
+        Verdict::Reproduced => "reproduced as stated.".to_owned(),
+        Verdict::Zero => {
+            "zero but for rounding, as K C comes back exactly; the paper's figures are \
+                          rounding in its own program."
+                .to_owned()
+        }
+        Verdict::UnderAnotherReading(reading) => {
+            let mut text = format!(
+                "not reproduced as stated, but under another reading: {}.",
+                reading.name
+            );
+            let partly = column.others.iter().filter(|row| {
+                let (agree, apart) = split(row);
+                !apart.is_empty() && apart.len() < agree.len()
+            });
+            for row in partly {
+                text.push_str(&format!(" With {} {}.", row.reading.name, of_reading(row)));
+            }
+            text
+        }
+        Verdict::NotReproducible(slip) => {
+            let mut text = "not reproducible by a correct program".to_owned();
+            if column.published.form.holds(InstallationForm::General) {
+                text.push_str(", which gives zero as K C comes back exactly");
+            }
+            match slip {
+                Some(slip) => text.push_str(&format!(
+                    "; a slip gives the paper's figures: {}.",
+                    slip.name
+                )),
+                None => text.push('.'),
+            }
+            text
+        }
+    }
+}

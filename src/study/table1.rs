@@ -1,0 +1,306 @@
+//! The paper's Table 1: what the two simplified installation forms cost in 40 h of navigation (Zhao,
+//! Jiang, Li 2016, §3.2).
+//!
+//! Installation angles are drawn (six independent ones for each triad, rows of unit norm), the triad
+//! is calibrated by the closed form from six positions without noise, and what is left of its errors
+//! at rest is navigated with, standing level at a perfect alignment and with height held: gyros and
+//! accelerometers one after the other. The figure of a sample is the largest absolute error of the
+//! run.
+//!
+//! Navigation is the linear error model. That suffices because the errors are small: the terms it
+//! leaves out are products of two errors, at most a hundredth of the largest error in any row of the
+//! table (a test holds it against nonlinear navigation). What is second order in the calibration, such
+//! as scale factors of rows of unit norm, is not left out.
+
+pub mod paper;
+mod quantity;
+mod reading;
+mod response;
+mod verdict;
+
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::earth::ROTATION_RATE;
+use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
+use crate::models::{InstallationModel, Instrument, ModelError, Place};
+use crate::navigation::LARGEST_LATITUDE;
+use crate::units::DEGREE;
+use paper::Published;
+use response::{Response, standing};
+
+pub use quantity::{ByQuantity, Quantity};
+pub use reading::{Installation, Kind, Reading};
+pub use response::Moments;
+pub use verdict::{AGREEMENT, Verdict};
+
+/// Verdicts rest on at least this many samples, so that chance is the paper's alone.
+pub const POPULATION: usize = 4000;
+
+/// Times at which the courses of samples are kept.
+const TIMES: usize = 500;
+
+/// What is studied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table1Study {
+    /// Number of samples, at least two.
+    pub samples: usize,
+    /// Seed; each sample has its own stream of it.
+    pub seed: u64,
+    /// Length of a run, h.
+    pub hours: f64,
+    /// Geodetic latitude, rad.
+    pub latitude: f64,
+}
+
+/// A study that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum Table1Error {
+    /// The embedded models of the paper's instrument cannot be read.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// East-North-Up has no heading near a pole.
+    #[error(
+        "latitude {:.3}° is too near to a pole for East-North-Up: stay within ±{:.1}°",
+        .0 / DEGREE,
+        LARGEST_LATITUDE / DEGREE
+    )]
+    Latitude(f64),
+    /// The length of a run.
+    #[error("a run of {0} h; expected more than 0 h")]
+    Hours(f64),
+    /// Standard deviations need two.
+    #[error("{0} samples; expected at least 2")]
+    Samples(usize),
+    /// A sample's positions leave its calibration undetermined.
+    #[error(
+        "sample {0} cannot be calibrated from six positions: its installation angles are too large"
+    )]
+    Degenerate(usize),
+}
+
+/// The result.
+#[derive(Debug, Clone)]
+pub struct Table1 {
+    /// What was studied.
+    pub study: Table1Study,
+    /// Number of samples that verdicts rest on; the first of them are those of the study.
+    pub population: usize,
+    /// The paper's columns, in its order.
+    pub columns: Vec<Column>,
+}
+
+/// One of the paper's columns under all its readings.
+#[derive(Debug, Clone)]
+pub struct Column {
+    /// The paper's.
+    pub published: &'static Published,
+    /// As the paper states it.
+    pub stated: Row,
+    /// Under its other readings.
+    pub others: Vec<Row>,
+    /// What can be said of the paper's figures.
+    pub verdict: Verdict,
+    /// How errors went over time, as stated.
+    pub courses: Courses,
+}
+
+/// A column under one reading. Errors in rad, m/s and m.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// The reading.
+    pub reading: &'static Reading,
+    /// Length of the runs, h.
+    pub hours: f64,
+    /// Of the samples of the study.
+    pub sample: ByQuantity<Moments>,
+    /// Of the population.
+    pub population: ByQuantity<Moments>,
+    /// Difference of the paper's mean from that of the population, in standard errors of the
+    /// difference.
+    pub difference: ByQuantity<f64>,
+    /// Errors of the sensed rate (rad/s) or specific force (m/s²) along body axes, computed − true, of
+    /// each sample of the study.
+    pub sensed: Vec<Vector3<f64>>,
+}
+
+impl Column {
+    /// All rows, that as stated first.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        std::iter::once(&self.stated).chain(&self.others)
+    }
+}
+
+impl Row {
+    /// Whether a quantity agrees with the paper's.
+    pub fn agrees(&self, quantity: Quantity) -> bool {
+        self.difference[quantity as usize].abs() <= AGREEMENT
+    }
+}
+
+/// How errors go over time: attitude with its sign, velocity and position as norms.
+#[derive(Debug, Clone, Default)]
+pub struct Courses {
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// For each of the first samples, at most as many as the paper's, its errors at each time.
+    pub samples: Vec<Vec<ByQuantity<f64>>>,
+    /// Over all samples of the study, at each time.
+    pub moments: Vec<ByQuantity<Moments>>,
+}
+
+impl Table1Study {
+    /// Makes the table, on all cores. The result does not depend on how many there are.
+    ///
+    /// # Errors
+    /// [`Table1Error`] if no table can be made of what is asked for.
+    pub fn run(&self) -> Result<Table1, Table1Error> {
+        if self.samples < 2 {
+            return Err(Table1Error::Samples(self.samples));
+        }
+        // Written so that not-a-number is refused as well.
+        if !(self.hours > 0.0 && self.hours.is_finite()) {
+            return Err(Table1Error::Hours(self.hours));
+        }
+        let population = self.samples.max(POPULATION);
+        let triads = self.draw(population)?;
+        let columns = paper::TABLE.iter();
+        let columns = columns.map(|published| self.column(published, &triads));
+        Ok(Table1 {
+            study: self.clone(),
+            population,
+            columns: columns.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// True triads of every sample.
+    fn draw(&self, count: usize) -> Result<Vec<PerSensor<Triad>>, Table1Error> {
+        let instrument = Instrument::load("paper", &Place::Embedded)?;
+        let installation = InstallationModel::load("general", &Place::Embedded)?;
+        let sample = |stream: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+            rng.set_stream(stream);
+            PerSensor::from_fn(|sensor| {
+                let variation = instrument.variation.get(sensor);
+                let mut triad = Triad::ideal(installation.form);
+                triad.angles = installation.draw(&mut rng);
+                triad.scale = Vector3::from_fn(|_, _| 1.0 + variation.scale.draw(&mut rng));
+                triad.bias = Vector3::from_fn(|_, _| variation.bias.draw(&mut rng));
+                triad
+            })
+        };
+        Ok((0..count as u64).map(sample).collect())
+    }
+
+    fn response(&self, hours: f64) -> Result<Response, Table1Error> {
+        Some(self.latitude)
+            .filter(|latitude| latitude.abs() <= LARGEST_LATITUDE)
+            .and_then(|latitude| Response::new(&standing(latitude), hours * 3600.0))
+            .ok_or(Table1Error::Latitude(self.latitude))
+    }
+
+    fn column(
+        &self,
+        published: &'static Published,
+        triads: &[PerSensor<Triad>],
+    ) -> Result<Column, Table1Error> {
+        let stated = self.row(published, &published.stated, triads)?;
+        let others = published.others.iter();
+        let others: Vec<Row> = others
+            .map(|reading| self.row(published, reading, triads))
+            .collect::<Result<_, _>>()?;
+        let three_angle = paper::TABLE
+            .iter()
+            .find(|other| {
+                other.sensor == published.sensor && other.form == InstallationForm::ThreeAngle
+            })
+            .unwrap_or(published);
+        let of_others: Vec<_> = others
+            .iter()
+            .map(|row| (row.reading, row.difference))
+            .collect();
+        Ok(Column {
+            published,
+            verdict: verdict::verdict(
+                published,
+                three_angle,
+                (&stated.population, &stated.difference),
+                &of_others,
+            ),
+            courses: self.courses(published.sensor, &stated)?,
+            stated,
+            others,
+        })
+    }
+
+    fn row(
+        &self,
+        published: &Published,
+        reading: &'static Reading,
+        triads: &[PerSensor<Triad>],
+    ) -> Result<Row, Table1Error> {
+        let (sensor, form) = (published.sensor, published.form);
+        let hours = reading.hours.unwrap_or(self.hours);
+        let response = self.response(hours)?;
+        let (rate, force) = standing(self.latitude).steady();
+        let (input, size) = match sensor {
+            Sensor::Gyro => (rate, ROTATION_RATE),
+            Sensor::Accel => (force, force.norm()),
+        };
+        let results: Vec<(Vector3<f64>, ByQuantity<f64>)> = triads
+            .par_iter()
+            .enumerate()
+            .map(|(sample, triads)| {
+                let truth = reading.drawn(triads.get(sensor));
+                let sensed = sensed(&truth, reading.calibrated(&truth, form, size), &input)
+                    .ok_or(Table1Error::Degenerate(sample))?;
+                Ok((sensed, response.largest(sensor, &sensed)))
+            })
+            .collect::<Result<_, Table1Error>>()?;
+        let moments = |count: usize| {
+            let results = results.iter().take(count);
+            Quantity::ALL.map(|q| Moments::of(results.clone().map(|r| r.1[q as usize])))
+        };
+        let population = moments(triads.len());
+        let paper = published.moments();
+        Ok(Row {
+            reading,
+            hours,
+            sample: moments(self.samples),
+            population,
+            difference: Quantity::ALL.map(|q| {
+                let q = q as usize;
+                verdict::difference(&paper[q], &population[q], triads.len())
+            }),
+            sensed: results.iter().take(self.samples).map(|r| r.0).collect(),
+        })
+    }
+
+    /// How the errors of a row go over time.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn courses(&self, sensor: Sensor, row: &Row) -> Result<Courses, Table1Error> {
+        let response = self.response(row.hours)?;
+        let outputs: Vec<usize> = response.thinned(TIMES).collect();
+        let errors = |output: &usize, sensed| response.errors(sensor, *output, sensed);
+        let course = |sensed| outputs.iter().map(|k| errors(k, sensed)).collect();
+        let moments = |output: &usize| {
+            let all: Vec<_> = row.sensed.iter().map(|s| errors(output, s)).collect();
+            Quantity::ALL.map(|q| Moments::of(all.iter().map(|errors| errors[q as usize])))
+        };
+        Ok(Courses {
+            times: outputs.iter().map(|&k| response.time(k)).collect(),
+            samples: row.sensed.iter().take(paper::SAMPLES).map(course).collect(),
+            moments: outputs.par_iter().map(moments).collect(),
+        })
+    }
+}
+
+/// What a calibration computes from the output at rest, less the true input.
+fn sensed(truth: &Triad, calibrated: Option<Triad>, input: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let calibrated = calibrated?;
+    Some(calibrated.correction()? * (truth.output(input) - calibrated.bias) - input)
+}
