@@ -338,6 +338,11 @@ mod tests {
                 "seed = 1\n[site]\nlatitude_deg = 91.0",
                 ["line 3", "latitude from -90 to 90"],
             ),
+            (
+                Room::Trajectory,
+                "[[segment]]\nturn = 90.0",
+                ["line 2", "expected one of `duration_s`"],
+            ),
         ] {
             let message = message(room, content);
             for said in says {

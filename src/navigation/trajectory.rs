@@ -4,22 +4,14 @@
 //! attitude and their derivatives. Latitude and longitude, which have no closed form, are integrals of
 //! the velocity.
 
-use nalgebra::Vector3;
+mod leg;
+mod travel;
+
 use thiserror::Error;
 
-use super::increments::Increments;
-use super::strapdown::Solution;
-use crate::attitude::from_pitch_roll_heading;
-use crate::earth::{Curvature, earth_rate_n};
-use crate::turntable::{Profile, Turned};
-use crate::units::STANDARD_GRAVITY;
+use leg::Leg;
+pub use travel::Travel;
 
-/// Nodes in parts of a step's half and weights, Gauss–Legendre of sixth order.
-const NODES: [(f64, f64); 3] = [
-    (-0.774_596_669_241_483_4, 5.0 / 9.0),
-    (0.0, 8.0 / 9.0),
-    (0.774_596_669_241_483_4, 5.0 / 9.0),
-];
 /// The least horizontal speed over the climb rate: beyond, pitch would be steeper than a body flies.
 const LEAST_GLIDE: f64 = 2.0;
 /// The least time in s that all segments together take.
@@ -120,9 +112,7 @@ impl Trajectory {
             if k >= count {
                 round += leg.duration;
             }
-            let climb = leg.height.peak_rate();
-            let end = leg.at(leg.end()).speed.angle;
-            let speed = leg.from[SPEED].min(end);
+            let (climb, speed) = (leg.climb_rate(), leg.lower_speed());
             if climb > 0.0 && speed < LEAST_GLIDE * climb {
                 return Err(TrajectoryError::Steep {
                     segment: k % count + 1,
@@ -160,284 +150,89 @@ impl Trajectory {
 
     /// Goes through it in steps of `period` seconds.
     pub fn travel(&self, period: f64) -> Travel<'_> {
-        let leg = Leg::before(&self.start);
-        let mut travel = Travel {
-            trajectory: self,
-            period,
-            steps: 0,
-            leg,
-            next: 0,
-            truth: Solution {
-                attitude: nalgebra::Matrix3::identity(),
-                velocity: Vector3::zeros(),
-                latitude: self.start.latitude,
-                longitude: self.start.longitude,
-                height: self.start.height,
-            },
-        };
-        travel.enter(0.0);
-        travel.arrive(0.0);
-        travel
+        Travel::new(self, period)
     }
 }
 
-const SPEED: usize = 0;
-const HEADING: usize = 1;
-const HEIGHT: usize = 2;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attitude::to_pitch_roll_heading;
+    use crate::models::{self, Place};
+    use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// A segment that has its place in time.
-#[derive(Debug, Clone, Copy)]
-struct Leg {
-    start: f64,
-    duration: f64,
-    /// Speed, heading and height at its start.
-    from: [f64; 3],
-    speed: Profile,
-    heading: Profile,
-    height: Profile,
-}
-
-/// Speed, heading and height with their first and second derivatives.
-#[derive(Debug, Clone, Copy)]
-struct Kinematics {
-    speed: Turned,
-    heading: Turned,
-    height: Turned,
-}
-
-impl Leg {
-    /// A leg of no length that ends at a start.
-    fn before(start: &Start) -> Self {
-        let none = Profile::limited(0.0, 1.0, 1.0);
-        Self {
-            start: 0.0,
-            duration: 0.0,
-            from: [start.speed, start.heading, start.height],
-            speed: none,
-            heading: none,
-            height: none,
-        }
+    fn embedded(name: &str) -> Trajectory {
+        models::trajectory(name, &Place::Embedded).unwrap().0
     }
 
-    fn followed_by(&self, segment: &Segment) -> Self {
-        let end = self.at(self.end());
-        let from = [end.speed.angle, end.heading.angle, end.height.angle];
-        let to = |change: Option<Change>, from: f64| match change {
-            Some(c) => Profile::limited(c.amount - from, c.rate, c.acceleration),
-            None => Profile::limited(0.0, 1.0, 1.0),
-        };
-        let turn = segment.turn;
-        let mut leg = Self {
-            start: self.end(),
-            duration: segment.duration,
-            from,
-            speed: to(segment.speed, from[SPEED]),
-            heading: Profile::limited(turn.amount, turn.rate, turn.acceleration),
-            height: to(segment.height, from[HEIGHT]),
-        };
-        for profile in leg.profiles() {
-            leg.duration = leg.duration.max(profile.duration());
-        }
-        leg
-    }
-
-    fn profiles(&self) -> [Profile; 3] {
-        [self.speed, self.heading, self.height]
-    }
-
-    fn end(&self) -> f64 {
-        self.start + self.duration
-    }
-
-    fn at(&self, time: f64) -> Kinematics {
-        let of = |profile: &Profile, from: f64| {
-            let turned = profile.at(time - self.start);
-            Turned {
-                angle: from + turned.angle,
-                ..turned
+    #[test]
+    fn a_round_leads_back_near_the_start() {
+        for (name, round, metres) in [("flight", 5104.0, 2000.0), ("vehicle", 775.0, 200.0)] {
+            let trajectory = embedded(name);
+            let start = trajectory.start;
+            let mut travel = trajectory.travel(1.0);
+            for _ in 0..round as usize {
+                travel.advance();
             }
+            let end = travel.truth();
+            let apart = 6.4e6 * (end.latitude - start.latitude).hypot(end.longitude * 0.7);
+            assert!(apart < metres, "{name}: {apart}");
+            assert!((end.height - start.height).abs() < 1.0, "{name}");
+            let [.., heading] = to_pitch_roll_heading(&end.attitude);
+            assert!((heading - start.heading).abs() < 1e-9, "{name}: {heading}");
+        }
+    }
+
+    #[test]
+    fn a_body_that_banks_feels_no_force_to_its_side_in_a_level_turn() {
+        let trajectory = embedded("flight");
+        let mut travel = trajectory.travel(1.0);
+        // In the middle of the first full circle.
+        for _ in 0..2080 {
+            travel.advance();
+        }
+        let (rate, force) = travel.sensed();
+        let [pitch, roll, _] = to_pitch_roll_heading(&travel.truth().attitude);
+        let expected = (230.0 * 1.0 * DEGREE / STANDARD_GRAVITY).atan();
+        assert!(pitch == 0.0 && (roll - expected).abs() < 1e-9, "{roll}");
+        // But for Coriolis and the Earth's roundness.
+        assert!(force.x.abs() < 0.1 && force.z > 10.0, "{force}");
+        assert!((rate.norm() - 1.0 * DEGREE).abs() < 2e-4, "{rate}");
+    }
+
+    #[test]
+    fn climbing_without_speed_and_segments_without_time_are_refused() {
+        let start = Start {
+            latitude: 0.5,
+            longitude: 0.0,
+            height: 0.0,
+            heading: 0.0,
+            speed: 10.0,
         };
-        Kinematics {
-            speed: of(&self.speed, self.from[SPEED]),
-            heading: of(&self.heading, self.from[HEADING]),
-            height: of(&self.height, self.from[HEIGHT]),
-        }
-    }
-
-    /// The next time after this one where a third derivative jumps, the end at the latest.
-    fn next_break(&self, after: f64) -> f64 {
-        self.profiles()
-            .iter()
-            .flat_map(Profile::breaks)
-            .map(|time| self.start + time)
-            .filter(|&time| time > after)
-            .fold(self.end(), f64::min)
-    }
-}
-
-impl Kinematics {
-    fn velocity(&self) -> Vector3<f64> {
-        let (sin, cos) = self.heading.angle.sin_cos();
-        let speed = self.speed.angle;
-        Vector3::new(speed * sin, speed * cos, self.height.rate)
-    }
-
-    /// Derivative of the velocity's components.
-    fn acceleration(&self) -> Vector3<f64> {
-        let (sin, cos) = self.heading.angle.sin_cos();
-        let across = self.speed.angle * self.heading.rate;
-        Vector3::new(
-            self.speed.rate * sin + across * cos,
-            self.speed.rate * cos - across * sin,
-            self.height.acceleration,
-        )
-    }
-
-    /// Pitch and roll in rad, each with its rate in rad/s.
-    fn pitch_and_roll(&self, banks: bool) -> [(f64, f64); 2] {
-        let (speed, climb) = (self.speed.angle, self.height.rate);
-        // A body that does not climb may stand.
-        let pitch = if climb == 0.0 && self.height.acceleration == 0.0 {
-            (0.0, 0.0)
-        } else {
-            let across = self.height.acceleration * speed - climb * self.speed.rate;
-            (climb.atan2(speed), across / (speed * speed + climb * climb))
+        let change = |amount| Change {
+            amount,
+            rate: 4.0,
+            acceleration: 1.0,
         };
-        let roll = if banks {
-            let tangent = speed * self.heading.rate / STANDARD_GRAVITY;
-            let change = self.speed.rate * self.heading.rate + speed * self.heading.acceleration;
-            let rate = change / STANDARD_GRAVITY / (1.0 + tangent * tangent);
-            (tangent.atan(), rate)
-        } else {
-            (0.0, 0.0)
+        let still = Segment {
+            duration: 0.0,
+            turn: change(0.0),
+            speed: None,
+            height: None,
         };
-        [pitch, roll]
-    }
-
-    /// Whether nothing but position changes.
-    fn is_steady(&self) -> bool {
-        self.speed.rate == 0.0
-            && self.speed.acceleration == 0.0
-            && self.heading.rate == 0.0
-            && self.heading.acceleration == 0.0
-            && self.height.acceleration == 0.0
-    }
-
-    /// The true state at this place, of which velocity and attitude are set.
-    fn placed(&self, place: &Solution, banks: bool) -> Solution {
-        let [(pitch, _), (roll, _)] = self.pitch_and_roll(banks);
-        Solution {
-            attitude: from_pitch_roll_heading(pitch, roll, self.heading.angle),
-            velocity: self.velocity(),
-            height: self.height.angle,
-            ..*place
-        }
-    }
-
-    /// Angular rate (rad/s) and specific force (m/s²) along body axes.
-    fn sensed(&self, truth: &Solution, banks: bool) -> (Vector3<f64>, Vector3<f64>) {
-        let [(_, pitch_rate), (_, roll_rate)] = self.pitch_and_roll(banks);
-        let (sin, cos) = self.heading.angle.sin_cos();
-        let body = Vector3::new(cos, -sin, 0.0) * pitch_rate + truth.attitude.column(1) * roll_rate
-            - Vector3::z() * self.heading.rate;
-        let rate = earth_rate_n(truth.latitude) + truth.transport_rate() + body;
-        // What an unsupported body would do is not sensed.
-        let force = self.acceleration() - truth.acceleration(&Vector3::zeros());
-        (truth.attitude.tr_mul(&rate), truth.attitude.tr_mul(&force))
-    }
-}
-
-/// A journey along a trajectory.
-#[derive(Debug, Clone)]
-pub struct Travel<'a> {
-    trajectory: &'a Trajectory,
-    period: f64,
-    steps: u64,
-    leg: Leg,
-    next: usize,
-    truth: Solution,
-}
-
-impl Travel<'_> {
-    /// The true state now.
-    pub fn truth(&self) -> &Solution {
-        &self.truth
-    }
-
-    /// Angular rate (rad/s) and specific force (m/s²) along body axes now.
-    pub fn sensed(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let kinematics = self.leg.at(self.time());
-        kinematics.sensed(&self.truth, self.trajectory.banks)
-    }
-
-    /// Whether velocity and attitude in East-North-Up stay as they are till a time after now, in s.
-    pub fn is_steady_for(&self, duration: f64) -> bool {
-        let (now, end) = (self.time(), self.time() + duration);
-        self.leg.next_break(now) >= end
-            && self.leg.at(now).is_steady()
-            && self.leg.at(end).is_steady()
-    }
-
-    /// Goes on by a step and gives the integrals over it of what an ideal instrument senses.
-    pub fn advance(&mut self) -> Increments {
-        let mut now = self.time();
-        self.steps += 1;
-        let end = self.time();
-        let mut increments = Increments::default();
-        // No part reaches across a break, so quadrature keeps its order.
-        while now < end {
-            self.enter(now);
-            let to = self.leg.next_break(now).min(end);
-            self.integrate(now, to, &mut increments);
-            now = to;
-        }
-        self.enter(end);
-        self.arrive(end);
-        increments
-    }
-
-    fn time(&self) -> f64 {
-        self.steps as f64 * self.period
-    }
-
-    /// Goes to the leg of a time.
-    fn enter(&mut self, time: f64) {
-        let segments = &self.trajectory.segments;
-        while self.leg.end() <= time {
-            self.leg = self.leg.followed_by(&segments[self.next]);
-            self.next = (self.next + 1) % segments.len();
-        }
-    }
-
-    /// Sets velocity, attitude and height to those of a time.
-    fn arrive(&mut self, time: f64) {
-        self.truth = self.leg.at(time).placed(&self.truth, self.trajectory.banks);
-    }
-
-    fn integrate(&mut self, from: f64, to: f64, increments: &mut Increments) {
-        let half = 0.5 * (to - from);
-        let start = self.leg.at(from);
-        let (velocity, acceleration) = (start.velocity(), start.acceleration());
-        let radius = Curvature::at(self.truth.latitude).meridian + start.height.angle;
-        let mut moved = Vector3::zeros();
-        for (node, weight) in NODES {
-            let after = half * (1.0 + node);
-            let kinematics = self.leg.at(from + after);
-            // Millimetres are enough here: they change Earth rate and gravity by 1e-9 of themselves.
-            let north = (velocity.y + 0.5 * acceleration.y * after) * after;
-            let place = Solution {
-                latitude: self.truth.latitude + north / radius,
-                ..self.truth
-            };
-            let truth = kinematics.placed(&place, self.trajectory.banks);
-            let (rate, force) = kinematics.sensed(&truth, self.trajectory.banks);
-            let transport = truth.transport_rate();
-            let weight = weight * half;
-            increments.angle += rate * weight;
-            increments.velocity += force * weight;
-            moved += Vector3::new(transport.y / truth.latitude.cos(), -transport.x, 0.0) * weight;
-        }
-        self.truth.longitude += moved.x;
-        self.truth.latitude += moved.y;
+        let of = |segment| Trajectory::new(start, false, vec![segment]);
+        assert!(matches!(of(still), Err(TrajectoryError::Short { .. })));
+        let climb = Segment {
+            height: Some(change(100.0)),
+            ..still
+        };
+        assert!(of(climb).is_err(), "the second round takes no time");
+        let halting = Segment {
+            speed: Some(change(7.0)),
+            duration: 10.0,
+            ..climb
+        };
+        let steep = of(halting).unwrap_err();
+        assert!(matches!(steep, TrajectoryError::Steep { segment: 1, .. }));
     }
 }

@@ -22,12 +22,14 @@ pub const INTERVAL: f64 = 60.0;
 /// Steps between two moments for a body that stands: 10 s. Against steps of a tenth 40 h differ by
 /// 1e-8°.
 const STANDING_STEPS: u32 = 6;
-/// Steps between two moments for a body that moves: 0.1 s. An ideal instrument then errs by centimetres
-/// in a flight of hours.
+/// Steps between two moments for a body that moves: 0.1 s. An ideal instrument then errs by a
+/// decimetre in a flight of four hours.
 const MOVING_STEPS: u32 = 600;
 /// Steps of the linear model between two moments for a body that moves: 0.25 s, in which a vehicle turns
 /// by 5°.
 const LINEAR_STEPS: u32 = 240;
+/// Steps after which the linear model of a steady motion is made anew: 10 s.
+const RENEWED: u32 = 40;
 
 /// How a body moves while it navigates.
 #[derive(Debug, Clone, PartialEq)]
@@ -248,14 +250,13 @@ impl Mission {
         let mut steady: Option<Linear> = None;
         let mut exposures = vec![exposure(0.0, &sensitivity, course.truth())?];
         for interval in 1..=self.intervals {
-            // Steady motion is linearised anew as it leads over the Earth.
-            if matches!(self.motion, Motion::Moving(_)) {
-                steady = None;
-            }
-            for _ in 0..steps {
+            for k in 0..steps {
                 let is_steady = course.is_steady_for(step);
                 course.advance();
-                let linear = match steady.take().filter(|_| is_steady) {
+                // Motion that is steady leads over the Earth nevertheless.
+                let renewed = k % RENEWED == 0 && matches!(self.motion, Motion::Moving(_));
+                let kept = steady.take().filter(|_| is_steady && !renewed);
+                let linear = match kept {
                     Some(linear) => linear,
                     None => Linear::about(&course, truth, step)?,
                 };

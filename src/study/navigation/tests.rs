@@ -87,24 +87,29 @@ fn draw(run: u64) -> ParameterVector {
 #[test]
 fn an_exact_calibration_navigates_without_error_wherever_it_goes() {
     let exact = pair(&ParameterVector::zeros(), None);
-    for (mission, metres) in [
-        (standing(2400), 1e-3),
-        (moving("flight", 240), 0.1),
-        (moving("vehicle", 240), 0.1),
+    for (mission, metres, arcsec) in [
+        (standing(2400), 1e-3, 1e-4),
+        (moving("flight", 240), 0.3, 1e-2),
+        (moving("vehicle", 240), 0.3, 1e-2),
     ] {
         let end = mission.errors(&exact).unwrap().pop().unwrap().error;
         println!("{end:?}");
-        assert!(end.attitude.amax() < 1e-3 * ARCSEC, "{end:?}");
+        assert!(end.attitude.amax() < arcsec * ARCSEC, "{end:?}");
         assert!(end.horizontal_position() < metres, "{end:?}");
     }
 }
 
 #[test]
 fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
-    for mission in [standing(600), moving("flight", 120), moving("vehicle", 60)] {
+    for (name, mission) in [
+        ("standing", standing(600)),
+        ("flight", moving("flight", 120)),
+        ("vehicle", moving("vehicle", 60)),
+    ] {
         let exposures = mission.exposure(&instrument()).unwrap();
         for run in 0..2 {
-            let error = draw(run);
+            // Large enough that rounding and the navigation's own error do not count.
+            let error = draw(run) * 10.0;
             let moments = mission.errors(&pair(&error, None)).unwrap();
             let mut largest = SVector::<f64, STATES>::zeros();
             let mut apart = SVector::<f64, STATES>::zeros();
@@ -116,7 +121,7 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
             // Height and vertical velocity are held.
             for i in [0, 1, 2, 3, 4, 6, 7] {
                 let relative = apart[i] / largest[i];
-                assert!(relative < 2e-3, "{:?}, {i}: {relative}", mission.motion);
+                assert!(relative < 2e-3, "{name} {i}: {relative}");
             }
         }
     }
