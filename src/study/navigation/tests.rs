@@ -108,8 +108,8 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
     ] {
         let exposures = mission.exposure(&instrument()).unwrap();
         for run in 0..2 {
-            // Large enough that rounding and the navigation's own error do not count.
-            let error = draw(run) * 10.0;
+            // Large enough that the own error of navigation does not count, and linear still.
+            let error = draw(run) * 3.0;
             let moments = mission.errors(&pair(&error, None)).unwrap();
             let mut largest = SVector::<f64, STATES>::zeros();
             let mut apart = SVector::<f64, STATES>::zeros();
@@ -121,7 +121,7 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
             // Height and vertical velocity are held.
             for i in [0, 1, 2, 3, 4, 6, 7] {
                 let relative = apart[i] / largest[i];
-                assert!(relative < 2e-3, "{name} {i}: {relative}");
+                assert!(relative < 3e-3, "{name} {i}: {relative}");
             }
         }
     }
