@@ -107,7 +107,7 @@ impl Quantity {
     /// make the usual unit.
     pub(super) fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let units: &[(&str, f64)] = match self.kind {
-            Kind::Attitude => &[("°", DEGREE), ("′", 60.0 * ARCSEC), ("″", ARCSEC)],
+            Kind::Attitude => &[("°", DEGREE), ("″", ARCSEC)],
             Kind::Velocity => &[
                 ("m/s", 1.0),
                 ("cm/s", CENTIMETRE),
