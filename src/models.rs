@@ -1,10 +1,12 @@
-//! What a user may edit: instruments, installations, tables, paths and scenarios as TOML files.
+//! What a user may edit: instruments, installations, tables, paths, scenarios and trajectories as TOML
+//! files.
 //!
 //! The files of the `models/` folder are embedded. A path to an existing file wins over an embedded
 //! name, on the command line and in a user's scenario; an embedded scenario names embedded models.
 
 mod instrument;
 mod machine;
+mod trajectory;
 mod values;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +15,7 @@ use serde::de::DeserializeOwned;
 
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
+pub use trajectory::trajectory;
 pub(crate) use values::{Finite, NonNegative, OneOrThree, Positive};
 
 /// A folder of models.
@@ -28,6 +31,8 @@ pub enum Room {
     Path,
     /// Whole simulated runs.
     Scenario,
+    /// Trajectories to navigate along.
+    Trajectory,
 }
 
 impl Room {
@@ -39,6 +44,7 @@ impl Room {
             Self::Turntable => "turntable",
             Self::Path => "path",
             Self::Scenario => "scenario",
+            Self::Trajectory => "trajectory",
         }
     }
 
@@ -49,6 +55,7 @@ impl Room {
             Self::Turntable => TURNTABLE,
             Self::Path => PATH,
             Self::Scenario => SCENARIO,
+            Self::Trajectory => TRAJECTORY,
         }
     }
 }
@@ -103,6 +110,7 @@ embed!(
     "single-axis",
     "two-axis",
 );
+embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
 
 /// Why a model cannot be had.
 #[derive(Debug, thiserror::Error)]
@@ -259,6 +267,7 @@ mod tests {
             Room::Turntable => turntable(path, place).unwrap_err(),
             Room::Path => machine::path(path, place, &site).unwrap_err(),
             Room::Scenario => crate::simulation::Scenario::load(path).unwrap_err(),
+            Room::Trajectory => trajectory(path, place).unwrap_err(),
         };
         let message = error.to_string();
         assert!(message.contains("mine.toml"), "{message}");
@@ -328,6 +337,11 @@ mod tests {
                 Room::Scenario,
                 "seed = 1\n[site]\nlatitude_deg = 91.0",
                 ["line 3", "latitude from -90 to 90"],
+            ),
+            (
+                Room::Trajectory,
+                "[[segment]]\nturn = 90.0",
+                ["line 2", "expected one of `duration_s`"],
             ),
         ] {
             let message = message(room, content);

@@ -2,7 +2,6 @@
 
 mod document;
 
-use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +10,7 @@ use turncal::calibration::{Comparison, Named, compare};
 use turncal::report::side_by_side::{self, Table};
 use turncal::run::CalibrationRecord;
 
+use super::names::short_names;
 use super::output::{Overwrite, print};
 
 /// Calibrations side by side, parameter by parameter, with their σ.
@@ -76,24 +76,6 @@ impl Compare {
     }
 }
 
-/// File stems; where they are equal, the name of the directory; where that is, too, the whole path.
-fn short_names(paths: &[&Path]) -> Vec<String> {
-    let shown = |name: &OsStr| name.to_string_lossy().into_owned();
-    let stem = |path: &Path| path.file_stem().map(shown);
-    let parent = |path: &Path| path.parent()?.file_name().map(shown);
-    let shortest = |path: &&Path| {
-        let unique = |of: &dyn Fn(&Path) -> Option<String>| {
-            let name = of(path)?;
-            let alike = paths.iter().filter(|p| of(p).as_ref() == Some(&name));
-            (alike.count() == 1).then_some(name)
-        };
-        unique(&stem)
-            .or_else(|| unique(&parent))
-            .unwrap_or_else(|| path.display().to_string())
-    };
-    paths.iter().map(shortest).collect()
-}
-
 fn text(comparison: &Comparison) -> String {
     let mut text = side_by_side::summary(comparison) + "\n";
     for warning in side_by_side::warnings(comparison) {
@@ -141,24 +123,5 @@ fn push_table(text: &mut String, table: &Table) {
     for note in &table.notes {
         text.push_str(note);
         text.push('\n');
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_as_short_as_they_can_be_told_apart() {
-        let names = |paths: &[&str]| short_names(&paths.iter().map(Path::new).collect::<Vec<_>>());
-        assert_eq!(names(&["a/one.json", "a/two.json"]), ["one", "two"]);
-        assert_eq!(
-            names(&["mon/calibration.json", "fri/calibration.json", "truth.json"]),
-            ["mon", "fri", "truth"]
-        );
-        assert_eq!(
-            names(&["a/b/c.json", "d/b/c.json"]),
-            ["a/b/c.json", "d/b/c.json"]
-        );
     }
 }

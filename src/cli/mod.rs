@@ -3,6 +3,8 @@
 mod calibrate;
 mod compare;
 mod demo;
+mod names;
+mod navigate;
 mod output;
 mod progress;
 mod simulate;
@@ -30,6 +32,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
     Compare(compare::Compare),
+    Navigate(navigate::Navigate),
     Study(study::Study),
 }
 
@@ -41,6 +44,7 @@ impl Cli {
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(),
             Command::Compare(compare) => compare.run(),
+            Command::Navigate(navigate) => navigate.run(),
             Command::Study(study) => study.run(),
         }
     }

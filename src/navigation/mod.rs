@@ -6,7 +6,8 @@
 //! (`V = 0` at rest) and linear in velocity and position.
 //!
 //! [`Strapdown`] goes over the ellipsoid, nonlinear, and shows what a calibration is worth;
-//! [`ErrorModel`] is its linear error model, [`NavigationError`] what is reported.
+//! [`ErrorModel`] is its linear error model, [`NavigationError`] what is reported. [`Trajectory`] is
+//! where a body that moves truly is.
 //!
 //! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13.
 
@@ -17,6 +18,7 @@ mod navigation_error;
 mod site_fixed;
 mod state;
 mod strapdown;
+mod trajectory;
 
 pub use block::{Block, BlockMatrix, NAVIGATION, ParameterBlock};
 pub use error_model::{
@@ -27,3 +29,4 @@ pub use navigation_error::NavigationError;
 pub use site_fixed::Navigator;
 pub use state::State;
 pub use strapdown::{Height, LARGEST_LATITUDE, NearPole, Solution, Strapdown};
+pub use trajectory::{Change, Segment, Start, Trajectory, TrajectoryError, Travel};

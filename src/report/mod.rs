@@ -12,6 +12,7 @@ mod estimates;
 mod facts;
 pub mod group;
 mod innovations;
+pub mod navigation;
 mod number;
 mod page;
 mod panel;

@@ -1,6 +1,7 @@
 //! Studies: what many simulated runs say.
 
 pub mod accuracy;
+pub mod navigation;
 mod ratio;
 pub mod table1;
 

@@ -4,6 +4,7 @@ mod batch;
 mod cli;
 mod compare;
 mod door;
+mod navigate;
 mod navigation;
 mod observability;
 mod outliers;

@@ -1,0 +1,232 @@
+//! `turncal navigate`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+use nalgebra::Vector3;
+use turncal::attitude::from_pitch_roll_heading;
+use turncal::calibration::Named;
+use turncal::imu::Sensor;
+use turncal::models::{self, Place};
+use turncal::navigation::Solution;
+use turncal::report::navigation::Navigation;
+use turncal::run::CalibrationRecord;
+use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
+use turncal::units::DEGREE;
+
+use super::names::short_names;
+use super::output::{Overwrite, print};
+use super::progress::Activity;
+
+const HOUR: f64 = 3600.0;
+/// Pitch beyond which roll and heading cannot be told apart, degrees.
+const LARGEST_PITCH: f64 = 89.0;
+
+/// The navigation error that a calibration's errors cause
+///
+/// Navigates with the instrument of --truth, taken for that of the calibration, from perfect alignment,
+/// its height held to the true one: standing at a place, or along a trajectory. Shows errors of
+/// attitude, velocity and position, and the σ of them that the calibration's covariance predicts.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal navigate calibration.json --truth truth.json --latitude-deg 45
+  turncal navigate calibration.json --truth truth.json --trajectory flight --hours 3 -o flight
+  turncal navigate monday.json --truth friday.json --latitude-deg -33.9 --errors gyro --json")]
+pub struct Navigate {
+    /// The calibration that navigation uses
+    #[arg(value_name = "CALIBRATION.json")]
+    calibration: PathBuf,
+    /// What the instrument truly is: a truth.json or another calibration
+    #[arg(long, value_name = "FILE")]
+    truth: PathBuf,
+    /// Latitude, north positive [default: the trajectory's]
+    #[arg(
+        long,
+        value_name = "L",
+        allow_negative_numbers = true,
+        required_unless_present = "trajectory",
+        value_parser = latitude
+    )]
+    latitude_deg: Option<f64>,
+    /// Height above the ellipsoid [default: 0, or the trajectory's, which moves with it]
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
+    height_m: Option<f64>,
+    /// Attitude while standing
+    #[arg(
+        long,
+        value_name = "PITCH,ROLL,HEADING",
+        allow_hyphen_values = true,
+        conflicts_with = "trajectory",
+        default_value = "0,0,0",
+        value_parser = attitude
+    )]
+    attitude_deg: Attitude,
+    /// Whose errors
+    #[arg(long, value_enum, default_value_t = Errors::Both)]
+    errors: Errors,
+    /// How long, to the minute, up to 1000
+    #[arg(long, default_value_t = 40.0, value_parser = hours)]
+    hours: f64,
+    /// Move instead of standing: a TOML file or an embedded name (flight, vehicle)
+    #[arg(long, value_name = "FILE.toml")]
+    trajectory: Option<String>,
+    /// Write navigation.csv, figures and a page into this directory
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Print one JSON document, hour by hour, and nothing else
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Pitch, roll and heading in degrees.
+#[derive(Debug, Clone, Copy)]
+struct Attitude([f64; 3]);
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Errors {
+    /// Of both triads
+    Both,
+    /// Of the gyros; the accelerometers are exact
+    Gyro,
+    /// Of the accelerometers; the gyros are exact
+    Accel,
+}
+
+impl Errors {
+    fn only(self) -> Option<Sensor> {
+        match self {
+            Self::Both => None,
+            Self::Gyro => Some(Sensor::Gyro),
+            Self::Accel => Some(Sensor::Accel),
+        }
+    }
+}
+
+impl Navigate {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let paths = [self.calibration.as_path(), self.truth.as_path()];
+        let names = short_names(&paths);
+        let [calibration, truth] = [
+            CalibrationRecord::read(&self.calibration)?,
+            CalibrationRecord::read(&self.truth)?,
+        ];
+        let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
+            .map(|(name, record)| Named { name, record });
+        let (mut pair, body_frame) = Pair::of_records(of_calibration, of_truth)?;
+        let only = self.errors.only();
+        if let Some(sensor) = only {
+            pair = pair.with_errors_of(sensor);
+        }
+        let (motion, trajectory) = self.motion()?;
+        let mission = Mission {
+            motion,
+            intervals: (self.hours * HOUR / INTERVAL).round() as u32,
+        };
+        let inputs: Vec<&Path> = paths
+            .into_iter()
+            .chain(self.trajectory.as_deref().map(Path::new))
+            .collect();
+        let directory = self
+            .output
+            .as_deref()
+            .map(|target| self.overwrite.directory(target, &inputs))
+            .transpose()?;
+
+        let activity = Activity::new(format!("navigating {} h", self.hours));
+        let moments = mission
+            .navigate(&pair)
+            .with_context(|| self.calibration.display().to_string())?;
+        drop(activity);
+        let navigation = Navigation {
+            calibration: &names[0],
+            truth: &names[1],
+            converged: calibration.converged != Some(false),
+            body_frame,
+            only,
+            mission: &mission,
+            trajectory: trajectory.as_deref(),
+            moments: &moments,
+        };
+        if let Some(directory) = directory {
+            navigation.write(&directory.path())?;
+            directory.commit()?;
+        }
+        if self.json {
+            let document = serde_json::to_string_pretty(&navigation.document())?;
+            return print((document + "\n").as_bytes());
+        }
+        print(navigation.summary().as_bytes())?;
+        if let Some(target) = &self.output {
+            eprintln!("\nreport: {}", target.join("index.html").display());
+        }
+        Ok(())
+    }
+
+    /// How the body moves, and the name of its trajectory.
+    fn motion(&self) -> anyhow::Result<(Motion, Option<String>)> {
+        let latitude = self.latitude_deg.map(|latitude| latitude * DEGREE);
+        if let Some(name) = &self.trajectory {
+            let (mut trajectory, name) = models::trajectory(name, &Place::CommandLine)?;
+            if let Some(latitude) = latitude {
+                trajectory = trajectory.at_latitude(latitude);
+            }
+            if let Some(height) = self.height_m {
+                trajectory = trajectory.at_height(height);
+            }
+            return Ok((Motion::Moving(trajectory), Some(name)));
+        }
+        let Some(latitude) = latitude else {
+            bail!("no latitude: give --latitude-deg, or --trajectory");
+        };
+        let [pitch, roll, heading] = self.attitude_deg.0.map(|angle| angle * DEGREE);
+        let standing = Solution {
+            attitude: from_pitch_roll_heading(pitch, roll, heading),
+            velocity: Vector3::zeros(),
+            latitude,
+            longitude: 0.0,
+            height: self.height_m.unwrap_or(0.0),
+        };
+        Ok((Motion::Standing(standing), None))
+    }
+}
+
+/// A number between two others.
+fn number(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    let expected = || format!("expected a number from {low} to {high}");
+    let value: f64 = text.trim().parse().map_err(|_| expected())?;
+    if (low..=high).contains(&value) {
+        Ok(value)
+    } else {
+        Err(expected())
+    }
+}
+
+fn latitude(text: &str) -> Result<f64, String> {
+    number(text, -90.0, 90.0)
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    number(text, -12e3, 1e5)
+}
+
+fn hours(text: &str) -> Result<f64, String> {
+    number(text, INTERVAL / HOUR, 1000.0)
+}
+
+fn attitude(text: &str) -> Result<Attitude, String> {
+    let angles: Vec<&str> = text.split(',').collect();
+    let [pitch, roll, heading] = angles[..] else {
+        return Err(format!(
+            "expected pitch, roll and heading with commas between, found {} number(s)",
+            angles.len()
+        ));
+    };
+    Ok(Attitude([
+        number(pitch, -LARGEST_PITCH, LARGEST_PITCH).map_err(|e| format!("pitch: {e}"))?,
+        number(roll, -360.0, 360.0).map_err(|e| format!("roll: {e}"))?,
+        number(heading, -360.0, 360.0).map_err(|e| format!("heading: {e}"))?,
+    ]))
+}

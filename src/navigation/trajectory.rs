@@ -1,0 +1,238 @@
+//! Where a body that moves truly is, and what an ideal instrument on it senses.
+//!
+//! Speed, heading and height follow raised-cosine profiles in closed form, and with them velocity,
+//! attitude and their derivatives. Latitude and longitude, which have no closed form, are integrals of
+//! the velocity.
+
+mod leg;
+mod travel;
+
+use thiserror::Error;
+
+use leg::Leg;
+pub use travel::Travel;
+
+/// The least horizontal speed over the climb rate: beyond, pitch would be steeper than a body flies.
+const LEAST_GLIDE: f64 = 2.0;
+/// The least time in s that all segments together take.
+const LEAST_ROUND: f64 = 1.0;
+
+/// A start and segments, gone through again and again.
+///
+/// The body points where it goes: heading is that of the velocity, pitch its angle above the horizon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    start: Start,
+    banks: bool,
+    segments: Vec<Segment>,
+}
+
+/// Where a trajectory starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Geodetic latitude in radians, north positive.
+    pub latitude: f64,
+    /// Longitude in radians, east positive.
+    pub longitude: f64,
+    /// Height above the ellipsoid in m.
+    pub height: f64,
+    /// Heading in radians, clockwise from North.
+    pub heading: f64,
+    /// Horizontal speed in m/s.
+    pub speed: f64,
+}
+
+/// Moves that begin together. The segment ends with the last of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// The least time that it takes, s.
+    pub duration: f64,
+    /// Turn by this angle, rad, clockwise positive.
+    pub turn: Change,
+    /// Change to this horizontal speed, m/s; none keeps it.
+    pub speed: Option<Change>,
+    /// Change to this height above the ellipsoid, m; none keeps it.
+    pub height: Option<Change>,
+}
+
+/// A change of a quantity, and how fast it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// By or to what.
+    pub amount: f64,
+    /// Rate that the change reaches, per s.
+    pub rate: f64,
+    /// Peak of the rate's own rate, per s².
+    pub acceleration: f64,
+}
+
+/// Why a body cannot follow segments.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TrajectoryError {
+    /// Nothing happens, and that for no time.
+    #[error("the segments together take {found} s; give one of them a duration_s or a move")]
+    Short {
+        /// How long they take, s.
+        found: f64,
+    },
+    /// A climb or descent that is too steep.
+    #[error(
+        "segment {segment} climbs or descends at {climb:.2} m/s with {speed:.2} m/s of horizontal speed at \
+         its start or end; at least {:.0} times the climb rate is needed: change speed in a segment of its \
+         own, or climb more slowly",
+        LEAST_GLIDE
+    )]
+    Steep {
+        /// Segment, counted from one.
+        segment: usize,
+        /// Climb rate, m/s.
+        climb: f64,
+        /// Horizontal speed, m/s.
+        speed: f64,
+    },
+}
+
+impl Trajectory {
+    /// A trajectory whose segments fit each other.
+    ///
+    /// # Errors
+    /// If the segments take no time or a climb is too steep.
+    pub fn new(start: Start, banks: bool, segments: Vec<Segment>) -> Result<Self, TrajectoryError> {
+        let trajectory = Self {
+            start,
+            banks,
+            segments,
+        };
+        // The second round may start at another speed than the first.
+        let count = trajectory.segments.len();
+        let mut leg = Leg::before(&start);
+        let mut round = 0.0;
+        for k in 0..2 * count {
+            leg = leg.followed_by(&trajectory.segments[k % count]);
+            if k >= count {
+                round += leg.duration;
+            }
+            let (climb, speed) = (leg.climb_rate(), leg.lower_speed());
+            if climb > 0.0 && speed < LEAST_GLIDE * climb {
+                return Err(TrajectoryError::Steep {
+                    segment: k % count + 1,
+                    climb,
+                    speed,
+                });
+            }
+        }
+        if round < LEAST_ROUND {
+            return Err(TrajectoryError::Short { found: round });
+        }
+        Ok(trajectory)
+    }
+
+    /// Where it starts.
+    pub fn start(&self) -> &Start {
+        &self.start
+    }
+
+    /// The same from another latitude in radians.
+    pub fn at_latitude(mut self, latitude: f64) -> Self {
+        self.start.latitude = latitude;
+        self
+    }
+
+    /// The same from another height in m, all other heights moved with it.
+    pub fn at_height(mut self, height: f64) -> Self {
+        let raised = height - self.start.height;
+        self.start.height = height;
+        for target in self.segments.iter_mut().filter_map(|s| s.height.as_mut()) {
+            target.amount += raised;
+        }
+        self
+    }
+
+    /// Goes through it in steps of `period` seconds.
+    pub fn travel(&self, period: f64) -> Travel<'_> {
+        Travel::new(self, period)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attitude::to_pitch_roll_heading;
+    use crate::models::{self, Place};
+    use crate::units::{DEGREE, STANDARD_GRAVITY};
+
+    fn embedded(name: &str) -> Trajectory {
+        models::trajectory(name, &Place::Embedded).unwrap().0
+    }
+
+    #[test]
+    fn a_round_leads_back_near_the_start() {
+        for (name, round, metres) in [("flight", 5104.0, 2000.0), ("vehicle", 775.0, 200.0)] {
+            let trajectory = embedded(name);
+            let start = trajectory.start;
+            let mut travel = trajectory.travel(1.0);
+            for _ in 0..round as usize {
+                travel.advance();
+            }
+            let end = travel.truth();
+            let apart = 6.4e6 * (end.latitude - start.latitude).hypot(end.longitude * 0.7);
+            assert!(apart < metres, "{name}: {apart}");
+            assert!((end.height - start.height).abs() < 1.0, "{name}");
+            let [.., heading] = to_pitch_roll_heading(&end.attitude);
+            assert!((heading - start.heading).abs() < 1e-9, "{name}: {heading}");
+        }
+    }
+
+    #[test]
+    fn a_body_that_banks_feels_no_force_to_its_side_in_a_level_turn() {
+        let trajectory = embedded("flight");
+        let mut travel = trajectory.travel(1.0);
+        // In the middle of the first full circle.
+        for _ in 0..2080 {
+            travel.advance();
+        }
+        let (rate, force) = travel.sensed();
+        let [pitch, roll, _] = to_pitch_roll_heading(&travel.truth().attitude);
+        let expected = (230.0 * 1.0 * DEGREE / STANDARD_GRAVITY).atan();
+        assert!(pitch == 0.0 && (roll - expected).abs() < 1e-9, "{roll}");
+        // But for Coriolis and the Earth's roundness.
+        assert!(force.x.abs() < 0.1 && force.z > 10.0, "{force}");
+        assert!((rate.norm() - 1.0 * DEGREE).abs() < 2e-4, "{rate}");
+    }
+
+    #[test]
+    fn climbing_without_speed_and_segments_without_time_are_refused() {
+        let start = Start {
+            latitude: 0.5,
+            longitude: 0.0,
+            height: 0.0,
+            heading: 0.0,
+            speed: 10.0,
+        };
+        let change = |amount| Change {
+            amount,
+            rate: 4.0,
+            acceleration: 1.0,
+        };
+        let still = Segment {
+            duration: 0.0,
+            turn: change(0.0),
+            speed: None,
+            height: None,
+        };
+        let of = |segment| Trajectory::new(start, false, vec![segment]);
+        assert!(matches!(of(still), Err(TrajectoryError::Short { .. })));
+        let climb = Segment {
+            height: Some(change(100.0)),
+            ..still
+        };
+        assert!(of(climb).is_err(), "the second round takes no time");
+        let halting = Segment {
+            speed: Some(change(7.0)),
+            duration: 10.0,
+            ..climb
+        };
+        let steep = of(halting).unwrap_err();
+        assert!(matches!(steep, TrajectoryError::Steep { segment: 1, .. }));
+    }
+}

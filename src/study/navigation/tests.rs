@@ -1,0 +1,192 @@
+use nalgebra::Vector2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+use super::*;
+use crate::attitude::from_pitch_roll_heading;
+use crate::calibration::outcome::{from_vector, to_vector};
+use crate::calibration::states::{ParameterVector, sensor_and_parameter};
+use crate::imu::{InstallationForm, ParameterKind};
+use crate::models::{Place, trajectory};
+use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
+
+const FORM: InstallationForm = InstallationForm::General;
+
+fn standing(intervals: u32) -> Mission {
+    Mission {
+        motion: Motion::Standing(Solution {
+            attitude: from_pitch_roll_heading(0.2, -0.3, 0.7),
+            velocity: Vector3::zeros(),
+            latitude: -34.0 * DEGREE,
+            longitude: 0.0,
+            height: 500.0,
+        }),
+        intervals,
+    }
+}
+
+fn moving(name: &str, intervals: u32) -> Mission {
+    Mission {
+        motion: Motion::Moving(trajectory(name, &Place::Embedded).unwrap().0),
+        intervals,
+    }
+}
+
+/// An instrument some way from ideal.
+fn instrument() -> PerSensor<Triad> {
+    let away = ParameterVector::from_fn(|i, _| {
+        let (sensor, of_triad) = sensor_and_parameter(i);
+        let size = match (Triad::kind(of_triad), sensor) {
+            (ParameterKind::Scale, _) => 2500.0 * PPM,
+            (ParameterKind::Installation, _) => 300.0 * ARCSEC,
+            (ParameterKind::Bias, Sensor::Gyro) => 2.0 * DEG_PER_H,
+            (ParameterKind::Bias, Sensor::Accel) => 700.0 * MICRO_G,
+        };
+        size * (1.7 * i as f64).sin()
+    });
+    let ideal = PerSensor::from_fn(|_| Triad::ideal(FORM));
+    from_vector(FORM, &(to_vector(&ideal) + away))
+}
+
+/// A square root of the covariance of a good calibration, with correlations between everything.
+fn root() -> ParameterMatrix {
+    let sigma = ParameterVector::from_fn(|i, _| {
+        let (sensor, of_triad) = sensor_and_parameter(i);
+        match (Triad::kind(of_triad), sensor) {
+            (ParameterKind::Scale, _) => 1.0 * PPM,
+            (ParameterKind::Installation, _) => 0.5 * ARCSEC,
+            (ParameterKind::Bias, Sensor::Gyro) => 0.002 * DEG_PER_H,
+            (ParameterKind::Bias, Sensor::Accel) => 3.0 * MICRO_G,
+        }
+    });
+    ParameterMatrix::from_fn(|i, j| {
+        let mixed = 0.3 * ((3 * i + 7 * j) as f64).sin();
+        sigma[i] * if i == j { 1.0 } else { mixed }
+    })
+}
+
+/// The calibration that errs by so much, true − estimated.
+fn pair(error: &ParameterVector, covariance: Option<ParameterMatrix>) -> Pair {
+    let truth = instrument();
+    Pair {
+        calibration: from_vector(FORM, &(to_vector(&truth) - error)),
+        truth,
+        covariance,
+    }
+}
+
+fn draw(run: u64) -> ParameterVector {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    rng.set_stream(run);
+    root() * ParameterVector::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal))
+}
+
+#[test]
+fn an_exact_calibration_navigates_without_error_wherever_it_goes() {
+    let exact = pair(&ParameterVector::zeros(), None);
+    for (mission, metres, arcsec) in [
+        (standing(2400), 1e-3, 1e-4),
+        (moving("flight", 240), 0.3, 1e-2),
+        (moving("vehicle", 240), 0.3, 1e-2),
+    ] {
+        let end = mission.errors(&exact).unwrap().pop().unwrap().error;
+        println!("{end:?}");
+        assert!(end.attitude.amax() < arcsec * ARCSEC, "{end:?}");
+        assert!(end.horizontal_position() < metres, "{end:?}");
+    }
+}
+
+#[test]
+fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
+    for (name, mission) in [
+        ("standing", standing(600)),
+        ("flight", moving("flight", 120)),
+        ("vehicle", moving("vehicle", 60)),
+    ] {
+        let exposures = mission.exposure(&instrument()).unwrap();
+        for run in 0..2 {
+            // Large enough that the own error of navigation does not count, and linear still.
+            let error = draw(run) * 3.0;
+            let moments = mission.errors(&pair(&error, None)).unwrap();
+            let mut largest = SVector::<f64, STATES>::zeros();
+            let mut apart = SVector::<f64, STATES>::zeros();
+            for (moment, exposure) in moments.iter().zip(&exposures) {
+                let actual = moment.error.to_vector();
+                largest = largest.sup(&actual.abs());
+                apart = apart.sup(&(exposure.by_parameter * error - actual).abs());
+            }
+            // Height and vertical velocity are held.
+            for i in [0, 1, 2, 3, 4, 6, 7] {
+                let relative = apart[i] / largest[i];
+                assert!(relative < 3e-3, "{name} {i}: {relative}");
+            }
+        }
+    }
+}
+
+/// Whether so many of so many runs are within the 99 % interval of a probability.
+fn as_claimed(hits: usize, runs: usize, probability: f64) -> bool {
+    let binomial = Binomial::new(probability, runs as u64).unwrap();
+    let hits = hits as u64;
+    let (below, above) = (binomial.cdf(hits), binomial.sf(hits.saturating_sub(1)));
+    below > 0.005 && above > 0.005
+}
+
+#[test]
+fn predicted_sigma_holds_the_error_after_forty_hours_as_often_as_it_claims() {
+    const RUNS: usize = 400;
+    let mission = standing(2400);
+    let covariance = root() * root().transpose();
+    let exposure = mission.exposure(&instrument()).unwrap().pop().unwrap();
+    let predicted = exposure.covariance(&covariance);
+    let predicted = predicted.fixed_view::<2, 2>(6, 6).into_owned();
+    let inverse = predicted.try_inverse().unwrap();
+    let errors: Vec<Vector2<f64>> = (0..RUNS as u64)
+        .into_par_iter()
+        .map(|run| {
+            let moments = mission.errors(&pair(&draw(run), None)).unwrap();
+            moments.last().unwrap().error.position.xy()
+        })
+        .collect();
+    let count = |holds: &dyn Fn(&Vector2<f64>) -> bool| errors.iter().filter(|e| holds(e)).count();
+    let within = |radius: f64| count(&|e| e.dot(&(inverse * e)) < radius * radius);
+    let east = count(&|e| e.x.powi(2) < predicted[(0, 0)]);
+    let north = count(&|e| e.y.powi(2) < predicted[(1, 1)]);
+    let found = [east, north, within(1.0), within(2.4477)];
+    println!("{found:?} of {RUNS}");
+    for (hits, claimed) in found.into_iter().zip([0.6827, 0.6827, 0.3935, 0.95]) {
+        assert!(as_claimed(hits, RUNS, claimed), "{hits} for {claimed}");
+    }
+}
+
+#[test]
+fn errors_of_both_triads_are_the_sum_of_those_of_each() {
+    let mission = moving("flight", 30);
+    let covariance = root() * root().transpose();
+    let both = pair(&draw(7), Some(covariance));
+    let end = |pair: &Pair| mission.navigate(pair).unwrap().pop().unwrap();
+    let [gyro, accel] = Sensor::ALL.map(|sensor| end(&both.clone().with_errors_of(sensor)));
+    let both = end(&both);
+    let apart = both.error.position - gyro.error.position - accel.error.position;
+    assert!(apart.norm() < 1e-3 * both.error.horizontal_position());
+    let sigma = [both, gyro, accel].map(|moment| moment.sigma().unwrap()[6]);
+    assert!(sigma[1] > 0.0 && sigma[2] > 0.0);
+    assert_ne!(sigma[0], sigma[1].hypot(sigma[2]));
+}
+
+#[test]
+fn a_standing_body_hides_gyro_scale_errors_that_a_turning_one_shows() {
+    let mut error = ParameterVector::zeros();
+    error[2] = 100.0 * PPM;
+    let heading = |mission: Mission| {
+        let moments = mission.errors(&pair(&error, None)).unwrap();
+        let headings = moments.iter().map(|m| m.error.attitude.z.abs());
+        headings.fold(0.0, f64::max)
+    };
+    // A full circle shows 100 ppm of it: 130″.
+    assert!(heading(moving("flight", 120)) > 100.0 * ARCSEC);
+    assert!(heading(standing(120)) < 20.0 * ARCSEC);
+}
