@@ -194,7 +194,7 @@ fn the_linear_courses_are_those_of_nonlinear_navigation_within_one_percent_of_th
             }
             let name = row.reading.name;
             let parts = Quantity::ALL.map(|q| apart[q as usize] / largest[q as usize]);
-            println!("{sensor:?} {name}: {parts:.1e?}");
+            println!("{sensor:?} {name}: {parts:?}");
             assert!(
                 parts.iter().all(|&part| part > 0.0 && part < 0.01),
                 "{sensor:?} {name}: {parts:?}"
