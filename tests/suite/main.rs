@@ -11,3 +11,4 @@ mod outliers;
 mod recorded;
 mod shared;
 mod simulated;
+mod study;

@@ -120,6 +120,7 @@ fn the_filter_knows_the_form_of_an_instrument_that_has_it() {
         let sigma = outcome.estimate.sigma();
         assert!(estimated.iter().all(|&i| error[i].abs() < 4.5 * sigma[i]));
         assert!(outcome.converged);
+        assert!(outcome.form_test.is_none_or(|test| !test.rejects()));
     }
 }
 
@@ -130,10 +131,11 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations_not_g
     assert!(outcome.converged);
     assert!(outcome.consistency.velocity.mean > 100.0 && outcome.consistency.table.mean > 100.0);
     assert!(outcome.innovations.iter().all(|i| i.accepted));
-    assert!(
-        outcome
-            .warnings
-            .iter()
-            .any(|w| w.contains("model do not fit"))
-    );
+    assert!(outcome.form_test.is_some_and(|test| test.rejects()));
+    for sentence in [
+        "model do not fit",
+        "The data reject the three-angle installation form",
+    ] {
+        assert!(outcome.warnings.iter().any(|w| w.contains(sentence)));
+    }
 }
