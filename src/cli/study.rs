@@ -1,6 +1,7 @@
 //! `turncal study`
 
 mod accuracy;
+mod experiment;
 
 use clap::Subcommand;
 
@@ -15,12 +16,14 @@ pub struct Study {
 #[derive(Debug, Subcommand)]
 enum Question {
     Accuracy(accuracy::Accuracy),
+    Experiment(experiment::Experiment),
 }
 
 impl Study {
     pub fn run(&self) -> anyhow::Result<()> {
         match &self.question {
             Question::Accuracy(accuracy) => accuracy.run(),
+            Question::Experiment(experiment) => experiment.run(),
         }
     }
 }
