@@ -5,6 +5,8 @@ mod budget;
 mod distribution;
 mod document;
 mod tables;
+#[cfg(test)]
+mod tests;
 mod time;
 mod verdict;
 

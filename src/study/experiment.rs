@@ -9,6 +9,8 @@ mod alignment;
 mod budget;
 mod method;
 mod noise;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::{SMatrix, Vector3};
 use rayon::prelude::*;
@@ -17,7 +19,6 @@ use super::Ratio;
 use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
 use super::ratio::{bootstrap, median, quantile};
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::outcome::to_vector;
 use crate::calibration::states::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::ModelError;
@@ -34,7 +35,7 @@ const POSITIONS: &str = "six-position";
 /// A path of the filter that takes the closed form's table time.
 const HOUR_PATH: &str = "three-axis-hour";
 /// Minutes between two points of a curve against time.
-const EVERY: usize = 30;
+const EVERY: usize = 10;
 
 /// What is studied.
 #[derive(Debug, Clone)]
@@ -141,6 +142,8 @@ pub struct Spread {
     pub mean: f64,
     /// Root of the mean square.
     pub rms: f64,
+    /// A quarter of all are below the first, three quarters below the second.
+    pub quartiles: (f64, f64),
     /// 68 % are below.
     pub below_68: f64,
     /// 95 % are below.
@@ -157,6 +160,7 @@ impl Spread {
             median: quantile(&sorted, 0.5),
             mean: sorted.iter().sum::<f64>() / count,
             rms: (sorted.iter().map(|x| x * x).sum::<f64>() / count).sqrt(),
+            quartiles: (quantile(&sorted, 0.25), quantile(&sorted, 0.75)),
             below_68: quantile(&sorted, 0.68),
             below_95: quantile(&sorted, 0.95),
         }
@@ -344,9 +348,4 @@ fn of_triad(error: &ParameterVector, sensor: Sensor) -> ParameterVector {
     only.fixed_rows_mut::<PER_TRIAD>(first)
         .copy_from(&error.fixed_rows::<PER_TRIAD>(first));
     only
-}
-
-/// Errors of parameters in the general form, true − estimated.
-fn errors(truth: &PerSensor<Triad>, estimate: &PerSensor<Triad>) -> ParameterVector {
-    to_vector(truth) - to_vector(estimate)
 }

@@ -107,6 +107,9 @@ fn panel(area: &Area, navigated: &Navigated, y: Axis) -> Result<(), DrawError> {
                 ],
                 pen(estimator),
             )?;
+            if height < foot {
+                continue;
+            }
             let metres = height * crate::units::NAUTICAL_MILE;
             let above = (HPos::Center, VPos::Bottom);
             panel.text((x, height_shown), (0.0, -3.0), &nmile(metres), above)?;

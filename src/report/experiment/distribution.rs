@@ -12,12 +12,12 @@ use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Worth};
 
 /// Half the height of a box, in places of the axis.
-const HALF: f64 = 0.26;
+const HALF: f64 = 0.2;
 
 pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let caption = String::from(
         "Horizontal position error at the end, logarithmic, the same axis for all. Dots: instruments; \
-         thick line with its value: median; box: from zero to where 68 % lie, its inner line at 95 %; \
+         thick line with its value: median; box: the middle half; line beyond: 95 % are below; \
          dashed: median of what the noise of the instrument alone makes.",
     );
     let all: Vec<f64> = experiment
@@ -35,7 +35,7 @@ pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
         "distribution.svg",
         "Position error at the end",
         caption,
-        (1200, 300 * rows as u32),
+        (1200, 330 * rows as u32),
         |area| {
             for (navigated, area) in experiment
                 .navigations
@@ -59,7 +59,7 @@ fn panel(
     let methods: Vec<&Worth> = navigated.methods.iter().rev().collect();
     let names = methods.iter().map(|w| method_name(experiment, w.method));
     let y = Axis::places(names);
-    let (left, top) = (x.low(), y.high());
+    let top = y.high();
     let mut panel = Panel::new(
         area,
         &format!(
@@ -67,7 +67,7 @@ fn panel(
             situation_name(navigated.situation)
         ),
         Margins {
-            left: 190.0,
+            left: 225.0,
             right: 70.0,
         },
         (x, y),
@@ -77,30 +77,33 @@ fn panel(
     let noise = miles(navigated.noise.median);
     panel.line(&[(noise, -0.5), (noise, top)], Pen::dashed(QUIET, 1.25))?;
     for (place, worth) in methods.iter().enumerate() {
-        boxed(&mut panel, place as f64, worth, left)?;
+        boxed(&mut panel, place as f64, worth)?;
     }
     panel.finish()
 }
 
-fn boxed(panel: &mut Panel, place: f64, worth: &Worth, left: f64) -> Result<(), DrawError> {
+fn boxed(panel: &mut Panel, place: f64, worth: &Worth) -> Result<(), DrawError> {
     let pen = pen(worth.method.estimator);
     let (below, above) = (place - HALF, place + HALF);
-    let (most, all) = (miles(worth.at_end.below_68), miles(worth.at_end.below_95));
+    let (first, third) = worth.at_end.quartiles;
+    let (first, third) = (miles(first), miles(third));
+    let (median, most) = (miles(worth.at_end.median), miles(worth.at_end.below_95));
     panel.band(
-        &[(left, below), (most, below)],
-        &[(left, above), (most, above)],
+        &[(first, below), (third, below)],
+        &[(first, above), (third, above)],
     )?;
-    let dots: Vec<(f64, f64)> = worth.errors.iter().map(|&e| (miles(e), place)).collect();
-    panel.marks(&dots, Mark::Dot, Pen::solid(pen.color, 0.25))?;
-    for (at, width) in [(most, 1.0), (all, 1.0), (miles(worth.at_end.median), 3.0)] {
-        let color = if width > 1.0 { INK } else { pen.color };
-        panel.line(&[(at, below), (at, above)], Pen::solid(color, width))?;
+    for at in [first, third, most] {
+        panel.line(&[(at, below), (at, above)], Pen::solid(pen.color, 1.0))?;
     }
+    panel.line(&[(third, place), (most, place)], Pen::solid(pen.color, 1.0))?;
+    let dots: Vec<(f64, f64)> = worth.errors.iter().map(|&e| (miles(e), place)).collect();
+    panel.marks(&dots, Mark::Dot, Pen::solid(pen.color, 0.5))?;
+    panel.line(&[(median, below), (median, above)], Pen::solid(INK, 3.0))?;
     panel.text(
         (miles(worth.at_end.median), place),
-        (5.0, -2.0),
+        (0.0, -8.0),
         &nmile(worth.at_end.median),
-        (HPos::Left, VPos::Bottom),
+        (HPos::Center, VPos::Bottom),
     )
 }
 

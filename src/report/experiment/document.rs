@@ -40,6 +40,7 @@ struct MethodFigures {
     table_time_s: f64,
     failures: usize,
     not_converged: usize,
+    form_rejections: usize,
     position_nmile: Spread,
     /// 99 %, bootstrap over instruments.
     median_interval: (f64, f64),
@@ -159,6 +160,7 @@ fn figures(experiment: &Experiment, place: usize, worth: &Worth) -> MethodFigure
             .unwrap_or(f64::NAN),
         failures: calibrations().filter(|c| c.is_err()).count(),
         not_converged: calibrations().flatten().filter(|c| !c.converged).count(),
+        form_rejections: calibrations().flatten().filter(|c| c.rejects_form).count(),
         position_nmile: Spread::of(&worth.at_end),
         median_interval: (miles(low), miles(high)),
         largest_position_nmile: Spread::of(&worth.largest),

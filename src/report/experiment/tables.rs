@@ -26,11 +26,22 @@ pub(super) fn tables(experiment: &Experiment) -> Vec<Table> {
         .map(|navigated| errors(experiment, navigated))
         .collect();
     if let Some(standing) = navigated(experiment, Situation::SelfAligned) {
-        tables.push(paper(experiment, standing));
+        tables.push(paper(
+            experiment,
+            standing,
+            "Beside the paper: one triad's errors alone, aligned by itself",
+        ));
         tables.push(budget(
             experiment,
             standing,
             "Error budget, standing, aligned by itself",
+        ));
+    }
+    if let Some(standing) = navigated(experiment, Situation::Aligned) {
+        tables.push(paper(
+            experiment,
+            standing,
+            "Beside the paper: one triad's errors alone, alignment given",
         ));
     }
     if let Some(moving) = navigated(experiment, Situation::Moving) {
@@ -117,7 +128,7 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
     }
 }
 
-fn paper(experiment: &Experiment, standing: &Navigated) -> Table {
+fn paper(experiment: &Experiment, standing: &Navigated, title: &'static str) -> Table {
     let of = |estimator, form, sensor| {
         let method = Method { estimator, form };
         let worth = standing.methods.iter().find(|w| w.method == method);
@@ -154,7 +165,7 @@ fn paper(experiment: &Experiment, standing: &Navigated) -> Table {
         sections.push(rows.collect());
     }
     let mut notes = vec![
-        "Standing, aligned by itself with the errors of that triad alone. Paper: one instrument on one \
+        "Standing, position error at the end; the other triad is exact. Paper: one instrument on one \
          table, closed form (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated."
             .to_owned(),
     ];
@@ -165,7 +176,7 @@ fn paper(experiment: &Experiment, standing: &Navigated) -> Table {
         ));
     }
     Table {
-        title: "Beside the paper: one triad's errors alone",
+        title,
         headings,
         sections,
         notes,

@@ -10,17 +10,17 @@ use crate::imu::InstallationForm;
 use crate::study::Experiment;
 use crate::study::experiment::{Navigated, Worth};
 
+/// Below this nothing is worth a place on the axis, nmile.
+const LEAST: f64 = 0.01;
+
 pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let caption = String::from(
         "Median over all instruments of the horizontal position error, logarithmic, the same axes for \
          all. Colour: what calibrated; solid: general form, dashed: six-angle, dotted: three-angle.",
     );
     let ends = experiment.navigations.iter().flat_map(|n| &n.methods);
-    let points = ends.flat_map(line).map(|p| p.1).filter(|y| *y > 0.0);
-    let (low, high) = points.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
-        (low.min(y), high.max(y))
-    });
-    let y = Axis::log_between(0.8 * low, 1.25 * high);
+    let points = ends.flat_map(line).map(|p| p.1).filter(|y| *y > LEAST);
+    let y = Axis::log(points);
     let rows = experiment.navigations.len().max(1);
     Figure::draw(
         "time.svg",
@@ -63,7 +63,7 @@ fn panel(
         ),
         Margins {
             left: 60.0,
-            right: 200.0,
+            right: 250.0,
         },
         (Axis::linear(0.0, hours(experiment)), y),
         "time, h",

@@ -96,7 +96,7 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<Sentence> {
     })
 }
 
-/// Calibrations that failed or did not converge.
+/// Calibrations that failed, did not converge, or whose data reject the form.
 fn failures(experiment: &Experiment) -> Vec<Sentence> {
     let trials = &experiment.trials;
     let mut sentences = Vec::new();
@@ -104,6 +104,7 @@ fn failures(experiment: &Experiment) -> Vec<Sentence> {
         let all = || trials.iter().filter_map(|t| t.calibrations.get(place));
         let failed = all().filter(|c| c.is_err()).count();
         let wandering = all().flatten().filter(|c| !c.converged).count();
+        let rejected = all().flatten().filter(|c| c.rejects_form).count();
         let name = method_name(experiment, method);
         if failed > 0 {
             let reason = all().find_map(|c| c.as_ref().err());
@@ -112,6 +113,13 @@ fn failures(experiment: &Experiment) -> Vec<Sentence> {
                 count(failed),
                 count(trials.len()),
                 reason.map_or("", String::as_str)
+            ));
+        }
+        if rejected > 0 {
+            sentences.push(format!(
+                "{name}: the data reject the form for {} of {} instruments.",
+                count(rejected),
+                count(trials.len())
             ));
         }
         if wandering > 0 {

@@ -1,9 +1,10 @@
 //! The methods, and what each makes of an instrument.
 
-use super::{ExperimentError, HOUR_PATH, POSITIONS, errors};
+use super::{ExperimentError, HOUR_PATH, POSITIONS};
+use crate::calibration::outcome::to_vector;
 use crate::calibration::states::{ParameterMatrix, ParameterVector};
 use crate::calibration::{Estimate, estimate, in_general_form, six_position};
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};
 use crate::turntable::TableError;
@@ -67,6 +68,8 @@ pub struct Calibrated {
     pub covariance: ParameterMatrix,
     /// False if the method says that it did not converge.
     pub converged: bool,
+    /// Whether the method says that the data reject its installation form.
+    pub rejects_form: bool,
 }
 
 /// What is simulated for each estimator.
@@ -114,26 +117,25 @@ fn calibrated(
     form: InstallationForm,
 ) -> Result<Calibrated, String> {
     let Simulated { run, truth, .. } = simulated;
-    let (estimate, converged) = match estimator {
+    let truth = in_general_form(truth);
+    let against_truth = |estimate: &Estimate, converged, rejects_form| {
+        let estimate = estimate.in_general_form();
+        Calibrated {
+            error: to_vector(&truth) - estimate.vector(),
+            covariance: estimate.covariance,
+            converged,
+            rejects_form,
+        }
+    };
+    match estimator {
         Estimator::ClosedForm => {
             let closed_form = six_position(run, form).map_err(|error| error.to_string())?;
-            (closed_form.estimate, true)
+            Ok(against_truth(&closed_form.estimate, true, false))
         }
         Estimator::Filter | Estimator::LongFilter => {
             let outcome = estimate(run, form, &|_| {}).map_err(|error| error.to_string())?;
-            (outcome.estimate, outcome.converged)
-        }
-    };
-    Ok(Calibrated::new(truth, &estimate, converged))
-}
-
-impl Calibrated {
-    fn new(truth: &PerSensor<Triad>, estimate: &Estimate, converged: bool) -> Self {
-        let estimate = estimate.in_general_form();
-        Self {
-            error: errors(&in_general_form(truth), &estimate.triads),
-            covariance: estimate.covariance,
-            converged,
+            let rejects = outcome.form_test.is_some_and(|test| test.rejects());
+            Ok(against_truth(&outcome.estimate, outcome.converged, rejects))
         }
     }
 }
