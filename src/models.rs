@@ -74,6 +74,7 @@ embed!(
     "industrial-mems",
     "navigation-fog",
     "paper",
+    "paper-unsteady",
     "ring-laser",
     "tactical-fog",
 );
@@ -98,6 +99,7 @@ embed!(
     "single-axis",
     "six-position",
     "three-axis",
+    "three-axis-hour",
     "two-axis",
 );
 embed!(
@@ -105,6 +107,7 @@ embed!(
     "scenario",
     "demo",
     "demo-six-position",
+    "experiment",
     "mems",
     "nineteen-position",
     "single-axis",

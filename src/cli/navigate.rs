@@ -212,7 +212,8 @@ fn height(text: &str) -> Result<f64, String> {
     number(text, -12e3, 1e5)
 }
 
-fn hours(text: &str) -> Result<f64, String> {
+/// Hours of a navigation.
+pub(super) fn hours(text: &str) -> Result<f64, String> {
     number(text, INTERVAL / HOUR, 1000.0)
 }
 

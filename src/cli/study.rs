@@ -1,6 +1,7 @@
 //! `turncal study`
 
 mod accuracy;
+mod experiment;
 mod table1;
 
 use clap::Subcommand;
@@ -16,6 +17,7 @@ pub struct Study {
 #[derive(Debug, Subcommand)]
 enum Question {
     Accuracy(accuracy::Accuracy),
+    Experiment(experiment::Experiment),
     Table1(table1::Table1),
 }
 
@@ -23,6 +25,7 @@ impl Study {
     pub fn run(&self) -> anyhow::Result<()> {
         match &self.question {
             Question::Accuracy(accuracy) => accuracy.run(),
+            Question::Experiment(experiment) => experiment.run(),
             Question::Table1(table1) => table1.run(),
         }
     }

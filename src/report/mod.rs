@@ -9,6 +9,7 @@ mod canvas;
 mod comparison;
 mod correlation;
 mod estimates;
+pub mod experiment;
 mod facts;
 pub mod group;
 mod innovations;

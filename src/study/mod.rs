@@ -1,10 +1,12 @@
 //! Studies: what many simulated runs say.
 
 pub mod accuracy;
+pub mod experiment;
 pub mod navigation;
 mod ratio;
 pub mod table1;
 
 pub use accuracy::{Accuracy, AccuracyStudy, GroupAccuracy};
+pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use table1::{Table1, Table1Study};

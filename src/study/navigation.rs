@@ -11,8 +11,8 @@ use crate::calibration::{Comparison, ComparisonError, Named, compare};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{INPUTS, STATES};
 use crate::navigation::{
-    ErrorMatrix, ErrorModel, Height, Increments, NavigationError, NearPole, Sensitivity, Solution,
-    Strapdown, Trajectory, Transition, sensed_errors,
+    ErrorMatrix, ErrorModel, ErrorVector, Height, Increments, NavigationError, NearPole,
+    Sensitivity, Solution, Strapdown, Trajectory, Transition, sensed_errors,
 };
 use crate::run::record::BodyFrame;
 use course::Course;
@@ -201,6 +201,18 @@ impl Mission {
     /// # Errors
     /// As for [`Self::navigate`].
     pub fn errors(&self, pair: &Pair) -> Result<Vec<Moment>, NavigationStudyError> {
+        self.errors_from(&ErrorVector::zeros(), pair)
+    }
+
+    /// The same from a start with these errors.
+    ///
+    /// # Errors
+    /// As for [`Self::navigate`].
+    pub fn errors_from(
+        &self,
+        start: &ErrorVector,
+        pair: &Pair,
+    ) -> Result<Vec<Moment>, NavigationStudyError> {
         let sensed = pair.sensed()?;
         let steps = match &self.motion {
             Motion::Standing(_) => STANDING_STEPS,
@@ -208,7 +220,7 @@ impl Mission {
         };
         let period = INTERVAL / f64::from(steps);
         let mut course = Course::new(&self.motion, period);
-        let mut navigation = Strapdown::new(*course.truth(), period)?;
+        let mut navigation = Strapdown::new(course.truth().with_errors(start), period)?;
         let mut moments = vec![moment(0.0, &navigation, course.truth())];
         for interval in 1..=self.intervals {
             for _ in 0..steps {
@@ -239,6 +251,18 @@ impl Mission {
         &self,
         truth: &PerSensor<Triad>,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
+        self.exposure_from(Sensitivity::new(), truth)
+    }
+
+    /// The same where the errors at the start depend on the parameters, too.
+    ///
+    /// # Errors
+    /// As for [`Self::navigate`].
+    pub fn exposure_from(
+        &self,
+        start: Sensitivity<PARAMETERS>,
+        truth: &PerSensor<Triad>,
+    ) -> Result<Vec<Exposure>, NavigationStudyError> {
         let steps = match &self.motion {
             Motion::Standing(_) => 1,
             Motion::Moving(_) => LINEAR_STEPS,
@@ -246,7 +270,7 @@ impl Mission {
         let step = INTERVAL / f64::from(steps);
         // Each step is linearised in its middle.
         let mut course = Course::new(&self.motion, 0.5 * step);
-        let mut sensitivity = Sensitivity::<PARAMETERS>::new();
+        let mut sensitivity = start;
         let mut steady: Option<Linear> = None;
         let mut exposures = vec![exposure(0.0, &sensitivity, course.truth())?];
         for interval in 1..=self.intervals {

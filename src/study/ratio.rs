@@ -1,4 +1,4 @@
-//! The ratio of two root mean squares with a bootstrap interval.
+//! Ratios of two methods over the same runs, with a bootstrap interval.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +10,7 @@ const OUTSIDE: f64 = 0.01;
 /// The bootstrap's own seed: its draws have nothing to do with those of the runs.
 const SEED: u64 = 0;
 
-/// A ratio of root mean squares.
+/// A ratio of root mean squares, or of medians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
     /// Of all runs.
@@ -24,27 +24,64 @@ impl Ratio {
     /// The ratio of two root mean squares of the same runs, each given by the sum of squares of each
     /// run; `None` without runs.
     pub(super) fn of(over: &[f64], under: &[f64]) -> Option<Self> {
-        let runs = over.len().min(under.len());
-        if runs == 0 {
-            return None;
-        }
-        let ratio = |(over, under): (f64, f64)| (over / under).sqrt();
-        let sums = |run: &mut dyn FnMut(usize) -> usize| {
-            (0..runs).fold((0.0, 0.0), |(a, b), k| {
-                let k = run(k);
-                (a + over[k], b + under[k])
-            })
-        };
-        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-        let mut samples: Vec<f64> = (0..SAMPLES)
-            .map(|_| ratio(sums(&mut |_| rng.random_range(0..runs))))
-            .collect();
-        samples.sort_by(f64::total_cmp);
-        let at = |share: f64| samples[((SAMPLES - 1) as f64 * share).round() as usize];
-        Some(Self {
-            value: ratio(sums(&mut |k| k)),
-            interval: (at(OUTSIDE / 2.0), at(1.0 - OUTSIDE / 2.0)),
+        let sum = |of: &[f64], chosen: &[usize]| chosen.iter().map(|&k| of[k]).sum::<f64>();
+        let ratio = |chosen: &[usize]| (sum(over, chosen) / sum(under, chosen)).sqrt();
+        Self::bootstrapped(over.len().min(under.len()), ratio)
+    }
+
+    /// The ratio of the medians of the same runs; `None` without runs.
+    pub(super) fn of_medians(over: &[f64], under: &[f64]) -> Option<Self> {
+        let ratio = |chosen: &[usize]| median(over, chosen) / median(under, chosen);
+        Self::bootstrapped(over.len().min(under.len()), ratio)
+    }
+
+    fn bootstrapped(runs: usize, statistic: impl Fn(&[usize]) -> f64) -> Option<Self> {
+        let (value, interval) = bootstrap(runs, statistic)?;
+        Some(Self { value, interval })
+    }
+}
+
+/// A statistic of all runs, which are given by their numbers, with its 99 % interval; `None` without
+/// runs.
+pub(super) fn bootstrap(
+    runs: usize,
+    statistic: impl Fn(&[usize]) -> f64,
+) -> Option<(f64, (f64, f64))> {
+    if runs == 0 {
+        return None;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut samples: Vec<f64> = (0..SAMPLES)
+        .map(|_| {
+            let chosen: Vec<usize> = (0..runs).map(|_| rng.random_range(0..runs)).collect();
+            statistic(&chosen)
         })
+        .collect();
+    samples.sort_by(f64::total_cmp);
+    let at = |share: f64| samples[((SAMPLES - 1) as f64 * share).round() as usize];
+    let all: Vec<usize> = (0..runs).collect();
+    Some((
+        statistic(&all),
+        (at(OUTSIDE / 2.0), at(1.0 - OUTSIDE / 2.0)),
+    ))
+}
+
+/// The median of some of the values, which are given by their numbers.
+pub(super) fn median(of: &[f64], chosen: &[usize]) -> f64 {
+    let mut values: Vec<f64> = chosen.iter().map(|&k| of[k]).collect();
+    values.sort_by(f64::total_cmp);
+    quantile(&values, 0.5)
+}
+
+/// The value below which this share of sorted values lies, between two of them by proportion; NaN of
+/// none.
+pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = share * sorted.len().saturating_sub(1) as f64;
+    let (below, part) = (place as usize, place.fract());
+    match (sorted.get(below), sorted.get(below + 1)) {
+        (Some(low), Some(high)) => low + part * (high - low),
+        (Some(&last), None) => last,
+        (None, _) => f64::NAN,
     }
 }
 
@@ -81,5 +118,14 @@ mod tests {
         let ratio = Ratio::of(&[4.0, 16.0, 36.0], &squares).unwrap();
         assert_eq!((ratio.value, ratio.interval), (2.0, (2.0, 2.0)));
         assert_eq!(Ratio::of(&[], &[]), None);
+        let ratio = Ratio::of_medians(&[2.0, 6.0, 4.0], &[1.0, 3.0, 2.0]).unwrap();
+        assert_eq!((ratio.value, ratio.interval), (2.0, (2.0, 2.0)));
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_lies_between_the_middle_two() {
+        assert_eq!(quantile(&[1.0, 2.0, 4.0, 8.0], 0.5), 3.0);
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 1.0), 4.0);
+        assert!(quantile(&[], 0.5).is_nan());
     }
 }

@@ -1,0 +1,90 @@
+//! `turncal study experiment`
+
+use std::path::{Path, PathBuf};
+
+use turncal::models::{self, Place};
+use turncal::report;
+use turncal::simulation::Scenario;
+use turncal::study::ExperimentStudy;
+use turncal::study::navigation::INTERVAL;
+
+use super::super::navigate::hours;
+use super::super::output::{Overwrite, print};
+use super::super::progress::Runs;
+
+const HOUR: f64 = 3600.0;
+const SCENARIO: &str = "experiment";
+
+/// The paper's turntable experiment: what each calibration is worth in 40 h of navigation
+///
+/// Simulates many instruments on a table with position errors, with noise and wandering biases.
+/// Calibrates each by the closed form on the paper's static positions and by the filter, in a sixth of
+/// that time and in the same time, in all installation forms, and navigates with what is left: standing,
+/// aligned by the calibrated instrument itself or perfectly, and moving. Shows the position error of
+/// every method, and which parameters make it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal study experiment
+  turncal study experiment --samples 200 --seed 3 -o experiment
+  turncal study experiment --trajectory vehicle --hours 2 --json")]
+pub struct Experiment {
+    /// Number of instruments
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(2..))]
+    samples: u64,
+    /// Seed of all random numbers [default: the scenario's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// What the instrument that moves follows: a TOML file or an embedded name
+    #[arg(long, value_name = "TRAJECTORY", default_value = "flight")]
+    trajectory: String,
+    /// How long each navigates, to the minute, up to 1000
+    #[arg(long, default_value_t = 40.0, value_parser = hours)]
+    hours: f64,
+    /// Directory for a report
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Print the figures as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Experiment {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let scenario = Scenario::load(SCENARIO)?;
+        let (trajectory, trajectory_name) =
+            models::trajectory(&self.trajectory, &Place::CommandLine)?;
+        let study = ExperimentStudy {
+            seed: self.seed.unwrap_or(scenario.seed),
+            scenario,
+            trajectory,
+            trajectory_name,
+            intervals: (self.hours * HOUR / INTERVAL).round() as u32,
+            samples: self.samples,
+        };
+        let target = self.output.as_deref();
+        let directory = target
+            .map(|target| {
+                self.overwrite
+                    .directory(target, &[Path::new(&self.trajectory)])
+            })
+            .transpose()?;
+        let runs = Runs::new(self.samples);
+        let experiment = study.run(&|| runs.one_done())?;
+        drop(runs);
+        if let Some(directory) = directory {
+            report::experiment::write(&experiment, &directory.path())?;
+            directory.commit()?;
+        }
+        if self.json {
+            let document = report::experiment::document(&experiment);
+            return print((serde_json::to_string_pretty(&document)? + "\n").as_bytes());
+        }
+        print(report::experiment::summary(&experiment).as_bytes())?;
+        if let Some(target) = target {
+            eprintln!("\nreport: {}", target.join("index.html").display());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+//! Which group of parameters makes how much of the position error.
+
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::super::axis::Axis;
+use super::super::canvas::{Area, DrawError};
+use super::super::panel::{Margins, Panel};
+use super::super::{Figure, ReportError};
+use super::distribution::pen;
+use super::tables::nmile;
+use super::{estimator_name, in_general, miles, situation_name};
+use crate::calibration::Group;
+use crate::study::Experiment;
+use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
+
+/// Half the width of a bar, and from one to the next, in places of the axis.
+const HALF: f64 = 0.12;
+const APART: f64 = 0.28;
+
+pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
+    let names: Vec<String> = Estimator::ALL
+        .map(|estimator| estimator_name(experiment, estimator))
+        .to_vec();
+    let caption = format!(
+        "Root mean square of the position error at the end that each group would make alone, and of all \
+         together, from the claimed covariance in the general form, and of the errors there were; \
+         logarithmic, the same axis for both. Bars from left to right: {}.",
+        names.join(", ")
+    );
+    let shown: Vec<&Navigated> = experiment
+        .navigations
+        .iter()
+        .filter(|n| n.situation != Situation::Aligned)
+        .collect();
+    let all = shown.iter().flat_map(|n| {
+        let worths = Estimator::ALL.into_iter().filter_map(|e| in_general(n, e));
+        worths.flat_map(heights)
+    });
+    let (low, high) = all
+        .filter(|y| *y > 0.0)
+        .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
+            (low.min(y), high.max(y))
+        });
+    // What is a thousandth of the whole is nothing.
+    let y = Axis::log_between(low.max(1e-3 * high) * 0.7, 1.8 * high);
+    let rows = shown.len().max(1);
+    Figure::draw(
+        "budget.svg",
+        "Error budget",
+        caption,
+        (1200, 360 * rows as u32),
+        |area| {
+            for (navigated, area) in shown.iter().zip(area.split_evenly((rows, 1))) {
+                panel(&area, navigated, y.clone())?;
+            }
+            Ok(())
+        },
+    )
+}
+
+/// Of each group alone, of all as claimed and as they were, nmile.
+fn heights(worth: &Worth) -> Vec<f64> {
+    let budget = &worth.budget;
+    let alone = budget.parts.iter().map(|part| part.alone);
+    alone
+        .chain([budget.claimed, budget.actual])
+        .map(miles)
+        .collect()
+}
+
+fn panel(area: &Area, navigated: &Navigated, y: Axis) -> Result<(), DrawError> {
+    let all = ["all, claimed", "all, actual"].map(str::to_owned);
+    let x = Axis::places(Group::all().map(Group::title).chain(all));
+    let foot = y.low();
+    let mut panel = Panel::new(
+        area,
+        &format!(
+            "{}: position error alone, RMS, nmile",
+            situation_name(navigated.situation)
+        ),
+        Margins {
+            left: 60.0,
+            right: 24.0,
+        },
+        (x, y),
+        "",
+        &[],
+    )?;
+    for (n, estimator) in Estimator::ALL.into_iter().enumerate() {
+        let Some(worth) = in_general(navigated, estimator) else {
+            continue;
+        };
+        for (place, height) in heights(worth).into_iter().enumerate() {
+            let x = place as f64 + APART * (n as f64 - 1.0);
+            let (left, right) = (x - HALF, x + HALF);
+            let height_shown = height.max(foot);
+            panel.band(
+                &[(left, foot), (right, foot)],
+                &[(left, height_shown), (right, height_shown)],
+            )?;
+            panel.line(
+                &[
+                    (left, foot),
+                    (left, height_shown),
+                    (right, height_shown),
+                    (right, foot),
+                ],
+                pen(estimator),
+            )?;
+            if height < foot {
+                continue;
+            }
+            let metres = height * crate::units::NAUTICAL_MILE;
+            let above = (HPos::Center, VPos::Bottom);
+            panel.text((x, height_shown), (0.0, -3.0), &nmile(metres), above)?;
+        }
+    }
+    panel.finish()
+}

@@ -1,0 +1,351 @@
+//! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated by
+//! the closed form and by the filter, and navigate with what is left of their errors.
+//!
+//! A calibration's navigation error is `error(t) = (S(t) + Φ(t) X₀) δθ`: S what the parameter errors
+//! δθ do on the way, X₀ what they did to the alignment at the start. Both are linear, so each mission
+//! is followed once and serves every calibration.
+
+mod alignment;
+mod budget;
+mod method;
+mod noise;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{SMatrix, Vector3};
+use rayon::prelude::*;
+
+use super::Ratio;
+use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
+use super::ratio::{bootstrap, median, quantile};
+use crate::attitude::from_pitch_roll_heading;
+use crate::calibration::states::{PARAMETERS, ParameterVector, parameter};
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::models::ModelError;
+use crate::navigation::{Sensitivity, Solution, Trajectory, sensed_errors};
+use crate::simulation::Scenario;
+use crate::turntable::TableError;
+
+pub use budget::{Budget, Part};
+pub use method::{Calibrated, Estimator, Method, Trial};
+pub use noise::ALIGNMENT_TIME;
+
+/// The paper's static positions, on which the closed form is made.
+const POSITIONS: &str = "six-position";
+/// A path of the filter that takes the closed form's table time.
+const HOUR_PATH: &str = "three-axis-hour";
+/// Minutes between two points of a curve against time.
+const EVERY: usize = 10;
+
+/// What is studied.
+#[derive(Debug, Clone)]
+pub struct ExperimentStudy {
+    /// What is simulated; its path is the filter's short one.
+    pub scenario: Scenario,
+    /// How the body moves where it moves.
+    pub trajectory: Trajectory,
+    /// Name of the trajectory.
+    pub trajectory_name: String,
+    /// How many intervals of [`super::navigation::INTERVAL`] each navigation lasts.
+    pub intervals: u32,
+    /// Number of instruments.
+    pub samples: u64,
+    /// Seed; each instrument has its own streams of it.
+    pub seed: u64,
+}
+
+/// An experiment that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// A path that belongs to the experiment cannot be had.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A path is beyond the table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A mission cannot be navigated.
+    #[error(transparent)]
+    Navigation(#[from] NavigationStudyError),
+}
+
+/// How an instrument navigates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Situation {
+    /// It stands level, heading North, and has found its attitude by itself.
+    SelfAligned,
+    /// It stands so and was given its attitude.
+    Aligned,
+    /// It follows the trajectory and was given its attitude at the start.
+    Moving,
+}
+
+impl Situation {
+    /// All, in the order of every result.
+    pub const ALL: [Self; 3] = [Self::SelfAligned, Self::Aligned, Self::Moving];
+}
+
+/// The result.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// What was studied.
+    pub study: ExperimentStudy,
+    /// Table time of each of [`Method::all`], s.
+    pub table_times: Vec<f64>,
+    /// Every instrument, in order.
+    pub trials: Vec<Trial>,
+    /// Each of [`Situation::ALL`].
+    pub navigations: Vec<Navigated>,
+}
+
+/// What the methods are worth in one situation.
+#[derive(Debug, Clone)]
+pub struct Navigated {
+    /// The situation.
+    pub situation: Situation,
+    /// Each of [`Method::all`].
+    pub methods: Vec<Worth>,
+    /// Horizontal position error at the end in m that the noise of alignment and navigation makes by
+    /// itself, after any calibration.
+    pub noise: Spread,
+}
+
+/// What a method is worth: horizontal position errors in m over all instruments.
+#[derive(Debug, Clone)]
+pub struct Worth {
+    /// The method.
+    pub method: Method,
+    /// At the end, in the order of the instruments that have a calibration.
+    pub errors: Vec<f64>,
+    /// At the end.
+    pub at_end: Spread,
+    /// 99 % bootstrap interval of the median at the end.
+    pub median_interval: (f64, f64),
+    /// The largest of all minutes.
+    pub largest: Spread,
+    /// At the end by the errors of one triad alone.
+    pub by_one: PerSensor<Spread>,
+    /// Time in s against the median.
+    pub against_time: Vec<(f64, f64)>,
+    /// Median of the closed form in the same installation form over that of this method, both at the
+    /// end; none for the closed form itself.
+    pub gain: Option<Ratio>,
+    /// What the claimed covariance says of the error at the end.
+    pub budget: Budget,
+}
+
+/// How a length is distributed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Half of all are below.
+    pub median: f64,
+    /// The mean.
+    pub mean: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// A quarter of all are below the first, three quarters below the second.
+    pub quartiles: (f64, f64),
+    /// 68 % are below.
+    pub below_68: f64,
+    /// 95 % are below.
+    pub below_95: f64,
+}
+
+impl Spread {
+    /// Of some lengths; NaN of none.
+    fn of(lengths: impl Iterator<Item = f64>) -> Self {
+        let mut sorted: Vec<f64> = lengths.collect();
+        sorted.sort_by(f64::total_cmp);
+        let count = sorted.len() as f64;
+        Self {
+            median: quantile(&sorted, 0.5),
+            mean: sorted.iter().sum::<f64>() / count,
+            rms: (sorted.iter().map(|x| x * x).sum::<f64>() / count).sqrt(),
+            quartiles: (quantile(&sorted, 0.25), quantile(&sorted, 0.75)),
+            below_68: quantile(&sorted, 0.68),
+            below_95: quantile(&sorted, 0.95),
+        }
+    }
+}
+
+/// Horizontal position error, east and north in m, by parameter errors.
+type ByParameter = SMatrix<f64, 2, PARAMETERS>;
+
+impl ExperimentStudy {
+    /// Makes everything, on all cores; `done` is told of each instrument. The result does not depend
+    /// on how many cores there are.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
+    /// it is counted.
+    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Experiment, ExperimentError> {
+        let scenarios = method::Scenarios::new(&self.scenario)?;
+        let table_times = scenarios.table_times()?;
+        let (ways, trials) = rayon::join(
+            || {
+                let all = Situation::ALL.into_par_iter();
+                let ways = all.map(|situation| self.way(situation));
+                ways.collect::<Result<Vec<_>, ExperimentError>>()
+            },
+            || {
+                let all = (0..self.samples).into_par_iter();
+                let trials = all.map(|run| {
+                    let trial = scenarios.trial(self.seed, run)?;
+                    done();
+                    Ok(trial)
+                });
+                trials.collect::<Result<Vec<_>, ExperimentError>>()
+            },
+        );
+        let trials = trials?;
+        Ok(Experiment {
+            navigations: ways?.iter().map(|way| way.navigated(&trials)).collect(),
+            study: self.clone(),
+            table_times,
+            trials,
+        })
+    }
+
+    /// The mission of a situation.
+    fn mission(&self, situation: Situation) -> Mission {
+        let site = &self.scenario.site;
+        Mission {
+            motion: match situation {
+                Situation::SelfAligned | Situation::Aligned => Motion::Standing(Solution {
+                    attitude: from_pitch_roll_heading(0.0, 0.0, 0.0),
+                    velocity: Vector3::zeros(),
+                    latitude: site.latitude,
+                    longitude: site.longitude,
+                    height: site.height,
+                }),
+                Situation::Moving => Motion::Moving(self.trajectory.clone()),
+            },
+            intervals: self.intervals,
+        }
+    }
+
+    fn way(&self, situation: Situation) -> Result<Way, ExperimentError> {
+        let mission = self.mission(situation);
+        let instrument = ideal();
+        let mut start = Sensitivity::new();
+        let mut aligned = None;
+        if let (Situation::SelfAligned, Motion::Standing(at)) = (situation, &mission.motion) {
+            let (rate, force) = at.steady();
+            let by_sensed = alignment::by_itself(at);
+            if let Some(sensed) = sensed_errors(&instrument, &rate, &force) {
+                start.0 = by_sensed * sensed;
+            }
+            aligned = Some(by_sensed);
+        }
+        let exposures = mission.exposure_from(start, &instrument)?;
+        let noise = noise::position(&mission, aligned, &self.scenario.instrument.noise)?;
+        Ok(Way {
+            situation,
+            noise: noise::spread(&noise),
+            minutes: exposures.iter().map(Minute::of).collect(),
+        })
+    }
+}
+
+/// The instrument that missions are followed with: what an error does depends on the instrument by
+/// less than one part in a hundred.
+fn ideal() -> PerSensor<Triad> {
+    PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General))
+}
+
+/// A mission, followed once.
+struct Way {
+    situation: Situation,
+    noise: Spread,
+    minutes: Vec<Minute>,
+}
+
+struct Minute {
+    time: f64,
+    position: ByParameter,
+}
+
+impl Minute {
+    fn of(exposure: &Exposure) -> Self {
+        Self {
+            time: exposure.time,
+            position: exposure.by_parameter.fixed_rows::<2>(6).into_owned(),
+        }
+    }
+}
+
+impl Way {
+    fn navigated(&self, trials: &[Trial]) -> Navigated {
+        Navigated {
+            situation: self.situation,
+            methods: Method::all()
+                .enumerate()
+                .map(|(place, method)| self.worth(place, method, trials))
+                .collect(),
+            noise: self.noise,
+        }
+    }
+
+    fn worth(&self, place: usize, method: Method, trials: &[Trial]) -> Worth {
+        let calibrated: Vec<&Calibrated> = trials.iter().filter_map(|t| t.of(place)).collect();
+        let all = || calibrated.iter().map(|c| &c.error);
+        let errors: Vec<f64> = all().map(|error| self.at_end(error)).collect();
+        let lengths_at =
+            |minute: &Minute| -> Vec<f64> { all().map(|e| (minute.position * e).norm()).collect() };
+        let every: Vec<usize> = (0..errors.len()).collect();
+        let largest = |error: &ParameterVector| {
+            let lengths = self.minutes.iter().map(|m| (m.position * error).norm());
+            lengths.fold(0.0, f64::max)
+        };
+        let interval = bootstrap(errors.len(), |chosen| median(&errors, chosen));
+        Worth {
+            method,
+            at_end: Spread::of(errors.iter().copied()),
+            median_interval: interval.map_or((f64::NAN, f64::NAN), |(_, interval)| interval),
+            largest: Spread::of(all().map(largest)),
+            by_one: PerSensor::from_fn(|sensor| {
+                Spread::of(all().map(|error| self.at_end(&of_triad(error, sensor))))
+            }),
+            against_time: self
+                .minutes
+                .iter()
+                .step_by(EVERY)
+                .map(|minute| (minute.time, median(&lengths_at(minute), &every)))
+                .collect(),
+            gain: self.gain(place, method, trials),
+            budget: Budget::new(self.end(), &calibrated),
+            errors,
+        }
+    }
+
+    /// Over the instruments that both methods calibrated.
+    fn gain(&self, place: usize, method: Method, trials: &[Trial]) -> Option<Ratio> {
+        let baseline = Method::all()
+            .position(|m| m.estimator == Estimator::ClosedForm && m.form == method.form)
+            .filter(|&baseline| baseline != place)?;
+        let both = trials
+            .iter()
+            .filter_map(|t| t.of(baseline).zip(t.of(place)));
+        let (over, under): (Vec<f64>, Vec<f64>) = both
+            .map(|(a, b)| (self.at_end(&a.error), self.at_end(&b.error)))
+            .unzip();
+        Ratio::of_medians(&over, &under)
+    }
+
+    fn at_end(&self, error: &ParameterVector) -> f64 {
+        (self.end() * error).norm()
+    }
+
+    fn end(&self) -> ByParameter {
+        let last = self.minutes.last();
+        last.map_or_else(ByParameter::zeros, |last| last.position)
+    }
+}
+
+/// The errors of one triad; the other has none.
+fn of_triad(error: &ParameterVector, sensor: Sensor) -> ParameterVector {
+    let mut only = ParameterVector::zeros();
+    let first = parameter(sensor, 0);
+    only.fixed_rows_mut::<PER_TRIAD>(first)
+        .copy_from(&error.fixed_rows::<PER_TRIAD>(first));
+    only
+}

@@ -1,0 +1,68 @@
+//! Which group of parameters makes how much of the position error.
+
+use super::{ByParameter, Calibrated};
+use crate::calibration::Group;
+use crate::calibration::states::{PARAMETERS, ParameterMatrix};
+
+/// What the claimed covariance, averaged over all instruments, says of the position error at the end.
+///
+/// Errors of groups are correlated: the filter knows many sums better than their terms. A group's
+/// share is the covariance of what it makes with what all make, over the variance of the whole,
+///
+/// ```text
+/// share_g = tr(S_g P_g· Sᵀ) / tr(S P Sᵀ)
+/// ```
+///
+/// so the cross terms of two groups go half to each and all shares together are one; a share below
+/// zero belongs to a group that makes up for another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// Root of the mean square of the position error that is claimed, m.
+    pub claimed: f64,
+    /// That of the errors there were, m.
+    pub actual: f64,
+    /// Each of [`Group::all`].
+    pub parts: Vec<Part>,
+}
+
+/// The part of one group.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// The group.
+    pub group: Group,
+    /// Root of the mean square of what it would make alone, m.
+    pub alone: f64,
+    /// Its share of the variance, as in [`Budget`].
+    pub share: f64,
+}
+
+impl Budget {
+    pub(super) fn new(by_parameter: ByParameter, calibrated: &[&Calibrated]) -> Self {
+        let count = calibrated.len() as f64;
+        let sum: ParameterMatrix = calibrated.iter().map(|c| c.covariance).sum();
+        let covariance = sum / count;
+        let squares = calibrated
+            .iter()
+            .map(|c| (by_parameter * c.error).norm_squared());
+        let variance = (by_parameter * covariance * by_parameter.transpose()).trace();
+        let part = |group| {
+            let mut of_group = by_parameter;
+            for other in (0..PARAMETERS).filter(|&i| Group::of(i) != group) {
+                of_group.column_mut(other).fill(0.0);
+            }
+            let with_all = (of_group * covariance * by_parameter.transpose()).trace();
+            Part {
+                group,
+                alone: (of_group * covariance * of_group.transpose())
+                    .trace()
+                    .sqrt(),
+                share: with_all / variance,
+            }
+        };
+        Self {
+            claimed: variance.sqrt(),
+            actual: (squares.sum::<f64>() / count).sqrt(),
+            parts: Group::all().map(part).collect(),
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The methods, and what each makes of an instrument.
+
+use super::{ExperimentError, HOUR_PATH, POSITIONS};
+use crate::calibration::outcome::to_vector;
+use crate::calibration::states::{ParameterMatrix, ParameterVector};
+use crate::calibration::{Estimate, estimate, in_general_form, six_position};
+use crate::imu::InstallationForm;
+use crate::models::ModelError;
+use crate::simulation::{Scenario, Simulated};
+use crate::turntable::TableError;
+
+/// What estimates, and on which path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// The closed form on the paper's static positions.
+    ClosedForm,
+    /// The filter on the scenario's path.
+    Filter,
+    /// The filter on a path that takes the closed form's table time.
+    LongFilter,
+}
+
+/// An estimator in an installation form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Method {
+    /// What estimates.
+    pub estimator: Estimator,
+    /// In which form.
+    pub form: InstallationForm,
+}
+
+impl Estimator {
+    /// All, in the order of every result.
+    pub const ALL: [Self; 3] = [Self::ClosedForm, Self::Filter, Self::LongFilter];
+}
+
+impl Method {
+    /// All, in the order of every result.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Estimator::ALL
+            .into_iter()
+            .flat_map(|estimator| InstallationForm::ALL.map(|form| Self { estimator, form }))
+    }
+}
+
+/// One instrument.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// Its number, the stream of its random numbers.
+    pub run: u64,
+    /// What each of [`Method::all`] made of it, or why it failed.
+    pub calibrations: Vec<Result<Calibrated, String>>,
+}
+
+impl Trial {
+    /// What a method made of it, by the method's place.
+    pub(super) fn of(&self, place: usize) -> Option<&Calibrated> {
+        self.calibrations.get(place)?.as_ref().ok()
+    }
+}
+
+/// A calibration, in the general form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibrated {
+    /// Errors, true − estimated.
+    pub error: ParameterVector,
+    /// The covariance that it claims.
+    pub covariance: ParameterMatrix,
+    /// False if the method says that it did not converge.
+    pub converged: bool,
+    /// Whether the method says that the data reject its installation form.
+    pub rejects_form: bool,
+}
+
+/// What is simulated for each estimator.
+pub(super) struct Scenarios(Vec<(Estimator, Scenario)>);
+
+impl Scenarios {
+    pub(super) fn new(scenario: &Scenario) -> Result<Self, ModelError> {
+        let on = |estimator| {
+            let scenario = scenario.clone();
+            let scenario = match estimator {
+                Estimator::ClosedForm => scenario.with_path(POSITIONS)?,
+                Estimator::Filter => scenario,
+                Estimator::LongFilter => scenario.with_path(HOUR_PATH)?,
+            };
+            Ok((estimator, scenario))
+        };
+        let all = Estimator::ALL.into_iter().map(on);
+        Ok(Self(all.collect::<Result<_, ModelError>>()?))
+    }
+
+    /// Table time of each of [`Method::all`], s.
+    pub(super) fn table_times(&self) -> Result<Vec<f64>, TableError> {
+        let mut times = Vec::new();
+        for (_, scenario) in &self.0 {
+            times.extend([scenario.duration()?; InstallationForm::ALL.len()]);
+        }
+        Ok(times)
+    }
+
+    /// One instrument, the same for all methods.
+    pub(super) fn trial(&self, seed: u64, run: u64) -> Result<Trial, ExperimentError> {
+        let mut calibrations = Vec::new();
+        for (estimator, scenario) in &self.0 {
+            let simulated = scenario.simulate(seed, run)?;
+            let forms = InstallationForm::ALL.into_iter();
+            calibrations.extend(forms.map(|form| calibrated(&simulated, *estimator, form)));
+        }
+        Ok(Trial { run, calibrations })
+    }
+}
+
+fn calibrated(
+    simulated: &Simulated,
+    estimator: Estimator,
+    form: InstallationForm,
+) -> Result<Calibrated, String> {
+    let Simulated { run, truth, .. } = simulated;
+    let truth = in_general_form(truth);
+    let against_truth = |estimate: &Estimate, converged, rejects_form| {
+        let estimate = estimate.in_general_form();
+        Calibrated {
+            error: to_vector(&truth) - estimate.vector(),
+            covariance: estimate.covariance,
+            converged,
+            rejects_form,
+        }
+    };
+    match estimator {
+        Estimator::ClosedForm => {
+            let closed_form = six_position(run, form).map_err(|error| error.to_string())?;
+            Ok(against_truth(&closed_form.estimate, true, false))
+        }
+        Estimator::Filter | Estimator::LongFilter => {
+            let outcome = estimate(run, form, &|_| {}).map_err(|error| error.to_string())?;
+            let rejects = outcome.form_test.is_some_and(|test| test.rejects());
+            Ok(against_truth(&outcome.estimate, outcome.converged, rejects))
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! What the noise of the instrument does while it aligns itself and navigates: alike after every
+//! calibration, so it is kept apart.
+
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::Spread;
+use crate::imu::{Noise, PerSensor};
+use crate::navigation::error_model::{INPUTS, InputMatrix};
+use crate::navigation::{ErrorMatrix, ErrorModel, Height, NavigationError, Solution};
+use crate::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError};
+
+/// How long an instrument stands to align itself, s.
+pub const ALIGNMENT_TIME: f64 = 600.0;
+/// Step in s for a body that stands, and for one that moves: noise has no direction, so a turn need
+/// not be followed finely.
+const STANDING_STEP: f64 = 10.0;
+const MOVING_STEP: f64 = 1.0;
+/// Draws that make a distribution of a covariance.
+const DRAWS: usize = 20_000;
+
+type Inputs = SVector<f64, INPUTS>;
+type InputCovariance = SMatrix<f64, INPUTS, INPUTS>;
+
+/// Covariance of navigation errors, of the wandering biases, and between them.
+struct Covariance {
+    errors: ErrorMatrix,
+    between: InputMatrix,
+    wander: InputCovariance,
+}
+
+/// Variances of the noise of the sensed rate and force.
+struct Variances {
+    /// Of the integral over a second.
+    white: Inputs,
+    /// Of the wandering bias.
+    wander: Inputs,
+    correlation_time: Inputs,
+}
+
+impl Variances {
+    fn of(noise: &PerSensor<Noise>) -> Self {
+        let each = |value: &dyn Fn(&Noise) -> f64| {
+            Inputs::from_fn(|i, _| value(if i < 3 { &noise.gyro } else { &noise.accel }))
+        };
+        Self {
+            white: each(&|n| n.random_walk.powi(2)),
+            wander: each(&|n| n.instability.map_or(0.0, |i| i.sigma.powi(2))),
+            correlation_time: each(&|n| {
+                n.instability.map_or(f64::INFINITY, |i| i.correlation_time)
+            }),
+        }
+    }
+}
+
+/// Covariance of the horizontal position error at the end, east and north, m². Where the instrument
+/// aligned itself, `aligned` is the errors at the start by those of the sensed rate and force.
+pub(super) fn position(
+    mission: &Mission,
+    aligned: Option<InputMatrix>,
+    noise: &PerSensor<Noise>,
+) -> Result<Matrix2<f64>, NavigationStudyError> {
+    let variances = Variances::of(noise);
+    let wander = InputCovariance::from_diagonal(&variances.wander);
+    let aligned = aligned.unwrap_or_default();
+    let mean = wander + InputCovariance::from_diagonal(&(variances.white / ALIGNMENT_TIME));
+    let mut covariance = Covariance {
+        errors: aligned * mean * aligned.transpose(),
+        between: aligned * wander,
+        wander,
+    };
+    let duration = f64::from(mission.intervals) * INTERVAL;
+    let end = match &mission.motion {
+        Motion::Standing(at) => {
+            let step = Step::new(at, &at.steady().1, STANDING_STEP, &variances);
+            for _ in 0..(duration / STANDING_STEP).round() as u64 {
+                covariance.advance(&step);
+            }
+            *at
+        }
+        Motion::Moving(trajectory) => {
+            let mut travel = trajectory.travel(0.5 * MOVING_STEP);
+            for _ in 0..(duration / MOVING_STEP).round() as u64 {
+                travel.advance();
+                let force = travel.sensed().1;
+                let step = Step::new(travel.truth(), &force, MOVING_STEP, &variances);
+                covariance.advance(&step);
+                travel.advance();
+            }
+            *travel.truth()
+        }
+    };
+    let by_state = NavigationError::by_state(&end).ok_or(NavigationStudyError::Upright)?;
+    let by_state = by_state.fixed_rows::<2>(6).into_owned();
+    Ok(by_state * covariance.errors * by_state.transpose())
+}
+
+/// The linear model over a step, with what noise adds.
+struct Step {
+    errors: ErrorMatrix,
+    input: InputMatrix,
+    added: ErrorMatrix,
+    keep: Inputs,
+    wander_added: Inputs,
+}
+
+impl Step {
+    fn new(truth: &Solution, force: &Vector3<f64>, duration: f64, variances: &Variances) -> Self {
+        let held = Height::Held {
+            height: truth.height,
+            velocity: truth.velocity.z,
+        };
+        let transition = ErrorModel::about(truth, force, held).over(duration);
+        let keep = variances
+            .correlation_time
+            .map(|time| (-duration / time).exp());
+        // Constant over the step with the variance of white noise's mean.
+        let white = InputCovariance::from_diagonal(&(variances.white / duration));
+        Self {
+            added: transition.input * white * transition.input.transpose(),
+            errors: transition.errors,
+            input: transition.input,
+            wander_added: variances.wander.zip_map(&keep, |v, k| v * (1.0 - k * k)),
+            keep,
+        }
+    }
+}
+
+impl Covariance {
+    fn advance(&mut self, step: &Step) {
+        let (a, g) = (&step.errors, &step.input);
+        let crossed = a * self.between * g.transpose();
+        self.errors = a * self.errors * a.transpose()
+            + crossed
+            + crossed.transpose()
+            + g * self.wander * g.transpose()
+            + step.added;
+        let keep = InputCovariance::from_diagonal(&step.keep);
+        self.between = (a * self.between + g * self.wander) * keep;
+        self.wander =
+            keep * self.wander * keep + InputCovariance::from_diagonal(&step.wander_added);
+    }
+}
+
+/// How the length of a normal vector with this covariance is distributed.
+pub(super) fn spread(covariance: &Matrix2<f64>) -> Spread {
+    let eigen = covariance.symmetric_eigen();
+    let sigma = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut draw = || rng.sample::<f64, _>(StandardNormal);
+    Spread::of((0..DRAWS).map(|_| Vector2::new(sigma.x * draw(), sigma.y * draw()).norm()))
+}
