@@ -10,7 +10,7 @@ pub(super) enum Course<'a> {
         truth: &'a Solution,
         increments: Increments,
     },
-    Moving(Travel<'a>),
+    Moving(Box<Travel<'a>>),
 }
 
 impl<'a> Course<'a> {
@@ -27,7 +27,7 @@ impl<'a> Course<'a> {
                     },
                 }
             }
-            Motion::Moving(trajectory) => Self::Moving(trajectory.travel(period)),
+            Motion::Moving(trajectory) => Self::Moving(Box::new(trajectory.travel(period))),
         }
     }
 
