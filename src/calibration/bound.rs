@@ -1,5 +1,6 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
+use super::coarse::coarse_start;
 use super::error::CalibrationError;
 use super::estimator::problem;
 use super::outcome::{Estimate, Moment};
@@ -28,12 +29,13 @@ pub struct Bound {
 pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationError> {
     let dwells = run.dwells();
     let schedule = Schedule::new(run, &dwells)?;
+    let form = truth.gyro.form;
     let at = Linearisation {
         triads: *truth,
-        initial_attitude: schedule.initial_attitude,
+        ..coarse_start(run, &dwells, form)?
     };
-    let form = truth.gyro.form;
-    let problem = problem(run, schedule, form, velocity_sigma(run, &dwells));
+    let sigma = velocity_sigma(run, &dwells);
+    let problem = problem(run, schedule, form, at.initial_attitude, sigma);
     let result = pass(&problem, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {

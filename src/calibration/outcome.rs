@@ -1,5 +1,7 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
+use nalgebra::Matrix3;
+
 use super::form::FormTest;
 use super::observability::Observability;
 use super::pass::Linearisation;
@@ -76,6 +78,9 @@ pub struct Outcome {
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
     pub prior_mean: ParameterVector,
+    /// Mean of the initial attitude before the run, `C_b_n`: a reading of the table or, without, the
+    /// coarse alignment.
+    pub prior_attitude: Matrix3<f64>,
     /// What the run showed of the parameters and what it left as it was.
     pub observability: Observability,
     /// Where the last pass linearised.

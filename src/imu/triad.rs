@@ -115,6 +115,15 @@ impl Triad {
         }
     }
 
+    /// Indices of the installation angles above the diagonal of `C`. In a body frame along the
+    /// accelerometers theirs are zero.
+    pub fn above_the_diagonal(form: InstallationForm) -> impl Iterator<Item = usize> {
+        let angles = form.angle_names().iter().enumerate();
+        angles
+            .filter(|(_, (row, column))| column > row)
+            .map(|(angle, _)| INSTALLATION + angle)
+    }
+
     /// Which parameters a form has.
     pub fn has_parameter(form: InstallationForm, parameter: usize) -> bool {
         !(INSTALLATION + form.angle_names().len()..BIAS).contains(&parameter)

@@ -57,7 +57,7 @@ pub struct Accuracy {
 
 impl Accuracy {
     pub fn run(&self) -> anyhow::Result<()> {
-        let Aiding::Table = self.aiding;
+        if self.aiding == Aiding::Velocity { todo!() }
         let mut scenario = Scenario::load(&self.scenario)?;
         if let Some(path) = &self.path {
             scenario = scenario.with_path(path)?;
