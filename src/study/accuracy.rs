@@ -136,7 +136,7 @@ impl AccuracyStudy {
             .collect::<Result<_, _>>()?;
         Ok(Accuracy {
             groups: Group::all()
-                .map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
+                .filter_map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
                 .collect(),
             anees: anees(&trials),
             velocity: pooled(&trials, |filtered| &filtered.velocity),
@@ -171,8 +171,16 @@ impl Accuracy {
 }
 
 impl GroupAccuracy {
-    fn new(group: Group, trials: &[Trial], baseline: &Baseline, table_time: f64) -> Self {
-        let indices: Vec<usize> = (0..PARAMETERS).filter(|&i| Group::of(i) == group).collect();
+    /// None if the form and the body frame leave nothing of the group to be estimated.
+    fn new(group: Group, trials: &[Trial], baseline: &Baseline, table_time: f64) -> Option<Self> {
+        let estimated = |&i: &usize| trials.iter().any(|trial| trial.bound[i] > 0.0);
+        let indices: Vec<usize> = (0..PARAMETERS)
+            .filter(|&i| Group::of(i) == group)
+            .filter(estimated)
+            .collect();
+        if indices.is_empty() {
+            return None;
+        }
         let count = indices.len() as f64;
         // For each run that has what is asked for, the sum of squares of the group.
         let squares = |of: &dyn Fn(&Trial, usize) -> Option<f64>| -> Vec<f64> {
@@ -206,7 +214,7 @@ impl GroupAccuracy {
         };
         let bound_track =
             |m: usize| move |t: &Trial, i: usize| Some(t.bound_track.get(m)?[i].powi(2));
-        Self {
+        Some(Self {
             group,
             filter: rms(&squares(&filter)),
             claimed: rms(&squares(&claimed)),
@@ -230,7 +238,7 @@ impl GroupAccuracy {
                 .parts()
                 .filter_map(|(part, time)| Some((time, some_rms(&squares(&closed(part)))?)))
                 .collect(),
-        }
+        })
     }
 }
 
