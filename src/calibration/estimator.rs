@@ -1,4 +1,4 @@
-//! The estimator: coarse start, a live pass, and held passes until nothing moves.
+//! The estimator: coarse start, with a table a live pass, and held passes until nothing moves.
 
 use super::coarse::coarse_start;
 use super::consistency::consistency;
@@ -16,6 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
 use crate::run::Run;
+use crate::run::record::BodyFrame;
 use crate::units::{ARCSEC, DEGREE};
 
 /// Told after each pass; the command line draws it.
@@ -40,7 +41,7 @@ const MOST_OUTLIERS: f64 = 0.05;
 /// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
 const DOUBTFUL: f64 = 0.2;
 
-/// Estimates both triads of a run with table aiding.
+/// Estimates both triads of a run, by standstill and, where the run has a table's log, its attitude.
 ///
 /// Source: design of the passes after Maybeck, *Stochastic Models, Estimation and Control*, vol. 2,
 /// §9.7 (iterated, linearised filters): each held pass is a Gauss–Newton step of the whole record.
@@ -62,11 +63,19 @@ pub fn estimate(
     let velocity_sigma = velocity_sigma(run, &dwells);
     let problem = problem(run, schedule, form, start.initial_attitude, velocity_sigma);
 
-    let live = pass(&problem, &start, Mode::Live)?;
-    let mut passes = vec![summary(&live, &start, true)];
-    passes.iter().for_each(progress);
-
-    let (held, converged) = iterate(&problem, live.estimate, &mut passes, progress)?;
+    let mut passes = Vec::new();
+    // What a live pass feeds back while heading is known to degrees only leads it astray; the coarse
+    // start without a table is good enough for the held passes to begin from.
+    let live = match run.body_frame() {
+        BodyFrame::Table => Some(pass(&problem, &start, Mode::Live)?),
+        BodyFrame::Accelerometer => None,
+    };
+    if let Some(live) = &live {
+        passes.push(summary(live, &start, true));
+        passes.iter().for_each(progress);
+    }
+    let from = live.as_ref().map_or(start, |live| live.estimate);
+    let (held, converged) = iterate(&problem, from, &mut passes, progress)?;
     let estimate = Estimate {
         triads: held.estimate.triads,
         covariance: held.covariance + curvature(&held.estimate.triads, &held.covariance),
@@ -90,7 +99,7 @@ pub fn estimate(
         converged,
         consistency: consistency(&held.innovations),
         history: held.history,
-        live_history: live.history,
+        live_history: live.map(|live| live.history).unwrap_or_default(),
         innovations: held.innovations,
         velocity_sigma,
         passes,

@@ -85,13 +85,13 @@ pub struct Outcome {
     pub observability: Observability,
     /// Where the last pass linearised.
     pub linearised_at: Linearisation,
-    /// Each pass in order; the first is the live one.
+    /// Each pass in order; with a table, the first is the live one.
     pub passes: Vec<Pass>,
     /// Whether the last pass moved no parameter by more than the limit.
     pub converged: bool,
     /// Estimate and σ against time in the last pass, whose σ are the true ones.
     pub history: Vec<Moment>,
-    /// Estimate and σ against time in the live pass, as the turntable moved.
+    /// Estimate and σ against time in the live pass, as the turntable moved; empty without a table.
     pub live_history: Vec<Moment>,
     /// Innovations of the last pass.
     pub innovations: Vec<Innovation>,
