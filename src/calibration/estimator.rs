@@ -310,7 +310,7 @@ mod tests {
         let reading = first_reading(&simulated.run, &dwells).unwrap();
         let mut problem = problem(&simulated.run, schedule, form, reading, 1e-6);
         // As tight a prior of attitude and scale as a run gives, so that it counts.
-        problem.start.attitude = ARCSEC;
+        problem.start.attitude = Vector3::repeat(ARCSEC);
         problem.prior_mean = to_vector(&simulated.truth);
         problem.prior_sigma.fill(PPM);
 

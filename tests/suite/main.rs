@@ -13,3 +13,4 @@ mod shared;
 mod simulated;
 mod study;
 mod table1;
+mod velocity;

@@ -70,7 +70,7 @@ fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
                 if spoilt {
                     let run = &mut simulated.run;
                     for dwell in run.dwells() {
-                        for reading in dwell.readings {
+                        for reading in dwell.position.unwrap().readings {
                             if rng.random_bool(1.0 / ONE_IN) {
                                 spoil_reading(run, reading, SIZE, &mut rng);
                                 made += 1;
@@ -120,7 +120,12 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
     const HIDDEN: f64 = 12.0;
     let run = &mut simulated.run;
     for dwell in &run.dwells()[1..] {
-        spoil_reading(run, dwell.readings.start, HIDDEN, &mut rng);
+        spoil_reading(
+            run,
+            dwell.position.as_ref().unwrap().readings.start,
+            HIDDEN,
+            &mut rng,
+        );
     }
     let dwells = run.dwells();
     for dwell in &dwells[1..] {
