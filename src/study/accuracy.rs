@@ -72,7 +72,7 @@ pub struct Accuracy {
     pub trials: Vec<Trial>,
     /// Figures of each group.
     pub groups: Vec<GroupAccuracy>,
-    /// What the calibrations are worth in each mission, in the order of [`Trial::positions`].
+    /// What the calibrations are worth in each mission.
     pub navigation: Vec<NavigationAccuracy>,
     /// Missions that cannot be navigated from the scenario's site.
     pub not_navigated: Vec<(Journey, NavigationStudyError)>,
@@ -123,30 +123,35 @@ impl AccuracyStudy {
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
         let table_time = self.scenario.duration()?;
-        let (mut ways, mut not_navigated) = (Vec::new(), Vec::new());
-        for journey in Journey::ALL {
-            match Way::of(journey, &self.scenario)? {
-                Ok(way) => ways.push(way),
+        let (ways, trials) = rayon::join(
+            || {
+                let all = Journey::ALL.into_par_iter();
+                let ways = all.map(|journey| Ok((journey, Way::of(journey, &self.scenario)?)));
+                ways.collect::<Result<Vec<_>, StudyError>>()
+            },
+            || {
+                let all = (0..self.runs).into_par_iter();
+                let trials = all.map(|run| {
+                    let trial = self.trial(&baseline, run);
+                    done();
+                    trial
+                });
+                trials.collect::<Result<Vec<_>, StudyError>>()
+            },
+        );
+        let trials = trials?;
+        let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());
+        for (journey, way) in ways? {
+            match way {
+                Ok(way) => navigation.push(way.worth(&trials)),
                 Err(error) => not_navigated.push((journey, error)),
             }
         }
-        let trials: Vec<Trial> = (0..self.runs)
-            .into_par_iter()
-            .map(|run| {
-                let trial = self.trial(&baseline, &ways, run);
-                done();
-                trial
-            })
-            .collect::<Result<_, _>>()?;
         Ok(Accuracy {
             groups: Group::all()
                 .map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
                 .collect(),
-            navigation: ways
-                .iter()
-                .enumerate()
-                .map(|(place, way)| NavigationAccuracy::new(place, way.journey, &trials))
-                .collect(),
+            navigation,
             not_navigated,
             anees: anees(&trials),
             velocity: pooled(&trials, |filtered| &filtered.velocity),
@@ -199,16 +204,16 @@ impl GroupAccuracy {
         };
         Self {
             group,
-            figures: Figures::new(trials, |t| {
+            figures: Figures::new(trials.iter().map(|t| {
                 let filtered = t.filtered.as_ref();
-                Some(Squares {
+                Squares {
                     filter: filtered.map(|f| square(&f.error)),
                     claimed: filtered.map(|f| square(&f.sigma)),
                     bound: square(&t.bound),
                     closed_form: closed(t, Baseline::OWN_TIME),
                     closed_form_in_equal_time: closed(t, Baseline::EQUAL_TIME),
-                })
-            }),
+                }
+            })),
             filter_against_time: trial::moments(table_time)
                 .enumerate()
                 .map(|(moment, time)| {

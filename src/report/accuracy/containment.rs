@@ -11,7 +11,7 @@ use super::super::panel::{Margins, Mark, Panel};
 use super::super::{Figure, ReportError};
 use super::merit::journey_name;
 use super::tables::percent;
-use crate::study::accuracy::Region;
+use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, NavigationAccuracy};
 
 /// The least half width of the axes, in σ.
@@ -30,13 +30,10 @@ pub(super) fn figure(accuracy: &Accuracy) -> Result<Option<Figure>, ReportError>
     if navigated.is_empty() {
         return Ok(None);
     }
-    let clouds: Vec<Vec<(f64, f64)>> = (0..navigated.len())
-        .map(|place| {
-            let positions = accuracy
-                .trials
-                .iter()
-                .filter_map(|t| t.positions.get(place));
-            let whitened = positions.filter_map(|p| p.whitened());
+    let clouds: Vec<Vec<(f64, f64)>> = navigated
+        .iter()
+        .map(|of| {
+            let whitened = of.positions.iter().filter_map(Position::whitened);
             whitened.map(|z| (z.x, z.y)).collect()
         })
         .collect();
@@ -96,6 +93,8 @@ fn panel(
             Pen::dashed(INK, 1.5)
         };
         panel.line(&circle, pen)?;
+        let name = format!("{sigmas}σ");
+        panel.text((0.0, -sigmas), (4.0, 3.0), &name, (HPos::Left, VPos::Top))?;
     }
     panel.marks(cloud, Mark::Dot, Pen::nth(0, 1.0))?;
     let mut notes = vec![format!("{} runs", count(cloud.len()))];

@@ -36,14 +36,12 @@ fn all_failed() -> Accuracy {
         trial.failure = Some("singular <IMU>".to_owned());
         trial.filtered = None;
     }
-    for trial in &mut accuracy.trials {
-        for position in &mut trial.positions {
-            position.filter = None;
-        }
-    }
     let positions = accuracy.navigation.iter_mut();
     let positions = positions.map(|navigated| {
         navigated.containment.clear();
+        for position in &mut navigated.positions {
+            position.filter = None;
+        }
         &mut navigated.figures
     });
     let groups = accuracy.groups.iter_mut().map(|group| &mut group.figures);

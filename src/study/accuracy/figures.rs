@@ -1,6 +1,5 @@
 //! Root mean squares of an error over the runs, by every method, and their ratios.
 
-use super::Trial;
 use crate::study::Ratio;
 
 /// Figures of one kind of error over all runs, in SI.
@@ -34,8 +33,8 @@ pub(super) struct Squares {
 }
 
 impl Figures {
-    pub(super) fn new(trials: &[Trial], squares: impl Fn(&Trial) -> Option<Squares>) -> Self {
-        let runs: Vec<Squares> = trials.iter().filter_map(squares).collect();
+    pub(super) fn new(runs: impl Iterator<Item = Squares>) -> Self {
+        let runs: Vec<Squares> = runs.collect();
         let of = |one: &dyn Fn(&Squares) -> Option<f64>| -> Vec<f64> {
             runs.iter().filter_map(one).collect()
         };

@@ -6,7 +6,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 use statrs::function::erf::erf;
 
 use super::figures::Squares;
-use super::{Figures, Trial};
+use super::{Baseline, Figures, Trial};
 use crate::calibration::states::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::{InstallationForm, PerSensor};
 use crate::models::{self, ModelError, Place};
@@ -45,6 +45,8 @@ pub struct Position {
 pub struct NavigationAccuracy {
     /// How the body moved.
     pub journey: Journey,
+    /// Of every run, in order.
+    pub positions: Vec<Position>,
     /// Horizontal position errors in m; σ and bound are roots of the trace of their covariance.
     pub figures: Figures,
     /// Each of [`Region::ALL`]; none if no run gave an estimate with a covariance that is regular.
@@ -77,7 +79,7 @@ pub struct Containment {
 
 /// A mission, followed once: what the linear model says of one instrument of the grade holds for all.
 pub(super) struct Way {
-    pub(super) journey: Journey,
+    journey: Journey,
     by_parameter: SMatrix<f64, 2, PARAMETERS>,
 }
 
@@ -119,28 +121,36 @@ impl Way {
         }))
     }
 
-    /// Of errors estimate less truth, in the general form.
-    pub(super) fn position(&self, error: &ParameterVector) -> Vector2<f64> {
-        -(self.by_parameter * error)
-    }
-
-    pub(super) fn covariance(&self, parameters: &ParameterMatrix) -> Matrix2<f64> {
-        self.by_parameter * parameters * self.by_parameter.transpose()
-    }
-}
-
-impl NavigationAccuracy {
-    /// Of the mission that has this place among those of each trial.
-    pub(super) fn new(place: usize, journey: Journey, trials: &[Trial]) -> Self {
-        let positions = || trials.iter().filter_map(|trial| trial.positions.get(place));
-        let filtered: Vec<_> = positions().filter_map(|p| p.filter).collect();
-        Self {
-            journey,
-            figures: Figures::new(trials, |trial| Some(trial.positions.get(place)?.squares())),
+    /// What the calibrations of these runs are worth.
+    pub(super) fn worth(self, trials: &[Trial]) -> NavigationAccuracy {
+        let positions: Vec<Position> = trials.iter().map(|trial| self.of_trial(trial)).collect();
+        let filtered: Vec<_> = positions.iter().filter_map(|p| p.filter).collect();
+        NavigationAccuracy {
+            journey: self.journey,
+            figures: Figures::new(positions.iter().map(Position::squares)),
             containment: Region::ALL
                 .into_iter()
                 .filter_map(|region| Containment::new(region, &filtered))
                 .collect(),
+            positions,
+        }
+    }
+
+    fn of_trial(&self, trial: &Trial) -> Position {
+        // The linear model has parameter errors true less estimated.
+        let error =
+            |estimate_less_truth: &ParameterVector| -self.by_parameter * estimate_less_truth;
+        let covariance =
+            |of: &ParameterMatrix| self.by_parameter * of * self.by_parameter.transpose();
+        let closed = |part: usize| trial.closed_form.get(part)?.as_ref().map(error);
+        Position {
+            filter: trial
+                .filtered
+                .as_ref()
+                .map(|f| (error(&f.error), covariance(&f.covariance))),
+            bound: covariance(&trial.bound_covariance),
+            closed_form: closed(Baseline::OWN_TIME),
+            closed_form_in_equal_time: closed(Baseline::EQUAL_TIME),
         }
     }
 }

@@ -1,6 +1,5 @@
 //! One run of the study.
 
-use super::navigation::{Position, Way};
 use super::{AccuracyStudy, Baseline, StudyError};
 use crate::calibration::outcome::{Moment, Nis, from_vector, to_vector};
 use crate::calibration::states::{PARAMETERS, ParameterMatrix, ParameterVector};
@@ -21,8 +20,8 @@ pub struct Trial {
     pub filtered: Option<Filtered>,
     /// σ of the bound.
     pub bound: ParameterVector,
-    /// Position errors after each mission that can be navigated.
-    pub positions: Vec<Position>,
+    /// Covariance of the bound.
+    pub(super) bound_covariance: ParameterMatrix,
     /// σ of the bound at each of the [`moments`].
     pub(super) bound_track: Vec<ParameterVector>,
     /// Error of the closed form for each part of its dwells; none where it failed.
@@ -37,7 +36,7 @@ pub struct Filtered {
     /// σ that it claims.
     pub sigma: ParameterVector,
     /// Covariance that it claims.
-    covariance: ParameterMatrix,
+    pub(super) covariance: ParameterMatrix,
     /// NEES/n.
     pub nees: Option<Nees>,
     /// Number of passes.
@@ -63,12 +62,7 @@ pub(super) fn moments(duration: f64) -> impl Iterator<Item = f64> {
 }
 
 impl AccuracyStudy {
-    pub(super) fn trial(
-        &self,
-        baseline: &Baseline,
-        ways: &[Way],
-        run: u64,
-    ) -> Result<Trial, StudyError> {
+    pub(super) fn trial(&self, baseline: &Baseline, run: u64) -> Result<Trial, StudyError> {
         let Simulated {
             run: record, truth, ..
         } = self.scenario.simulate(self.seed, run)?;
@@ -77,42 +71,23 @@ impl AccuracyStudy {
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
         let bound =
             bound(&record, &attainable).map_err(|source| StudyError::Bound { run, source })?;
-        let bound_track = track(&bound.history, form, duration)
-            .map(|estimate| estimate.sigma())
-            .collect();
-        let bound = bound.estimate.in_general_form();
         let outcome = estimate(&record, self.form, &|_| {});
-        let failure = match &outcome {
-            Err(error) => Some(error.to_string()),
-            Ok(outcome) => (!outcome.converged).then(|| "not converged".to_owned()),
-        };
-        let filtered = outcome
-            .ok()
-            .map(|outcome| Filtered::new(&outcome, &truth, duration));
-        let closed_form = baseline.errors(self.seed, run, self.form)?;
-        let closed = |way: &Way, part: usize| {
-            let error = closed_form.get(part)?.as_ref()?;
-            Some(way.position(error))
-        };
-        let positions = ways
-            .iter()
-            .map(|way| Position {
-                filter: filtered
-                    .as_ref()
-                    .map(|f| (way.position(&f.error), way.covariance(&f.covariance))),
-                bound: way.covariance(&bound.covariance),
-                closed_form: closed(way, Baseline::OWN_TIME),
-                closed_form_in_equal_time: closed(way, Baseline::EQUAL_TIME),
-            })
-            .collect();
+        let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,
-            failure,
-            filtered,
-            bound: bound.sigma(),
-            positions,
-            bound_track,
-            closed_form,
+            failure: match &outcome {
+                Err(error) => Some(error.to_string()),
+                Ok(outcome) => (!outcome.converged).then(|| "not converged".to_owned()),
+            },
+            filtered: outcome
+                .ok()
+                .map(|outcome| Filtered::new(&outcome, &truth, duration)),
+            bound: attained.sigma(),
+            bound_covariance: attained.covariance,
+            bound_track: track(&bound.history, form, duration)
+                .map(|estimate| estimate.sigma())
+                .collect(),
+            closed_form: baseline.errors(self.seed, run, self.form)?,
         })
     }
 
