@@ -8,7 +8,7 @@ use turncal::imu::InstallationForm;
 use turncal::report::{self, Report};
 use turncal::simulation::{Scenario, Simulated};
 
-use super::calibrate::{BODY_FRAME, dwell_times, filter, note, write_report};
+use super::calibrate::{BODY_FRAME, dwell_times, filter, navigate, note, write_report};
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
@@ -50,6 +50,12 @@ impl Demo {
 
         let note = note(&closed_form);
         let dwells = dwell_times(run);
+        activity.next("navigating");
+        let methods = [
+            ("closed form", &closed_form.estimate),
+            ("EKF", &outcome.estimate),
+        ];
+        let navigation = navigate(run, &methods, Some(&turning.truth));
         let report = Report {
             title: "turncal demo",
             run,
@@ -61,6 +67,7 @@ impl Demo {
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
+            navigation: navigation.as_deref(),
         };
         activity.next("writing");
         let root = directory.path();

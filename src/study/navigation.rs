@@ -2,6 +2,7 @@
 //! nonlinear navigation, and the σ of that error that its covariance predicts, by the linear model.
 
 mod course;
+mod outlook;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
@@ -18,6 +19,8 @@ use crate::navigation::{
 };
 use crate::run::record::BodyFrame;
 use course::Course;
+
+pub use outlook::Outlook;
 
 /// Time in s between two moments of a result.
 pub const INTERVAL: f64 = 60.0;
