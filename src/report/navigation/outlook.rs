@@ -122,7 +122,7 @@ fn panel(area: &Area, quantity: Quantity, navigated: &[Navigated]) -> Result<(),
         &format!("{}, {unit}{kind}", quantity.name()),
         Margins {
             left: 60.0,
-            right: 108.0,
+            right: 124.0,
         },
         (time(hours), y),
         "time, h",
@@ -131,10 +131,12 @@ fn panel(area: &Area, quantity: Quantity, navigated: &[Navigated]) -> Result<(),
     let lower: Line = band.iter().map(|&(t, s)| (t, -s)).collect();
     panel.band(&lower, &band)?;
     panel.line(&[(0.0, 0.0), (hours, 0.0)], Pen::solid(QUIET, 0.75))?;
-    for end in [lower.last(), band.last()].into_iter().flatten() {
-        panel.label(end.1, if end.1 < 0.0 { "−σ" } else { "+σ" }, QUIET);
-    }
     let known = is_known(navigated);
+    if known {
+        for end in [lower.last(), band.last()].into_iter().flatten() {
+            panel.label(end.1, if end.1 < 0.0 { "−σ" } else { "+σ" }, QUIET);
+        }
+    }
     for (name, lines) in &drawn {
         let pen = match *name {
             "EKF" => Pen::nth(0, 1.5),
@@ -147,7 +149,7 @@ fn panel(area: &Area, quantity: Quantity, navigated: &[Navigated]) -> Result<(),
             let name = if known {
                 (*name).to_owned()
             } else {
-                format!("σ {name}")
+                format!("σ of {name}")
             };
             panel.label(end.1, name, pen.color);
         }
@@ -170,7 +172,7 @@ pub(in crate::report) fn section(
                 h2 { "What it is worth in navigation" }
                 (table(navigated))
                 p.note {
-                    (number::three_digits(hours(navigated)))
+                    (number::value(hours(navigated), 10.0))
                     " h standing level at the site of the run, heading North, from perfect alignment, \
                     height held. σ: predicted from the covariance of the calibration by the linear error \
                     model; of horizontal errors the root of the mean square. "
@@ -292,7 +294,7 @@ pub(in crate::report) fn line(navigated: &[Navigated]) -> Option<String> {
     (!ends.is_empty()).then(|| {
         format!(
             "Position error after {} h of navigation standing level: {}",
-            number::three_digits(hours(navigated)),
+            number::value(hours(navigated), 10.0),
             ends.join(", ")
         )
     })
