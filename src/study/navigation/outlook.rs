@@ -71,8 +71,8 @@ mod tests {
         let mission = Mission::standing_level(&Site::with_normal_gravity(0.6, 0.0, 100.0), 300);
         let form = InstallationForm::SixAngle;
         let sigma = ParameterVector::repeat(0.01 * DEG_PER_H);
-        let mut vector = ParameterVector::zeros();
-        vector[0] = 300.0 * PPM;
+        let mut vector = to_vector(&PerSensor::from_fn(|_| Triad::ideal(form)));
+        vector[0] += 300.0 * PPM;
         vector.fixed_rows_mut::<6>(3).fill(0.1 * DEGREE);
         let estimate = Estimate {
             triads: from_vector(form, &vector),
