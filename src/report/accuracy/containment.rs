@@ -93,8 +93,6 @@ fn panel(
             Pen::dashed(INK, 1.5)
         };
         panel.line(&circle, pen)?;
-        let name = format!("{sigmas}σ");
-        panel.text((0.0, -sigmas), (4.0, 3.0), &name, (HPos::Left, VPos::Top))?;
     }
     panel.marks(cloud, Mark::Dot, Pen::nth(0, 1.0))?;
     let mut notes = vec![format!("{} runs", count(cloud.len()))];

@@ -200,7 +200,7 @@ fn position_errors_beyond_their_predicted_sigma_are_called_so() {
         "{doubts}"
     );
     assert!(
-        doubts.contains("north within 1σ 0.0 % of 68.3 %"),
+        doubts.contains("north within 1σ 0.0 % (claimed 68.3 %)"),
         "{doubts}"
     );
 }

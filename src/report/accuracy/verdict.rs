@@ -233,7 +233,7 @@ fn containment(of: &NavigationAccuracy) -> Option<Sentence> {
             .map(|held| {
                 let found = held.within as f64 / held.runs as f64;
                 format!(
-                    "{} {} % of {} %",
+                    "{} {} % (claimed {} %)",
                     region_name(held.region),
                     percent(found),
                     percent(held.region.probability())

@@ -137,21 +137,26 @@ impl Way {
     }
 
     fn of_trial(&self, trial: &Trial) -> Position {
-        // The linear model has parameter errors true less estimated.
-        let error =
-            |estimate_less_truth: &ParameterVector| -self.by_parameter * estimate_less_truth;
         let covariance =
             |of: &ParameterMatrix| self.by_parameter * of * self.by_parameter.transpose();
-        let closed = |part: usize| trial.closed_form.get(part)?.as_ref().map(error);
+        let closed = |part: usize| {
+            let error = trial.closed_form.get(part)?.as_ref()?;
+            Some(self.position(error))
+        };
         Position {
             filter: trial
                 .filtered
                 .as_ref()
-                .map(|f| (error(&f.error), covariance(&f.covariance))),
+                .map(|f| (self.position(&f.error), covariance(&f.covariance))),
             bound: covariance(&trial.bound_covariance),
             closed_form: closed(Baseline::OWN_TIME),
             closed_form_in_equal_time: closed(Baseline::EQUAL_TIME),
         }
+    }
+
+    /// From parameter errors, estimate less truth; the linear model has them the other way round.
+    fn position(&self, error: &ParameterVector) -> Vector2<f64> {
+        -self.by_parameter * error
     }
 }
 
@@ -234,6 +239,9 @@ impl Containment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::outcome::{from_vector, to_vector};
+    use crate::imu::Triad;
+    use crate::study::navigation::Pair;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -304,6 +312,28 @@ mod tests {
     fn a_covariance_that_is_singular_says_nothing() {
         let errors = [(Vector2::zeros(), Matrix2::zeros())];
         assert_eq!(Containment::new(Region::East, &errors), None);
+    }
+
+    #[test]
+    fn a_way_leads_where_navigation_with_the_estimate_does() {
+        let scenario = Scenario::load("demo").unwrap();
+        let way = Way::of(Journey::Standing, &scenario).unwrap().unwrap();
+        let form = InstallationForm::General;
+        let truth = PerSensor::from_fn(|_| Triad::ideal(form));
+        let error = ParameterVector::from_fn(|i, _| 1e-8 * (1.0 + i as f64).sin());
+        let pair = Pair {
+            truth,
+            calibration: from_vector(form, &(to_vector(&truth) + error)),
+            covariance: None,
+        };
+        let mission = Journey::Standing.mission(&scenario).unwrap();
+        let end = mission.errors(&pair).unwrap().pop().unwrap();
+        let expected = end.error.position.xy();
+        let apart = way.position(&error) - expected;
+        assert!(
+            expected.norm() > 1000.0 && apart.norm() < 0.02 * expected.norm(),
+            "{apart}"
+        );
     }
 
     #[test]
