@@ -17,8 +17,9 @@ use super::simulate::{simulated, write};
 ///
 /// Simulates an instrument with the paper's errors on a three-axis table, ten minutes with turns for
 /// the filter and an hour of static positions for the paper's closed form, calibrates it both ways,
-/// compares both with the truth and writes a report. DIR is the filter's run directory and holds ekf/
-/// with its calibration, six-position/ with the static run and its calibration, and report/.
+/// compares both with the truth, navigates 40 h with each and writes a report. DIR is the filter's run
+/// directory and holds ekf/ with its calibration, six-position/ with the static run and its
+/// calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {

@@ -43,7 +43,8 @@ pub(super) fn figure(accuracy: &Accuracy) -> Result<Option<Figure>, ReportError>
         "Horizontal position error of the EKF after 40 h over the σ predicted from its covariance, one \
          dot for each run, the same axes for all. Across: east over its σ; up: what north differs from \
          that which east lets expect, over the σ of that. So the ellipses of all runs are circles: \
-         solid 1σ, dashed 2.45σ.",
+         solid 1σ, dashed 2.45σ. Where the axes end far beyond ±4 the σ are too small, and the circles \
+         a speck in the middle.",
     );
     Figure::draw(
         "position.svg",
