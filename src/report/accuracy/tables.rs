@@ -6,7 +6,6 @@ use super::facts::minutes;
 use super::merit::{Merit, journey_name, merits, region_name};
 use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
-use crate::imu::ParameterKind;
 use crate::study::{Accuracy, Ratio};
 
 const NONE: &str = "–";
@@ -55,9 +54,10 @@ fn by_merit(accuracy: &Accuracy, cells: impl Fn(&Merit) -> Vec<String>) -> Vec<V
         row.extend(cells(of));
         row
     };
-    let merits = merits(accuracy);
-    let sections = merits.chunks(ParameterKind::ALL.len());
-    sections.map(|of| of.iter().map(row).collect()).collect()
+    merits(accuracy)
+        .chunk_by(|a, b| a.sensor == b.sensor)
+        .map(|section| section.iter().map(row).collect())
+        .collect()
 }
 
 fn bound(accuracy: &Accuracy) -> Table {
