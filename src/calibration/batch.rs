@@ -42,7 +42,13 @@ const NO_SOURCE: f64 = 1e-14;
 pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
     let form = outcome.estimate.form();
     let schedule = Schedule::new(run, &run.dwells())?;
-    let problem = problem(run, schedule, form, outcome.velocity_sigma);
+    let problem = problem(
+        run,
+        schedule,
+        form,
+        outcome.prior_attitude,
+        outcome.velocity_sigma,
+    );
     let mut accepted = outcome.innovations.iter().map(|i| i.accepted);
     let mut batch = Batch::new(&problem, outcome)?;
     let mut stood = false;
@@ -88,7 +94,7 @@ impl<'a> Batch<'a> {
             information: Information::new(
                 problem,
                 &(problem.prior_mean - to_vector(&at.triads)),
-                &log(&(problem.schedule.initial_attitude * at.initial_attitude.transpose())),
+                &log(&(problem.initial_attitude * at.initial_attitude.transpose())),
             ),
         })
     }
@@ -108,7 +114,7 @@ impl<'a> Batch<'a> {
         mut accepted: impl FnMut() -> bool,
     ) -> Result<(), CalibrationError> {
         let variance = self.problem.variance;
-        let tied = State::at_rest(standing.attitude);
+        let tied = State::at_rest(standing.attitude.unwrap_or(self.navigator.state.attitude));
         self.information.refer(&self.navigator.state, &tied);
         self.navigator.state = tied;
 
@@ -165,9 +171,9 @@ impl Information {
             know(table + ATTITUDE + axis, SAME);
             know(table + VELOCITY + axis, start.velocity);
             know(table + POSITION + axis, start.position);
-            know(initial + axis, start.attitude);
+            know(initial + axis, start.attitude[axis]);
             rows[(table + ATTITUDE + axis, initial + axis)] = -1.0 / SAME;
-            rows[(initial + axis, z)] = attitude[axis] / start.attitude;
+            rows[(initial + axis, z)] = attitude[axis] / start.attitude[axis];
         }
         for (n, &(index, sigma)) in parameters.iter().enumerate() {
             let unknown = table + NAVIGATION + n;

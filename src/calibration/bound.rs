@@ -1,10 +1,11 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
+use super::coarse::coarse_start;
 use super::error::CalibrationError;
 use super::estimator::problem;
 use super::outcome::{Estimate, Moment};
 use super::pass::{Gate, Linearisation, Mode, pass};
-use super::schedule::Schedule;
+use super::schedule::{Schedule, first_reading};
 use super::standstill::velocity_sigma;
 use crate::imu::{PerSensor, Triad};
 use crate::run::Run;
@@ -21,19 +22,25 @@ pub struct Bound {
 /// The covariance of a held pass linearised at the truth, in the truth's own installation form:
 /// the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
 /// Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the first
-/// reading: an arc second there is nothing to the covariance.
+/// reading or the coarse start: arc seconds of tilt and arc minutes of heading are nothing to the
+/// covariance.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
 pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationError> {
     let dwells = run.dwells();
     let schedule = Schedule::new(run, &dwells)?;
+    let form = truth.gyro.form;
+    let initial_attitude = match first_reading(run, &dwells) {
+        Some(reading) => reading,
+        None => coarse_start(run, &dwells, form)?.initial_attitude,
+    };
     let at = Linearisation {
         triads: *truth,
-        initial_attitude: schedule.initial_attitude,
+        initial_attitude,
     };
-    let form = truth.gyro.form;
-    let problem = problem(run, schedule, form, velocity_sigma(run, &dwells));
+    let sigma = velocity_sigma(run, &dwells);
+    let problem = problem(run, schedule, form, initial_attitude, sigma);
     let result = pass(&problem, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {

@@ -11,7 +11,7 @@ use super::states::{ParameterMatrix, parameter};
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
-use crate::run::{Dwell, Run};
+use crate::run::{Dwell, MeanOutput, Run};
 
 /// The mean output of a triad at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,20 +184,21 @@ fn split_covariance(
 /// Mean output and known input over one dwell; `None` without a table.
 fn position(run: &Run, dwell: &Dwell, sensor: Sensor) -> Option<Position> {
     let table = run.table.as_ref()?;
-    let (samples, known) = match sensor {
-        Sensor::Gyro => (&run.imu.gyro, run.site.earth_rate_n()),
-        Sensor::Accel => (&run.imu.accel, -run.site.gravity_n()),
+    let position = dwell.position.as_ref()?;
+    let known = match sensor {
+        Sensor::Gyro => run.site.earth_rate_n(),
+        Sensor::Accel => -run.site.gravity_n(),
     };
-    let duration = dwell.samples.len() as f64 * run.imu.period;
-    let sum: Vector3<f64> = samples[dwell.samples.clone()].iter().sum();
-    let input = dwell.attitude.tr_mul(&known);
-    let noise = run.noise.get(sensor).random_walk.powi(2) / duration
-        + run.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration);
+    let MeanOutput {
+        output,
+        variance: noise,
+    } = dwell.mean(sensor, run);
+    let input = position.attitude.tr_mul(&known);
     let attitude =
-        table.position_sigma.powi(2) + table.reading_sigma.powi(2) / dwell.readings.len() as f64;
+        table.position_sigma.powi(2) + table.reading_sigma.powi(2) / position.readings.len() as f64;
     Some(Position {
         input,
-        output: sum / duration,
+        output,
         // A wrong attitude turns the other two components of the input into this one.
         variance: Vector3::from_fn(|i, _| {
             noise + attitude * (input.norm_squared() - input[i].powi(2))

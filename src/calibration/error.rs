@@ -10,15 +10,15 @@ use crate::imu::Sensor;
 pub enum CalibrationError {
     /// Table aiding without a table.
     #[error(
-        "the run has no [turntable]: calibration with table aiding needs the table's log; \
-         name it in run.toml"
+        "the run has no [turntable]: table aiding and the six-position method need the table's log; \
+         name it in run.toml, or use --method ekf --aiding velocity"
     )]
     NoTable,
     /// Not enough standing positions.
     #[error(
-        "{found} dwells found in the table's log, at least {needed} expected: the table must stand \
-         for a second or more between turns; check the log, and reading_sigma_arcsec if it is \
-         noisier than stated"
+        "{found} dwells found, at least {needed} expected: the instrument must stand for a second or \
+         more between turns; check the table's log, and reading_sigma_arcsec if it is noisier than \
+         stated; without a log, the gyros' prior bias and noise figures"
     )]
     TooFewDwells {
         /// Dwells found.

@@ -1,4 +1,4 @@
-//! The estimator: coarse start, a live pass, and held passes until nothing moves.
+//! The estimator: coarse start, with a table a live pass, and held passes until nothing moves.
 
 use super::coarse::coarse_start;
 use super::consistency::consistency;
@@ -12,9 +12,12 @@ use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, Variance, gate
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
 use super::states::ParameterVector;
+use nalgebra::{Matrix3, Vector3};
+
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
 use crate::run::Run;
-use crate::units::ARCSEC;
+use crate::run::record::BodyFrame;
+use crate::units::{ARCSEC, DEGREE};
 
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
@@ -28,6 +31,9 @@ const PASSES: usize = 10;
 const MERIT_RISE: f64 = 0.1;
 /// 1σ of the initial attitude before anything is known of it but one reading, rad.
 const INITIAL_ATTITUDE: f64 = 60.0 * ARCSEC;
+/// 1σ of the initial attitude without a table, East, North and Up, rad. What gave it is in the
+/// observations, too, so this is far wider than it is wrong.
+const COARSE_ATTITUDE: [f64; 3] = [0.2 * DEGREE, 0.2 * DEGREE, 15.0 * DEGREE];
 /// 1σ of the initial velocity: a table at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
 /// More than this part of all observations beyond the gate are no outliers.
@@ -35,7 +41,7 @@ const MOST_OUTLIERS: f64 = 0.05;
 /// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
 const DOUBTFUL: f64 = 0.2;
 
-/// Estimates both triads of a run with table aiding.
+/// Estimates both triads of a run, by standstill and, where the run has a table's log, its attitude.
 ///
 /// Source: design of the passes after Maybeck, *Stochastic Models, Estimation and Control*, vol. 2,
 /// §9.7 (iterated, linearised filters): each held pass is a Gauss–Newton step of the whole record.
@@ -53,19 +59,23 @@ pub fn estimate(
     }
     let dwells = run.dwells();
     let schedule = Schedule::new(run, &dwells)?;
-    let coarse = coarse_start(run, &dwells, form)?;
-    let start = Linearisation {
-        triads: coarse,
-        initial_attitude: schedule.initial_attitude,
-    };
+    let start = coarse_start(run, &dwells, form)?;
     let velocity_sigma = velocity_sigma(run, &dwells);
-    let problem = problem(run, schedule, form, velocity_sigma);
+    let problem = problem(run, schedule, form, start.initial_attitude, velocity_sigma);
 
-    let live = pass(&problem, &start, Mode::Live)?;
-    let mut passes = vec![summary(&live, &start, true)];
-    passes.iter().for_each(progress);
-
-    let (held, converged) = iterate(&problem, live.estimate, &mut passes, progress)?;
+    let mut passes = Vec::new();
+    // What a live pass feeds back while heading is known to degrees only leads it astray; the coarse
+    // start without a table is good enough for the held passes to begin from.
+    let live = match run.body_frame() {
+        BodyFrame::Table => Some(pass(&problem, &start, Mode::Live)?),
+        BodyFrame::Accelerometer => None,
+    };
+    if let Some(live) = &live {
+        passes.push(summary(live, &start, true));
+        passes.iter().for_each(progress);
+    }
+    let from = live.as_ref().map_or(start, |live| live.estimate);
+    let (held, converged) = iterate(&problem, from, &mut passes, progress)?;
     let estimate = Estimate {
         triads: held.estimate.triads,
         covariance: held.covariance + curvature(&held.estimate.triads, &held.covariance),
@@ -84,11 +94,12 @@ pub fn estimate(
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
+        prior_attitude: problem.initial_attitude,
         linearised_at: held.at,
         converged,
         consistency: consistency(&held.innovations),
         history: held.history,
-        live_history: live.history,
+        live_history: live.map(|live| live.history).unwrap_or_default(),
         innovations: held.innovations,
         velocity_sigma,
         passes,
@@ -156,27 +167,35 @@ pub(super) fn problem<'a>(
     run: &'a Run,
     schedule: Schedule,
     form: InstallationForm,
+    initial_attitude: Matrix3<f64>,
     velocity_sigma: f64,
 ) -> Problem<'a> {
     let (position_sigma, reading_sigma) = run.table.as_ref().map_or((0.0, 0.0), |table| {
         (table.position_sigma, table.reading_sigma)
     });
     let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
+    let sigma_of_triads = run.prior_sigma(form);
     let mut prior_sigma = ParameterVector::zeros();
     for sensor in Sensor::ALL {
         prior_sigma
             .fixed_rows_mut::<PER_TRIAD>(super::states::parameter(sensor, 0))
-            .copy_from(&run.prior.get(sensor).sigma(form));
+            .copy_from(sigma_of_triads.get(sensor));
     }
     Problem {
         run,
         schedule,
         form,
+        initial_attitude,
         prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
         start: Start {
-            // The one reading that gave it has both errors.
-            attitude: INITIAL_ATTITUDE.max(10.0 * position_sigma.hypot(reading_sigma)),
+            attitude: match run.table {
+                // The one reading that gave it has both errors.
+                Some(_) => Vector3::repeat(
+                    INITIAL_ATTITUDE.max(10.0 * position_sigma.hypot(reading_sigma)),
+                ),
+                None => Vector3::from(COARSE_ATTITUDE),
+            },
             velocity: INITIAL_VELOCITY,
             position: run.standstill.position_sigma,
             table: position_sigma,
@@ -276,11 +295,11 @@ fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::super::outcome::from_vector;
+    use super::super::schedule::first_reading;
     use super::*;
     use crate::attitude::exp;
     use crate::simulation::Scenario;
     use crate::units::PPM;
-    use nalgebra::Vector3;
 
     #[test]
     fn the_estimate_does_not_depend_on_where_a_held_pass_linearises() {
@@ -288,8 +307,8 @@ mod tests {
         let form = InstallationForm::General;
         let dwells = simulated.run.dwells();
         let schedule = Schedule::new(&simulated.run, &dwells).unwrap();
-        let reading = schedule.initial_attitude;
-        let mut problem = problem(&simulated.run, schedule, form, 1e-6);
+        let reading = first_reading(&simulated.run, &dwells).unwrap();
+        let mut problem = problem(&simulated.run, schedule, form, reading, 1e-6);
         // As tight a prior of attitude and scale as a run gives, so that it counts.
         problem.start.attitude = ARCSEC;
         problem.prior_mean = to_vector(&simulated.truth);

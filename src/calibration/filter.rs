@@ -57,7 +57,8 @@ pub(super) struct Filter {
 /// Uncertainty at the first sample, 1σ.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
-    pub attitude: f64,
+    /// East, North and Up, rad.
+    pub attitude: Vector3<f64>,
     pub velocity: f64,
     pub position: f64,
     pub table: f64,
@@ -86,10 +87,10 @@ impl Filter {
                 p[(row + axis, column + axis)] = sigma.powi(2);
             };
             // φ starts as φ₀: fully correlated.
-            set(ATTITUDE, ATTITUDE, start.attitude);
-            set(ATTITUDE, INITIAL_ATTITUDE, start.attitude);
-            set(INITIAL_ATTITUDE, ATTITUDE, start.attitude);
-            set(INITIAL_ATTITUDE, INITIAL_ATTITUDE, start.attitude);
+            set(ATTITUDE, ATTITUDE, start.attitude[axis]);
+            set(ATTITUDE, INITIAL_ATTITUDE, start.attitude[axis]);
+            set(INITIAL_ATTITUDE, ATTITUDE, start.attitude[axis]);
+            set(INITIAL_ATTITUDE, INITIAL_ATTITUDE, start.attitude[axis]);
             set(VELOCITY, VELOCITY, start.velocity);
             set(POSITION, POSITION, start.position);
             set(TABLE, TABLE, start.table);
@@ -264,7 +265,7 @@ mod tests {
 
     fn filter() -> Filter {
         let start = Start {
-            attitude: 3e-4,
+            attitude: Vector3::repeat(3e-4),
             velocity: 1e-3,
             position: 1.0,
             table: 5e-6,

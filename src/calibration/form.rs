@@ -46,6 +46,7 @@ pub(super) fn form_test(
         restricted.run,
         restricted.schedule.clone(),
         general,
+        restricted.initial_attitude,
         restricted.velocity_sigma,
     );
     let at = Linearisation {

@@ -126,22 +126,31 @@ pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
     PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }
 
+/// The same triads, given on any body axes, on those of a body frame; as they are on the table's,
+/// which they do not tell.
+pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
+    if body_frame == BodyFrame::Table {
+        return *triads;
+    }
+    let rotation = accelerometer_frame(&triads.accel.sensitivity());
+    PerSensor::from_fn(|sensor| {
+        let triad = triads.get(sensor);
+        let mut a = triad.sensitivity() * rotation.transpose();
+        clear_fixed(&mut a, sensor, body_frame);
+        Triad::from_sensitivity(triad.form, &a, triad.bias)
+    })
+}
+
 /// Indices of the parameters that a body frame leaves free, in the general form.
 pub(super) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
-    let fixed: &[&str] = match body_frame {
-        BodyFrame::Table => &[],
-        BodyFrame::Accelerometer => &[
-            "accel.installation.xy",
-            "accel.installation.xz",
-            "accel.installation.yz",
-        ],
-    };
-    (0..PARAMETERS)
-        .filter(|&i| {
-            parameter_name(InstallationForm::General, i)
-                .is_some_and(|name| !fixed.contains(&name.as_str()))
-        })
-        .collect()
+    let mut free: Vec<usize> = (0..PARAMETERS).collect();
+    if body_frame == BodyFrame::Accelerometer {
+        let fixed: Vec<usize> = Triad::above_the_diagonal(InstallationForm::General)
+            .map(|angle| super::states::parameter(Sensor::Accel, angle))
+            .collect();
+        free.retain(|index| !fixed.contains(index));
+    }
+    free
 }
 
 /// The nominal scales by which a record's own scale factors in the general form are one: the norms

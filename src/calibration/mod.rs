@@ -34,7 +34,7 @@ pub use consistency::mean_square_interval;
 pub use error::{CalibrationError, ComparisonError};
 pub use estimator::{Progress, estimate};
 pub use form::FormTest;
-pub use frame::{Canonical, in_general_form};
+pub use frame::{Canonical, in_body_frame, in_general_form};
 pub use group::Group;
 pub use nees::{Nees, nees};
 pub use observability::{AttitudePart, Direction, Observability, Part};

@@ -1,5 +1,7 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
+use nalgebra::Matrix3;
+
 use super::form::FormTest;
 use super::observability::Observability;
 use super::pass::Linearisation;
@@ -76,17 +78,20 @@ pub struct Outcome {
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
     pub prior_mean: ParameterVector,
+    /// Mean of the initial attitude before the run, `C_b_n`: a reading of the table or, without, the
+    /// coarse alignment.
+    pub prior_attitude: Matrix3<f64>,
     /// What the run showed of the parameters and what it left as it was.
     pub observability: Observability,
     /// Where the last pass linearised.
     pub linearised_at: Linearisation,
-    /// Each pass in order; the first is the live one.
+    /// Each pass in order; with a table, the first is the live one.
     pub passes: Vec<Pass>,
     /// Whether the last pass moved no parameter by more than the limit.
     pub converged: bool,
     /// Estimate and σ against time in the last pass, whose σ are the true ones.
     pub history: Vec<Moment>,
-    /// Estimate and σ against time in the live pass, as the turntable moved.
+    /// Estimate and σ against time in the live pass, as the turntable moved; empty without a table.
     pub live_history: Vec<Moment>,
     /// Innovations of the last pass.
     pub innovations: Vec<Innovation>,

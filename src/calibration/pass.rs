@@ -22,6 +22,8 @@ pub(super) struct Problem<'a> {
     pub run: &'a Run,
     pub schedule: Schedule,
     pub form: InstallationForm,
+    /// Mean of the initial attitude's prior, `C_b_n`.
+    pub initial_attitude: Matrix3<f64>,
     pub prior_mean: ParameterVector,
     pub prior_sigma: ParameterVector,
     pub start: Start,
@@ -173,7 +175,7 @@ impl<'a> Pass<'a> {
             Mode::Live => (ParameterVector::zeros(), Vector3::zeros()),
             Mode::Held(_) => (
                 problem.prior_mean - to_vector(&at.triads),
-                log(&(problem.schedule.initial_attitude * at.initial_attitude.transpose())),
+                log(&(problem.initial_attitude * at.initial_attitude.transpose())),
             ),
         };
         let filter = Filter::new(problem.start, &parameters, &problem.prior_sigma, attitude);
@@ -286,7 +288,7 @@ impl<'a> Pass<'a> {
         if matches!(self.mode, Mode::Held(_)) {
             // The table's own mean reading is within arc seconds of the truth in every pass, so what
             // noise adds up to over a long record never leaves the linear range.
-            let tied = State::at_rest(standing.attitude);
+            let tied = State::at_rest(standing.attitude.unwrap_or(self.navigator.state.attitude));
             self.filter.refer(&self.navigator.state, &tied);
             self.navigator.state = tied;
         }

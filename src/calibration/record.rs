@@ -24,7 +24,10 @@ impl Outcome {
     pub fn record(&self, run: &Run) -> CalibrationRecord {
         CalibrationRecord {
             method: Some(Method::Ekf),
-            aiding: Some(Aiding::Table),
+            aiding: Some(match run.body_frame() {
+                BodyFrame::Table => Aiding::Table,
+                BodyFrame::Accelerometer => Aiding::Velocity,
+            }),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
@@ -59,7 +62,7 @@ impl Estimate {
         CalibrationRecord {
             method: Some(Method::SixPosition),
             installation_form: Some(form),
-            body_frame: BodyFrame::Table,
+            body_frame: run.body_frame(),
             unit: Some(run.unit.clone()),
             sigma: Some(PerSensor::from_fn(|sensor| {
                 let sigma = sigma.fixed_rows::<PER_TRIAD>(super::states::parameter(sensor, 0));

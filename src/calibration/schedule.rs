@@ -21,8 +21,8 @@ pub(super) struct Step {
 pub(super) struct Standing {
     /// Whether it is the dwell's first.
     pub first: bool,
-    /// Mean of the table's readings during the whole dwell, `C_b_n`.
-    pub attitude: Matrix3<f64>,
+    /// Mean of the table's readings during the whole dwell, `C_b_n`; none without a table.
+    pub attitude: Option<Matrix3<f64>>,
     /// Mean of the table's readings during the stretch, and how many they were.
     pub reading: Option<(Matrix3<f64>, usize)>,
 }
@@ -31,8 +31,6 @@ pub(super) struct Standing {
 #[derive(Debug, Clone)]
 pub(super) struct Schedule {
     pub steps: Vec<Step>,
-    /// Attitude that the first reading gives; that reading is not used again.
-    pub initial_attitude: Matrix3<f64>,
 }
 
 /// Length of a stretch, s: covariance is propagated and observations are taken at 10 Hz.
@@ -45,39 +43,41 @@ pub(super) fn stretch(period: f64) -> usize {
 
 impl Schedule {
     pub fn new(run: &Run, dwells: &[Dwell]) -> Result<Self, CalibrationError> {
-        let table = run.table.as_ref().ok_or(CalibrationError::NoTable)?;
         let [start, _, ..] = dwells else {
             return Err(CalibrationError::TooFewDwells {
                 found: dwells.len(),
                 needed: 2,
             });
         };
-        let initial = start.readings.start;
         let mut steps = Vec::new();
         let mut at = start.samples.start;
         let stretch = stretch(run.imu.period);
-        for dwell in dwells {
+        for (number, dwell) in dwells.iter().enumerate() {
             cut(at..dwell.samples.start, stretch, |samples| {
                 steps.push(Step {
                     samples,
                     standing: None,
                 });
             });
-            let mut unread = dwell.readings.clone();
-            if unread.start == initial {
+            let mut unread = dwell.position.as_ref().map(|p| p.readings.clone());
+            // The first reading of all is the initial attitude.
+            if let Some(unread) = unread.as_mut().filter(|_| number == 0) {
                 unread.start += 1;
             }
             let mut first = true;
             cut(dwell.samples.clone(), stretch, |samples| {
                 let until = run.imu.time(samples.end) + 1e-3 * run.imu.period;
-                let readings = take_until(&mut unread, table, until);
-                let reading = attitude::mean(&table.attitude[readings.clone()])
-                    .map(|attitude| (attitude, readings.len()));
+                let reading = run.table.as_ref().zip(unread.as_mut());
+                let reading = reading.and_then(|(table, unread)| {
+                    let readings = take_until(unread, table, until);
+                    let mean = attitude::mean(&table.attitude[readings.clone()])?;
+                    Some((mean, readings.len()))
+                });
                 steps.push(Step {
                     samples,
                     standing: Some(Standing {
                         first,
-                        attitude: dwell.attitude,
+                        attitude: dwell.position.as_ref().map(|p| p.attitude),
                         reading,
                     }),
                 });
@@ -85,11 +85,18 @@ impl Schedule {
             });
             at = dwell.samples.end;
         }
-        Ok(Self {
-            steps,
-            initial_attitude: table.attitude[initial],
-        })
+        Ok(Self { steps })
     }
+}
+
+/// The attitude that a table's first reading gives.
+pub(super) fn first_reading(run: &Run, dwells: &[Dwell]) -> Option<Matrix3<f64>> {
+    let position = dwells.first()?.position.as_ref()?;
+    run.table
+        .as_ref()?
+        .attitude
+        .get(position.readings.start)
+        .copied()
 }
 
 /// Cuts a range into stretches of this length; the last may be shorter.

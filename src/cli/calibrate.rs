@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
-use turncal::calibration::{self, ClosedForm, Outcome, triads_of};
+use turncal::calibration::{self, CalibrationError, ClosedForm, Outcome, in_body_frame, triads_of};
 use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};
 use turncal::run::{CalibrationRecord, Run};
@@ -36,9 +36,9 @@ pub struct Calibrate {
     /// How installation angles make the installation matrix
     #[arg(long, value_enum, default_value_t = Installation::General)]
     installation: Installation,
-    /// What the filter observes beside the standstill
-    #[arg(long, value_enum, default_value_t = Aiding::Table)]
-    aiding: Aiding,
+    /// What the filter observes [default: table if the run has its log, else velocity]
+    #[arg(long, value_enum)]
+    aiding: Option<Aiding>,
     /// True calibration; the estimator never sees it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -68,11 +68,13 @@ pub enum Installation {
     ThreeAngle,
 }
 
-/// What the filter observes beside the standstill.
-#[derive(Debug, Clone, Copy, ValueEnum)]
+/// What the filter observes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Aiding {
-    /// Attitude of the table
+    /// Standstill, and the attitude of the table
     Table,
+    /// Standstill alone; the accelerometers fix the body axes
+    Velocity,
 }
 
 impl From<Installation> for InstallationForm {
@@ -94,7 +96,16 @@ enum Result {
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new(format!("reading {}", self.run.display()));
-        let run = Run::read(&self.run)?;
+        let mut run = Run::read(&self.run)?;
+        match self.aiding {
+            Some(Aiding::Table) if run.table.is_none() => {
+                return Err(CalibrationError::NoTable)
+                    .with_context(|| self.run.display().to_string());
+            }
+            // What the filter is not to observe is not there.
+            Some(Aiding::Velocity) => run.table = None,
+            Some(Aiding::Table) | None => {}
+        }
         let form = self.installation.into();
         let truth = self
             .truth
@@ -121,7 +132,6 @@ impl Calibrate {
             })
             .transpose()?;
 
-        let Aiding::Table = self.aiding;
         let result = match self.method {
             Method::Ekf => Result::Filter(Box::new(filter(&run, form, &activity)?)),
             Method::SixPosition => {
@@ -147,7 +157,6 @@ impl Calibrate {
         let report = Report {
             title: &run.name,
             run: &run,
-            body_frame: BODY_FRAME,
             outcome: match &result {
                 Result::Filter(outcome) => Some(outcome),
                 Result::ClosedForm(_) => None,
@@ -181,9 +190,6 @@ impl Calibrate {
         Ok(())
     }
 }
-
-/// What fixes the body axes with table aiding.
-pub const BODY_FRAME: &str = "mounting face of the turntable";
 
 /// Runs the filter; a run that does not converge is a failure.
 pub fn filter(run: &Run, form: InstallationForm, activity: &Activity) -> anyhow::Result<Outcome> {
@@ -250,5 +256,6 @@ fn read_truth(path: &Path, run: &Run) -> anyhow::Result<PerSensor<Triad>> {
             run.unit.accel
         );
     }
-    Ok(triads_of(&record, &run.nominal, InstallationForm::General))
+    let triads = triads_of(&record, &run.nominal, InstallationForm::General);
+    Ok(in_body_frame(&triads, run.body_frame()))
 }

@@ -8,7 +8,7 @@ use turncal::imu::InstallationForm;
 use turncal::report::{self, Report};
 use turncal::simulation::{Scenario, Simulated};
 
-use super::calibrate::{BODY_FRAME, dwell_times, filter, navigate, note, write_report};
+use super::calibrate::{dwell_times, filter, navigate, note, write_report};
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
@@ -60,7 +60,6 @@ impl Demo {
         let report = Report {
             title: "turncal demo",
             run,
-            body_frame: BODY_FRAME,
             outcome: Some(&outcome),
             closed_form: Some(report::ClosedForm {
                 estimate: &closed_form.estimate,

@@ -115,6 +115,24 @@ impl Triad {
         }
     }
 
+    /// Indices of the installation angles above the diagonal of `C`. In a body frame along the
+    /// accelerometers theirs are zero.
+    pub fn above_the_diagonal(form: InstallationForm) -> impl Iterator<Item = usize> {
+        let angles = form.angle_names().iter().enumerate();
+        angles
+            .filter(|(_, (row, column))| column > row)
+            .map(|(angle, _)| INSTALLATION + angle)
+    }
+
+    /// The same without installation angles above the diagonal of `C`.
+    pub fn along_body_axes(&self) -> Self {
+        let mut v = self.to_vector();
+        for angle in Self::above_the_diagonal(self.form) {
+            v[angle] = 0.0;
+        }
+        Self::from_vector(self.form, &v)
+    }
+
     /// Which parameters a form has.
     pub fn has_parameter(form: InstallationForm, parameter: usize) -> bool {
         !(INSTALLATION + form.angle_names().len()..BIAS).contains(&parameter)

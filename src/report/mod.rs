@@ -46,8 +46,6 @@ pub struct Report<'a> {
     pub title: &'a str,
     /// The record.
     pub run: &'a Run,
-    /// What defines the body frame of the estimates, such as `mounting face of the turntable`.
-    pub body_frame: &'a str,
     /// The filter's result, if it ran.
     pub outcome: Option<&'a Outcome>,
     /// The closed form's result, if there is one.

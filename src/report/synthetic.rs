@@ -45,7 +45,6 @@ impl Synthetic {
         Report {
             title: "Calibration of a made-up instrument",
             run: &self.run,
-            body_frame: "mounting face of the turntable",
             outcome: Some(&self.outcome),
             closed_form: Some(ClosedForm {
                 estimate: &self.closed,
@@ -267,6 +266,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         estimate,
         prior_sigma,
         prior_mean,
+        prior_attitude: nalgebra::Matrix3::identity(),
         observability: Observability {
             directions: vec![Direction {
                 remaining: 0.002,

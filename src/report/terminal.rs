@@ -41,7 +41,7 @@ impl Report<'_> {
         if let Some(estimate) = self.estimate() {
             let _ = write!(text, "; {} installation", estimate.form().name());
         }
-        let _ = writeln!(text, "; body frame: {}", self.body_frame);
+        let _ = writeln!(text, "; body frame: {}", self.run.body_frame().words());
         if let Some(outcome) = self.outcome {
             let _ = writeln!(text, "{}", passes(outcome));
         } else if let Some(closed_form) = self.closed_form {

@@ -1,41 +1,40 @@
-//! Where the table stands: dwells, found from its own readings.
+//! Where the instrument stands: dwells, found from the table's readings or, without a table, from the
+//! instrument itself.
+
+mod imu;
+mod table;
 
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{ImuRecord, Run, TableRecord};
-use crate::attitude::{exp, log, mean};
+use super::{ImuRecord, Run};
+use crate::attitude::{exp, log};
+use crate::imu::Sensor;
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
 
-/// A stretch of samples during which the table stands.
+/// A stretch of samples during which the instrument stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dwell {
     /// Samples that lie wholly within it.
     pub samples: Range<usize>,
-    /// Readings of the table within it.
+    /// What the table says of it; none without a table.
+    pub position: Option<Position>,
+}
+
+/// A position of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Position {
+    /// Readings of the table within the dwell.
     pub readings: Range<usize>,
     /// Mean reading, `C_b_n`.
     pub attitude: Matrix3<f64>,
 }
 
-/// Shortest dwell worth a name, s.
-const SHORTEST: f64 = 0.5;
-/// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
-/// it, and one that stops still rings.
-const MARGIN: f64 = 0.2;
-/// A table that creeps, or takes up its next position before it turns, shows it in the mean of this
-/// long a stretch at an end of the dwell, s …
-const CREEP_STRETCH: f64 = 1.0;
-/// … by this many σ.
-const CREEP_SIGMAS: f64 = 5.0;
-/// Readings at least this far apart tell a slow turn from a standstill, however dense the log, s.
-const APART: f64 = 0.05;
 /// Readings of a standing table differ by less than this many σ of their noise …
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
-
 /// Gyros that integrate to less than this have not turned, rad …
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 /// … beyond their noise …
@@ -44,13 +43,18 @@ const STILL_SIGMAS: f64 = 6.0;
 const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 
 impl Run {
-    /// The dwells of the table's log, in order; none without a table.
+    /// The dwells, in order.
     ///
-    /// The gyros have a say: a standstill of the log during which they turn is none (two readings may
-    /// miss a full turn), and two between which they do not turn are one (a wild reading parted them).
+    /// Where a table's log says where it stands, the gyros have a say: a standstill of the log during
+    /// which they turn is none (two readings may miss a full turn). Two between which they do not turn
+    /// are one (a wild reading, or a knock, parted them).
     pub fn dwells(&self) -> Vec<Dwell> {
+        let standstills = match &self.table {
+            Some(table) => self.standstills_of_table(table),
+            None => self.standstills_of_imu(),
+        };
         let mut dwells: Vec<Dwell> = Vec::new();
-        for dwell in self.standstills() {
+        for dwell in standstills {
             if self.turns(dwell.samples.clone(), &dwell) {
                 continue;
             }
@@ -63,11 +67,16 @@ impl Run {
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {
-        let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
-        let reading_sigma = self.table.as_ref().map_or(0.0, |t| t.reading_sigma);
-        let limit = STANDING_ANGLE.max(STANDING_SIGMAS * reading_sigma * share.sqrt());
-        log(&(after.attitude * before.attitude.transpose())).norm() < limit
-            && !self.turns(before.samples.end..after.samples.start, before)
+        let same_reading = match (&before.position, &after.position) {
+            (Some(before), Some(after)) => {
+                let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
+                let reading_sigma = self.table.as_ref().map_or(0.0, |t| t.reading_sigma);
+                let limit = STANDING_ANGLE.max(STANDING_SIGMAS * reading_sigma * share.sqrt());
+                log(&(after.attitude * before.attitude.transpose())).norm() < limit
+            }
+            _ => true,
+        };
+        same_reading && !self.turns(before.samples.end..after.samples.start, before)
     }
 
     /// Whether the gyros turn during these samples, with their mean output at rest as zero.
@@ -85,59 +94,33 @@ impl Run {
             angle.norm() > limit
         })
     }
+}
 
-    /// Stretches of the log whose readings stay.
-    fn standstills(&self) -> Vec<Dwell> {
-        let Some(table) = &self.table else {
-            return Vec::new();
-        };
-        // Two readings of three components each.
-        let limit = STANDING_ANGLE.max(STANDING_SIGMAS * table.reading_sigma * 6f64.sqrt());
-        let mut dwells = Vec::new();
-        let (mut first, mut before) = (0, 0);
-        for next in 1..=table.time.len() {
-            let stands = next < table.time.len() && {
-                while before + 1 < next && table.time[next] - table.time[before + 1] >= APART {
-                    before += 1;
-                }
-                let before = &table.attitude[before.max(first)];
-                log(&(table.attitude[next] * before.transpose())).norm() < limit
-            };
-            if !stands {
-                dwells.extend(self.dwell(table, first..next));
-                first = next;
-            }
-        }
-        dwells
-    }
-
-    fn dwell(&self, table: &TableRecord, standing: Range<usize>) -> Option<Dwell> {
-        let settled = settled(table, standing);
-        // At either end of the log the table is not known to move.
-        let margin = |at_end: bool| if at_end { 0.0 } else { MARGIN };
-        let begin = table.time.get(settled.start)? + margin(settled.start == 0);
-        let end =
-            table.time.get(settled.end.checked_sub(1)?)? - margin(settled.end == table.time.len());
-
-        let times = &table.time[settled.clone()];
-        let readings = settled.start + times.partition_point(|&t| t < begin)
-            ..settled.start + times.partition_point(|&t| t <= end);
-        // A stamp that misses a sample's edge by rounding must not cost the sample.
-        let edge = |time: f64| (time - self.imu.start) / self.imu.period;
-        let sample = |k: f64| k.clamp(0.0, self.imu.len() as f64) as usize;
-        let samples = sample((edge(begin) - 1e-3).ceil())..sample((edge(end) + 1e-3).floor());
-        if samples.len() as f64 * self.imu.period < SHORTEST {
-            return None;
-        }
-        Some(Dwell {
-            attitude: mean(table.attitude.get(readings.clone())?)?,
-            samples,
-            readings,
-        })
-    }
+/// Mean output of a triad over a dwell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeanOutput {
+    /// Normalised output per second, rad/s or m/s².
+    pub output: Vector3<f64>,
+    /// Variance per axis by random walk and pulses.
+    pub variance: f64,
 }
 
 impl Dwell {
+    /// Mean output of a triad over it.
+    pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
+        let samples = match sensor {
+            Sensor::Gyro => &run.imu.gyro,
+            Sensor::Accel => &run.imu.accel,
+        };
+        let duration = self.samples.len() as f64 * run.imu.period;
+        let sum: Vector3<f64> = samples[self.samples.clone()].iter().sum();
+        MeanOutput {
+            output: sum / duration,
+            variance: run.noise.get(sensor).random_walk.powi(2) / duration
+                + run.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration),
+        }
+    }
+
     /// The first seconds of it; the attitude is that of all its readings.
     pub fn first_seconds(&self, duration: f64, imu: &ImuRecord) -> Self {
         let samples = (duration / imu.period).round() as usize;
@@ -150,49 +133,32 @@ impl Dwell {
 
     /// Takes in a later dwell at the same position.
     fn extend(&mut self, later: &Self) {
+        self.samples.end = later.samples.end;
+        if let (Some(position), Some(later)) = (&mut self.position, &later.position) {
+            position.extend(later);
+        }
+    }
+}
+
+impl Position {
+    fn extend(&mut self, later: &Self) {
         let share =
             later.readings.len() as f64 / (self.readings.len() + later.readings.len()) as f64;
         let turn = log(&(later.attitude * self.attitude.transpose()));
         self.attitude = exp(turn * share) * self.attitude;
-        self.samples.end = later.samples.end;
         self.readings.end = later.readings.end;
     }
-}
-
-/// Cuts off the ends of a standstill at which the mean of the readings is not that of its middle.
-fn settled(table: &TableRecord, standing: Range<usize>) -> Range<usize> {
-    let quarter = standing.len() / 4;
-    let middle = standing.start + quarter..standing.end - quarter;
-    let (first, last) = (table.time[standing.start], table.time[standing.end - 1]);
-    let interval = (last - first) / (standing.len() as f64 - 1.0);
-    let stretch = (CREEP_STRETCH / interval).round();
-    let Some(level) = mean(&table.attitude[middle.clone()]) else {
-        return standing;
-    };
-    if !(stretch >= 1.0 && stretch <= quarter as f64) {
-        return standing;
-    }
-    let stretch = stretch as usize;
-    let sigma = table.reading_sigma * (1.0 / stretch as f64 + 1.0 / middle.len() as f64).sqrt();
-    let creeps = |readings: Range<usize>| {
-        mean(&table.attitude[readings])
-            .is_some_and(|mean| log(&(mean * level.transpose())).norm() > CREEP_SIGMAS * sigma)
-    };
-    let mut settled = standing;
-    while settled.start + stretch <= middle.start && creeps(settled.start..settled.start + stretch)
-    {
-        settled.start += stretch;
-    }
-    while settled.end >= middle.end + stretch && creeps(settled.end - stretch..settled.end) {
-        settled.end -= stretch;
-    }
-    settled
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::run::TableRecord;
     use crate::simulation::Scenario;
+
+    fn reading(dwell: &Dwell) -> Range<usize> {
+        dwell.position.clone().unwrap().readings
+    }
 
     #[test]
     fn dwells_lie_within_the_standstills_of_the_table_and_miss_little_of_them() {
@@ -217,16 +183,16 @@ mod tests {
     #[test]
     fn a_reading_that_takes_up_the_next_position_before_the_turn_ends_the_dwell() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let before = run.dwells()[0].clone();
+        let before = reading(&run.dwells()[0]);
         let table = run.table.as_mut().unwrap();
         let early = 20;
-        for reading in before.readings.end - early..before.readings.end {
+        for reading in before.end - early..before.end {
             table.attitude[reading] =
                 exp(Vector3::new(0.0, 3.0 * ARCSEC, 0.0)) * table.attitude[reading];
         }
-        let after = &run.dwells()[0];
-        assert!(after.readings.end <= before.readings.end - early);
-        assert!(after.readings.end + early + 20 > before.readings.end);
+        let after = reading(&run.dwells()[0]);
+        assert!(after.end <= before.end - early);
+        assert!(after.end + early + 20 > before.end);
     }
 
     #[test]
@@ -234,12 +200,13 @@ mod tests {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
         let before = run.dwells();
         let table = run.table.as_mut().unwrap();
-        let wild = before[3].readings.start + 40;
+        let wild = reading(&before[3]).start + 40;
         table.attitude[wild] = exp(Vector3::new(0.0, 0.01, 0.0)) * table.attitude[wild];
         let after = run.dwells();
         assert_eq!(after.len(), before.len());
         assert_eq!(after[3].samples, before[3].samples);
-        let moved = log(&(after[3].attitude * before[3].attitude.transpose())).norm();
+        let attitude = |dwells: &[Dwell]| dwells[3].position.clone().unwrap().attitude;
+        let moved = log(&(attitude(&after) * attitude(&before).transpose())).norm();
         assert!(moved < 0.5 * ARCSEC, "{}″", moved / ARCSEC);
     }
 

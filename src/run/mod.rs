@@ -18,7 +18,7 @@ mod table_log;
 mod whole;
 mod write;
 
-pub use dwells::Dwell;
+pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
 pub use record::CalibrationRecord;
 pub use whole::{WholeDirectory, write_whole};
@@ -29,7 +29,8 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::earth::Site;
-use crate::imu::{InstallationForm, Noise, Nominal, PerSensor, Prior, Triad};
+use crate::imu::{InstallationForm, Noise, Nominal, PerSensor, Prior, Triad, TriadVector};
+use record::BodyFrame;
 
 /// Everything that a calibration needs to know of one record.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,9 +62,29 @@ pub struct Run {
 }
 
 impl Run {
+    /// What fixes the body axes.
+    pub fn body_frame(&self) -> BodyFrame {
+        match self.table {
+            Some(_) => BodyFrame::Table,
+            None => BodyFrame::Accelerometer,
+        }
+    }
+
     /// Both triads as the prior has them.
     pub fn prior_mean(&self, form: InstallationForm) -> PerSensor<Triad> {
         PerSensor::from_fn(|sensor| self.prior.get(sensor).mean(form))
+    }
+
+    /// 1σ of each parameter of both triads before calibration; zero for those that the form does not
+    /// have or the body frame fixes.
+    pub fn prior_sigma(&self, form: InstallationForm) -> PerSensor<TriadVector> {
+        let mut sigma = PerSensor::from_fn(|sensor| self.prior.get(sensor).sigma(form));
+        if self.body_frame() == BodyFrame::Accelerometer {
+            for fixed in Triad::above_the_diagonal(form) {
+                sigma.accel[fixed] = 0.0;
+            }
+        }
+        sigma
     }
 }
 

@@ -116,6 +116,18 @@ pub enum BodyFrame {
     Accelerometer,
 }
 
+impl BodyFrame {
+    /// In a few words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Table => "mounting face of the turntable",
+            Self::Accelerometer => {
+                "x along accelerometer x, y in the plane of accelerometers x and y"
+            }
+        }
+    }
+}
+
 /// Values of one triad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TriadRecord {

@@ -10,6 +10,7 @@ use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, Triad};
 use crate::models::{
     self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
+use crate::run::record::BodyFrame;
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
@@ -29,6 +30,9 @@ pub struct Scenario {
     pub instrument: Instrument,
     /// Its installation.
     pub installation: InstallationModel,
+    /// What fixes the true body axes: in the accelerometers' frame, the installation angles that it
+    /// fixes are not drawn.
+    pub body_frame: BodyFrame,
     /// True values that are given, not drawn.
     pub given: PerSensor<Given>,
     /// The table.
@@ -78,6 +82,7 @@ impl Scenario {
             site,
             instrument: Instrument::load(&file.imu.model, &text.place)?,
             installation,
+            body_frame: BodyFrame::Table,
             given: file
                 .truth
                 .in_si(installation.form)
@@ -164,12 +169,16 @@ impl Scenario {
         let bias = Vector3::from_fn(|_, _| variation.bias.draw(rng));
         let angles = self.installation.draw(rng);
         let given = self.given.get(sensor);
-        Triad {
+        let mut triad = Triad {
             form: self.installation.form,
             scale: given.scale.unwrap_or(scale).add_scalar(1.0),
             angles: given.angles.unwrap_or(angles),
             bias: given.bias.unwrap_or(bias),
+        };
+        if (self.body_frame, sensor) == (BodyFrame::Accelerometer, Sensor::Accel) {
+            triad = triad.along_body_axes();
         }
+        triad
     }
 }
 

@@ -149,7 +149,7 @@ impl AccuracyStudy {
         }
         Ok(Accuracy {
             groups: Group::all()
-                .map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
+                .filter_map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
                 .collect(),
             navigation,
             not_navigated,
@@ -186,8 +186,16 @@ impl Accuracy {
 }
 
 impl GroupAccuracy {
-    fn new(group: Group, trials: &[Trial], baseline: &Baseline, table_time: f64) -> Self {
-        let indices: Vec<usize> = (0..PARAMETERS).filter(|&i| Group::of(i) == group).collect();
+    /// None if the form and the body frame leave nothing of the group to be estimated.
+    fn new(group: Group, trials: &[Trial], baseline: &Baseline, table_time: f64) -> Option<Self> {
+        let estimated = |&i: &usize| trials.iter().any(|trial| trial.bound[i] > 0.0);
+        let indices: Vec<usize> = (0..PARAMETERS)
+            .filter(|&i| Group::of(i) == group)
+            .filter(estimated)
+            .collect();
+        if indices.is_empty() {
+            return None;
+        }
         // The mean square of the group in one run.
         let square = |of: &ParameterVector| {
             let sum: f64 = indices.iter().map(|&i| of[i].powi(2)).sum();
@@ -202,7 +210,7 @@ impl GroupAccuracy {
             let bound = |t: &Trial| t.bound_track.get(moment).map(square);
             (rms(&all(&filter)), rms(&all(&bound)))
         };
-        Self {
+        Some(Self {
             group,
             figures: Figures::new(trials.iter().map(|t| {
                 let filtered = t.filtered.as_ref();
@@ -227,7 +235,7 @@ impl GroupAccuracy {
                 .filter(|(_, squares)| !squares.is_empty())
                 .map(|(time, squares)| (time, rms(&squares)))
                 .collect(),
-        }
+        })
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
+use turncal::run::record::BodyFrame;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
@@ -30,7 +31,7 @@ pub struct Accuracy {
     /// Another path for it: a TOML file or an embedded name
     #[arg(long, value_name = "PATH")]
     path: Option<String>,
-    /// What the filter observes beside the standstill
+    /// What the filter observes
     #[arg(long, value_enum, default_value_t = Aiding::Table)]
     aiding: Aiding,
     /// Installation form of the filter
@@ -58,8 +59,11 @@ pub struct Accuracy {
 
 impl Accuracy {
     pub fn run(&self) -> anyhow::Result<()> {
-        let Aiding::Table = self.aiding;
         let mut scenario = Scenario::load(&self.scenario)?;
+        scenario.body_frame = match self.aiding {
+            Aiding::Table => BodyFrame::Table,
+            Aiding::Velocity => BodyFrame::Accelerometer,
+        };
         if let Some(path) = &self.path {
             scenario = scenario.with_path(path)?;
         }

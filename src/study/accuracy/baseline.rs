@@ -3,7 +3,7 @@
 
 use super::StudyError;
 use crate::calibration::states::ParameterVector;
-use crate::calibration::{in_general_form, outcome::to_vector, six_position_of};
+use crate::calibration::{in_body_frame, in_general_form, outcome::to_vector, six_position_of};
 use crate::imu::InstallationForm;
 use crate::models::{self, ModelError, Place};
 use crate::run::Dwell;
@@ -91,7 +91,8 @@ impl Baseline {
                 };
                 let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
                 let closed_form = six_position_of(&run, &dwells, form).ok()?;
-                Some(closed_form.estimate.in_general_form().vector() - truth)
+                let estimate = in_general_form(&closed_form.estimate.triads);
+                Some(to_vector(&in_body_frame(&estimate, self.scenario.body_frame)) - truth)
             })
             .collect())
     }

@@ -7,6 +7,7 @@ use crate::calibration::{
     Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
 };
 use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::run::record::BodyFrame;
 use crate::simulation::Simulated;
 
 /// One run. Errors are estimate less truth; everything is in the general form.
@@ -64,8 +65,13 @@ pub(super) fn moments(duration: f64) -> impl Iterator<Item = f64> {
 impl AccuracyStudy {
     pub(super) fn trial(&self, baseline: &Baseline, run: u64) -> Result<Trial, StudyError> {
         let Simulated {
-            run: record, truth, ..
+            run: mut record,
+            truth,
+            ..
         } = self.scenario.simulate(self.seed, run)?;
+        if self.scenario.body_frame == BodyFrame::Accelerometer {
+            record.table = None;
+        }
         let duration = record.imu.duration();
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));

@@ -1,0 +1,95 @@
+//! Weighted linear equations for the parameters.
+
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+use nalgebra::Vector3;
+
+use super::super::outcome::to_vector;
+use super::super::states::{ParameterVector, parameter};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
+use crate::navigation::Block;
+use crate::run::Run;
+
+/// An instrument without noise is still not better than this, rad or m/s: an equation needs a σ.
+const ROUNDING: f64 = 1e-9;
+
+/// Linear equations for the step δθ of the estimated parameters, each row divided by its σ.
+pub(super) struct Equations {
+    /// Indices of the parameters to be estimated.
+    unknown: Vec<usize>,
+    rows: Vec<(ParameterVector, f64)>,
+}
+
+impl Equations {
+    /// The prior's equations, for these triads.
+    pub(super) fn new(run: &Run, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
+        let form = at.gyro.form;
+        let prior = to_vector(&run.prior_mean(form));
+        let at = to_vector(at);
+        let sigmas = run.prior_sigma(form);
+        let mut equations = Self {
+            unknown: Vec::new(),
+            rows: Vec::new(),
+        };
+        for &sensor in sensors {
+            for (of_triad, &sigma) in sigmas.get(sensor).iter().enumerate() {
+                let index = parameter(sensor, of_triad);
+                if sigma > 0.0 {
+                    let mut row = ParameterVector::zeros();
+                    row[index] = 1.0 / sigma;
+                    equations.unknown.push(index);
+                    equations
+                        .rows
+                        .push((row, (prior[index] - at[index]) / sigma));
+                }
+            }
+        }
+        equations
+    }
+
+    /// An equation `error = row δθ` of one triad's parameters, its error of this variance.
+    pub(super) fn add(&mut self, sensor: Sensor, row: &TriadVector, error: f64, variance: f64) {
+        let mut whole = ParameterVector::zeros();
+        whole
+            .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
+            .copy_from(row);
+        self.add_row(whole, error, variance);
+    }
+
+    /// Three equations `error = Φ δθ` with rows of a block from `first` on.
+    pub(super) fn add_block(
+        &mut self,
+        block: &Block,
+        first: usize,
+        error: Vector3<f64>,
+        variance: f64,
+    ) {
+        for axis in 0..3 {
+            let mut row = ParameterVector::zeros();
+            for sensor in Sensor::ALL {
+                row.fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
+                    .copy_from(&block.parameters.get(sensor).row(first + axis).transpose());
+            }
+            self.add_row(row, error[axis], variance);
+        }
+    }
+
+    fn add_row(&mut self, row: ParameterVector, error: f64, variance: f64) {
+        let weight = 1.0 / (variance + ROUNDING.powi(2)).sqrt();
+        self.rows.push((row * weight, error * weight));
+    }
+
+    /// The step δθ of least squares.
+    pub(super) fn solve(&self) -> ParameterVector {
+        let a = Mat::from_fn(self.rows.len(), self.unknown.len(), |i, j| {
+            self.rows[i].0[self.unknown[j]]
+        });
+        let b = Mat::from_fn(self.rows.len(), 1, |i, _| self.rows[i].1);
+        let solution = a.qr().solve_lstsq(&b);
+        let mut step = ParameterVector::zeros();
+        for (j, &index) in self.unknown.iter().enumerate() {
+            step[index] = solution[(j, 0)];
+        }
+        step
+    }
+}

@@ -1,0 +1,70 @@
+//! The coarse start from dwells and turns with known attitude.
+
+use nalgebra::Vector3;
+
+use super::super::error::CalibrationError;
+use super::super::pass::singular;
+use super::equations::Equations;
+use super::gauss_newton;
+use crate::attitude::log;
+use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
+use crate::navigation::{Block, Navigator, State};
+use crate::run::{Dwell, Run, TableRecord};
+
+/// Both triads from the table's attitude alone: over each dwell the velocity must stay zero and the
+/// attitude must stay; over each turn between two dwells the gyros must turn by what the table says.
+/// The prior ties down what these do not see.
+pub(super) fn from_table(
+    run: &Run,
+    table: &TableRecord,
+    dwells: &[Dwell],
+    form: InstallationForm,
+) -> Result<PerSensor<Triad>, CalibrationError> {
+    gauss_newton(run.prior_mean(form), |triads| {
+        let mut equations = Equations::new(run, triads, &Sensor::ALL);
+        add_legs(&mut equations, run, table, dwells, triads)?;
+        Ok(equations)
+    })
+}
+
+fn add_legs(
+    equations: &mut Equations,
+    run: &Run,
+    table: &TableRecord,
+    dwells: &[Dwell],
+    triads: &PerSensor<Triad>,
+) -> Result<(), CalibrationError> {
+    let walk = PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
+    let attitude_variance = table.position_sigma.powi(2) + run.imu.pulse.gyro.powi(2) / 12.0;
+    let at_rest = |attitude| {
+        let state = State::at_rest(attitude);
+        Navigator::new(&run.imu, &run.site, walk, triads, state).ok_or_else(|| singular(triads))
+    };
+    let mut before = None;
+    for dwell in dwells {
+        let Some(attitude) = dwell.position.as_ref().map(|p| p.attitude) else {
+            continue;
+        };
+        // φ of a block's end against the dwell's attitude.
+        let error = |block: &Block| -> Vector3<f64> {
+            -log(&(block.state.attitude * attitude.transpose()))
+        };
+        if let Some((end, start)) = before {
+            let turn = at_rest(start)?.advance(end..dwell.samples.start);
+            let variance = 2.0 * attitude_variance + walk.gyro.powi(2) * turn.duration;
+            equations.add_block(&turn, 0, error(&turn), variance);
+        }
+        let stand = at_rest(attitude)?.advance_standing(dwell.samples.clone());
+        let duration = stand.duration;
+        let pulses = run.imu.pulse.gyro.powi(2) / 6.0;
+        let variance = pulses + walk.gyro.powi(2) * duration;
+        equations.add_block(&stand, 0, error(&stand), variance);
+        // A tilt of the table turns gravity into velocity.
+        let variance = (run.site.gravity * duration).powi(2) * attitude_variance
+            + walk.accel.powi(2) * duration
+            + run.imu.pulse.accel.powi(2) / 6.0;
+        equations.add_block(&stand, 3, stand.state.velocity, variance);
+        before = Some((dwell.samples.end, attitude));
+    }
+    Ok(())
+}

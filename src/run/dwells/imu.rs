@@ -1,0 +1,123 @@
+//! Standstills in what the instrument itself says.
+
+use nalgebra::Vector3;
+
+use super::{Dwell, STILL_RATE};
+use crate::earth::ROTATION_RATE;
+use crate::imu::Sensor;
+use crate::run::Run;
+
+/// Length of the windows whose means are compared, s.
+const WINDOW: f64 = 0.25;
+/// Windows in a row that make a standstill: after a hand has let go a sensor still swings.
+const FEWEST: usize = 4;
+/// Means of a window at rest differ by less than this many σ of their noise …
+const STILL_SIGMAS: f64 = 6.0;
+/// … and specific force by this much more, m/s²: a turn of 0.02°.
+const STILL_FORCE: f64 = 3e-3;
+/// A bias is within this many σ of its prior.
+const BIAS_SIGMAS: f64 = 6.0;
+/// σ of a normal distribution over the median of its absolute deviations.
+const SIGMA_OF_MEDIAN: f64 = 1.482_602;
+
+/// Mean output of a triad over each window.
+struct Windows {
+    means: Vec<Vector3<f64>>,
+    /// 1σ per axis of their noise.
+    sigma: f64,
+}
+
+impl Run {
+    /// Stretches during which the gyros say what they say at rest and the accelerometers do not change.
+    pub(super) fn standstills_of_imu(&self) -> Vec<Dwell> {
+        let length = ((WINDOW / self.imu.period).round() as usize).max(1);
+        let gyro = self.windows(Sensor::Gyro, length);
+        let accel = self.windows(Sensor::Accel, length);
+        let Some(rest) = self.output_at_rest(&gyro) else {
+            return Vec::new();
+        };
+        let rate = STILL_SIGMAS * gyro.sigma + STILL_RATE;
+        let force = STILL_SIGMAS * std::f64::consts::SQRT_2 * accel.sigma + STILL_FORCE;
+        let steady = |k: usize| (accel.means[k + 1] - accel.means[k]).norm() < force;
+        let count = gyro.means.len();
+        let is_still = |k: usize| {
+            (gyro.means[k] - rest).norm() < rate
+                && (k == 0 || steady(k - 1))
+                && (k + 1 == count || steady(k))
+        };
+        let mut dwells = Vec::new();
+        let mut first = 0;
+        for k in 0..=count {
+            if k < count && is_still(k) {
+                continue;
+            }
+            // A move begins and ends too gently for the windows at its ends to show it.
+            let begin = if first == 0 { 0 } else { first + 1 };
+            let end = if k == count { k } else { k.saturating_sub(1) };
+            if end >= begin + FEWEST {
+                let end = if k == count {
+                    self.imu.len()
+                } else {
+                    end * length
+                };
+                dwells.push(Dwell {
+                    samples: begin * length..end,
+                    position: None,
+                });
+            }
+            first = k + 1;
+        }
+        dwells
+    }
+
+    fn windows(&self, sensor: Sensor, length: usize) -> Windows {
+        let samples = match sensor {
+            Sensor::Gyro => &self.imu.gyro,
+            Sensor::Accel => &self.imu.accel,
+        };
+        let duration = length as f64 * self.imu.period;
+        let mean = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>() / duration;
+        let means: Vec<_> = samples.chunks_exact(length).map(mean).collect();
+        // Most windows are at rest or turn evenly, so the median sees noise alone; noise figures may
+        // know nothing of a laboratory's shaking.
+        let mut changes: Vec<f64> = means
+            .windows(2)
+            .flat_map(|pair| <[f64; 3]>::from((pair[1] - pair[0]).abs()))
+            .collect();
+        let found = median(&mut changes).unwrap_or(0.0);
+        let stated = self.noise.get(sensor).random_walk / duration.sqrt();
+        let pulse = self.imu.pulse.get(sensor) / duration;
+        Windows {
+            means,
+            sigma: (SIGMA_OF_MEDIAN * std::f64::consts::FRAC_1_SQRT_2 * found)
+                .max(stated)
+                .max(pulse),
+        }
+    }
+
+    /// What the gyros say at rest: what most of the windows say that a bias could make. None if no
+    /// window does.
+    fn output_at_rest(&self, gyro: &Windows) -> Option<Vector3<f64>> {
+        let prior = &self.prior.gyro;
+        let limit = (prior.bias_sigma * BIAS_SIGMAS)
+            .add_scalar(ROTATION_RATE + STILL_RATE + STILL_SIGMAS * gyro.sigma);
+        let could_rest = |mean: &&Vector3<f64>| {
+            let off = (*mean - prior.bias).abs();
+            off.iter().zip(&limit).all(|(off, limit)| off <= limit)
+        };
+        let resting: Vec<_> = gyro.means.iter().filter(could_rest).collect();
+        let axis = |axis: usize| {
+            let mut values: Vec<f64> = resting.iter().map(|mean| mean[axis]).collect();
+            median(&mut values)
+        };
+        Some(Vector3::new(axis(0)?, axis(1)?, axis(2)?))
+    }
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
