@@ -5,10 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use rayon::prelude::*;
+use turncal::calibration::outcome::Estimate;
 use turncal::calibration::{self, CalibrationError, ClosedForm, Outcome, in_body_frame, triads_of};
 use turncal::imu::{InstallationForm, PerSensor, Triad};
-use turncal::report::{self, Report};
+use turncal::report::{self, Navigated, Report};
 use turncal::run::{CalibrationRecord, Run};
+use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
 use super::output::{Overwrite, print};
 use super::progress::Activity;
@@ -107,8 +110,11 @@ impl Calibrate {
         let truth = self
             .truth
             .as_deref()
-            .map(|path| read_truth(path, &run, form))
+            .map(|path| read_truth(path, &run))
             .transpose()?;
+        let truth_in_form = truth
+            .as_ref()
+            .map(|truth| PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form)));
         let target = match (&self.output, self.json) {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
@@ -143,6 +149,11 @@ impl Calibrate {
             Result::ClosedForm(closed_form) => note(closed_form),
         };
         let dwells = dwell_times(&run);
+        let method = match &result {
+            Result::Filter(outcome) => ("EKF", &outcome.estimate),
+            Result::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
+        };
+        let navigation = navigate(&run, &[method], truth.as_ref());
         let report = Report {
             title: &run.name,
             run: &run,
@@ -157,8 +168,9 @@ impl Calibrate {
                     note: &note,
                 }),
             },
-            truth: truth.as_ref(),
+            truth: truth_in_form.as_ref(),
             dwells: &dwells,
+            navigation: navigation.as_deref(),
         };
         activity.next("writing");
         if let Some(directory) = directory {
@@ -200,6 +212,20 @@ pub fn note(closed_form: &ClosedForm) -> String {
     )
 }
 
+/// Navigates 40 h standing level at the run's site by the calibration of each method.
+pub fn navigate(
+    run: &Run,
+    methods: &[(&'static str, &Estimate)],
+    truth: Option<&PerSensor<Triad>>,
+) -> std::result::Result<Vec<Navigated>, NavigationStudyError> {
+    let mission = Mission::standing_level(&run.site, FORTY_HOURS);
+    let all = methods.par_iter().map(|&(method, estimate)| {
+        let outlook = mission.outlook(estimate, truth)?;
+        Ok(Navigated { method, outlook })
+    });
+    all.collect()
+}
+
 /// Begin and end of each dwell, s.
 pub fn dwell_times(run: &Run) -> Vec<Range<f64>> {
     run.dwells()
@@ -215,7 +241,8 @@ pub fn write_report(report: &Report, directory: &Path) -> anyhow::Result<()> {
     Ok(report.write(directory)?)
 }
 
-fn read_truth(path: &Path, run: &Run, form: InstallationForm) -> anyhow::Result<PerSensor<Triad>> {
+/// In the general form, which can hold any truth.
+fn read_truth(path: &Path, run: &Run) -> anyhow::Result<PerSensor<Triad>> {
     let record = CalibrationRecord::read(path)?;
     if let Some(unit) = &record.unit
         && *unit != run.unit
@@ -229,6 +256,6 @@ fn read_truth(path: &Path, run: &Run, form: InstallationForm) -> anyhow::Result<
             run.unit.accel
         );
     }
-    let triads = triads_of(&record, &run.nominal, form);
+    let triads = triads_of(&record, &run.nominal, InstallationForm::General);
     Ok(in_body_frame(&triads, run.body_frame()))
 }

@@ -8,7 +8,7 @@ use turncal::imu::InstallationForm;
 use turncal::report::{self, Report};
 use turncal::simulation::{Scenario, Simulated};
 
-use super::calibrate::{dwell_times, filter, note, write_report};
+use super::calibrate::{dwell_times, filter, navigate, note, write_report};
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
@@ -17,8 +17,9 @@ use super::simulate::{simulated, write};
 ///
 /// Simulates an instrument with the paper's errors on a three-axis table, ten minutes with turns for
 /// the filter and an hour of static positions for the paper's closed form, calibrates it both ways,
-/// compares both with the truth and writes a report. DIR is the filter's run directory and holds ekf/
-/// with its calibration, six-position/ with the static run and its calibration, and report/.
+/// compares both with the truth, navigates 40 h with each and writes a report. DIR is the filter's run
+/// directory and holds ekf/ with its calibration, six-position/ with the static run and its
+/// calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {
@@ -50,6 +51,12 @@ impl Demo {
 
         let note = note(&closed_form);
         let dwells = dwell_times(run);
+        activity.next("navigating");
+        let methods = [
+            ("closed form", &closed_form.estimate),
+            ("EKF", &outcome.estimate),
+        ];
+        let navigation = navigate(run, &methods, Some(&turning.truth));
         let report = Report {
             title: "turncal demo",
             run,
@@ -60,6 +67,7 @@ impl Demo {
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
+            navigation: navigation.as_deref(),
         };
         activity.next("writing");
         let root = directory.path();

@@ -28,5 +28,6 @@ pub use increments::{Increments, Motion};
 pub use navigation_error::NavigationError;
 pub use site_fixed::Navigator;
 pub use state::State;
+pub(crate) use strapdown::within_reach;
 pub use strapdown::{Height, LARGEST_LATITUDE, NearPole, Solution, Strapdown};
 pub use trajectory::{Change, Segment, Start, Trajectory, TrajectoryError, Travel};

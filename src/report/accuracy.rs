@@ -2,9 +2,11 @@
 //! and one JSON document.
 
 mod bars;
+mod containment;
 mod document;
 mod facts;
 mod histogram;
+mod merit;
 mod nees;
 mod tables;
 #[cfg(test)]
@@ -57,13 +59,15 @@ pub fn write(accuracy: &Accuracy, directory: &Path) -> Result<(), ReportError> {
 }
 
 fn figures(accuracy: &Accuracy) -> Result<Vec<Figure>, ReportError> {
-    Ok(vec![
+    let mut figures = vec![
         histogram::figure(accuracy)?,
         bars::ratio(accuracy)?,
         nees::figure(accuracy)?,
         bars::gain(accuracy)?,
         time::figure(accuracy)?,
-    ])
+    ];
+    figures.extend(containment::figure(accuracy)?);
+    Ok(figures)
 }
 
 fn page(accuracy: &Accuracy, figures: &[Figure]) -> String {

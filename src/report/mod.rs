@@ -36,6 +36,7 @@ use crate::calibration::outcome::{Estimate, Outcome, to_vector};
 use crate::calibration::states::ParameterVector;
 use crate::imu::{PerSensor, Triad};
 use crate::run::Run;
+use crate::study::navigation::{NavigationStudyError, Outlook};
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the
 /// same body frame.
@@ -53,6 +54,18 @@ pub struct Report<'a> {
     pub truth: Option<&'a PerSensor<Triad>>,
     /// Intervals during which the table stands, s.
     pub dwells: &'a [Range<f64>],
+    /// What the calibrations are worth in navigation, the closed form first; or why that cannot be
+    /// said of the run's site.
+    pub navigation: Result<&'a [Navigated], &'a NavigationStudyError>,
+}
+
+/// The navigation errors that one method's calibration leads to, standing level at the run's site.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Navigated {
+    /// `EKF` or `closed form`.
+    pub method: &'static str,
+    /// The errors, as far as they are known.
+    pub outlook: Vec<Outlook>,
 }
 
 /// The closed form's result, the baseline of the comparison.
@@ -107,6 +120,9 @@ impl Report<'_> {
 
     fn figures(&self) -> Result<Vec<Figure>, ReportError> {
         let mut figures = Vec::new();
+        figures.extend(navigation::outlook::figure(
+            self.navigation.unwrap_or_default(),
+        )?);
         figures.extend(comparison::figure(self)?);
         if let Some(outcome) = self.outcome {
             figures.extend(sigma::figure(self, outcome)?);

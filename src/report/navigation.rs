@@ -3,6 +3,7 @@
 
 mod document;
 mod figures;
+pub(super) mod outlook;
 mod quantity;
 #[cfg(test)]
 mod tests;

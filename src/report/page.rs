@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::{Figure, Report, facts, number, tables};
+use super::{Figure, Report, facts, navigation, number, tables};
 
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
@@ -33,6 +33,7 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
             }
             section { h2 { "Passes" } (tables::passes(outcome)) }
         }
+        (navigation::outlook::section(report.navigation))
         @for figure in figures { (drawn(figure)) }
         @if let Some(outcome) = report.outcome {
             section { h2 { "What the path saw least" } (tables::weakest(outcome))

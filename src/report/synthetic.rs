@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{ClosedForm, Report};
+use super::{ClosedForm, Navigated, Report};
 use crate::attitude;
 use crate::calibration::outcome::*;
 use crate::calibration::states::{
@@ -18,6 +18,7 @@ use crate::calibration::{Direction, Linearisation, Observability, Part};
 use crate::earth::Site;
 use crate::imu::*;
 use crate::run::{ImuRecord, Run, Standstill, TableRecord};
+use crate::study::navigation::Mission;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G};
 
 const PERIOD: f64 = 0.05;
@@ -36,6 +37,7 @@ pub(super) struct Synthetic {
     pub(super) closed: Estimate,
     pub(super) truth: PerSensor<Triad>,
     pub(super) dwells: Vec<Range<f64>>,
+    pub(super) navigation: Vec<Navigated>,
 }
 
 impl Synthetic {
@@ -50,6 +52,7 @@ impl Synthetic {
             }),
             truth: Some(&self.truth),
             dwells: &self.dwells,
+            navigation: Ok(&self.navigation),
         }
     }
 }
@@ -306,12 +309,20 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         ],
     };
     let truth = from_vector(form, &truth);
+    let mission = Mission::standing_level(&run.site, 600);
+    let navigation = [("closed form", &closed), ("EKF", &outcome.estimate)]
+        .map(|(method, estimate)| Navigated {
+            method,
+            outlook: mission.outlook(estimate, Some(&truth)).unwrap(),
+        })
+        .to_vec();
     Synthetic {
         run,
         outcome,
         closed,
         truth,
         dwells,
+        navigation,
     }
 }
 

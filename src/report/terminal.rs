@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
-use super::{Report, side_by_side};
+use super::{Report, navigation, side_by_side};
 use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
@@ -18,6 +18,9 @@ impl Report<'_> {
         }
         if self.truth.is_some() {
             let _ = writeln!(text, "\n{}", self.group_errors());
+        }
+        if let Some(line) = navigation::outlook::line(self.navigation.unwrap_or_default()) {
+            let _ = writeln!(text, "\n{line}");
         }
         for warning in self.outcome.map_or(&[][..], |outcome| &outcome.warnings) {
             let _ = writeln!(text, "\nWarning: {warning}");

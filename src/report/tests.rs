@@ -5,6 +5,7 @@ use super::*;
 use crate::calibration::outcome::{Nis, parameter_name};
 use crate::calibration::states::{PARAMETERS, ParameterMatrix};
 use crate::imu::InstallationForm;
+use crate::navigation::NearPole;
 
 /// Every file of a report, by name.
 fn written(report: &Report) -> Vec<(String, String)> {
@@ -62,6 +63,7 @@ fn a_report_has_every_figure_and_names_every_parameter_in_every_form() {
                 "estimates.svg",
                 "index.html",
                 "innovations.svg",
+                "navigation.svg",
                 "path.svg",
                 "sigma.svg"
             ]
@@ -104,13 +106,22 @@ fn a_parameter_that_keeps_its_prior_sigma_is_marked() {
 #[test]
 fn without_truth_or_baseline_no_error_is_claimed() {
     let made_up = synthetic(InstallationForm::General);
+    let mut navigation = made_up.navigation.clone();
+    for moment in navigation.iter_mut().flat_map(|of| &mut of.outlook) {
+        moment.error = None;
+    }
     let mut report = made_up.report();
+    assert!(page::page(&report, &[]).contains("EKF: error"));
     report.truth = None;
+    report.navigation = Ok(&navigation);
     let files = written(&report);
     assert_sound(&files);
     assert!(names(&files).contains(&"comparison.svg"));
-    assert!(!page::page(&report, &[]).contains("error / σ"));
+    let page = page::page(&report, &[]);
+    assert!(!page.contains("error / σ") && !page.contains("EKF: error"));
+    assert!(page.contains("The truth is not known"));
     report.closed_form = None;
+    report.navigation = Ok(&navigation[1..]);
     let files = written(&report);
     assert_sound(&files);
     assert!(!names(&files).contains(&"comparison.svg"));
@@ -121,6 +132,7 @@ fn a_closed_form_alone_is_reported() {
     let made_up = synthetic(InstallationForm::SixAngle);
     let mut report = made_up.report();
     report.outcome = None;
+    report.navigation = Ok(&made_up.navigation[..1]);
     let files = written(&report);
     assert_sound(&files);
     assert_eq!(
@@ -129,6 +141,7 @@ fn a_closed_form_alone_is_reported() {
             "comparison.svg",
             "correlation.svg",
             "index.html",
+            "navigation.svg",
             "path.svg"
         ]
     );
@@ -197,4 +210,27 @@ fn a_missing_directory_is_named() {
         .write(Path::new("no/such/place"))
         .unwrap_err();
     assert!(error.to_string().contains("no/such/place"), "{error}");
+}
+
+#[test]
+fn a_site_that_cannot_be_navigated_from_is_said_to_be_one() {
+    let made_up = synthetic(InstallationForm::General);
+    let mut report = made_up.report();
+    let pole = NavigationStudyError::from(NearPole { latitude: 1.57 });
+    report.navigation = Err(&pole);
+    let files = written(&report);
+    assert_sound(&files);
+    assert!(!names(&files).contains(&"navigation.svg"));
+    assert!(page::page(&report, &[]).contains("Not navigated"));
+    assert!(!report.summary().contains("nmile"));
+}
+
+#[test]
+fn the_position_error_at_the_end_stands_in_the_summary() {
+    let mut made_up = synthetic(InstallationForm::General);
+    let end = made_up.navigation[1].outlook.last_mut().unwrap();
+    end.error.as_mut().unwrap().position = nalgebra::Vector3::new(3.0, -4.0, 0.0) * 1852.0;
+    end.sigma.fixed_rows_mut::<3>(6).fill(1852.0);
+    let summary = made_up.report().summary();
+    assert!(summary.contains("EKF 5.00 nmile (σ 1.41)"), "{summary}");
 }

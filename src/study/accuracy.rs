@@ -4,20 +4,27 @@
 //! Everything is compared in the general form and in the body frame of the table.
 
 mod baseline;
+mod figures;
+mod navigation;
 mod trial;
 
 use rayon::prelude::*;
 
-use super::Ratio;
+use super::navigation::NavigationStudyError;
 use crate::calibration::outcome::Nis;
-use crate::calibration::states::PARAMETERS;
+use crate::calibration::states::{PARAMETERS, ParameterVector};
 use crate::calibration::{CalibrationError, Group, mean_square_interval};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
+use figures::{Squares, rms};
+use navigation::Way;
+
 pub use baseline::Baseline;
+pub use figures::Figures;
+pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
 /// What is studied.
@@ -36,7 +43,7 @@ pub struct AccuracyStudy {
 /// A study that cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The closed form's static positions cannot be had.
+    /// The closed form's static positions or the trajectory of navigation cannot be had.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The path is beyond the table.
@@ -65,6 +72,10 @@ pub struct Accuracy {
     pub trials: Vec<Trial>,
     /// Figures of each group.
     pub groups: Vec<GroupAccuracy>,
+    /// What the calibrations are worth in each mission.
+    pub navigation: Vec<NavigationAccuracy>,
+    /// Missions that cannot be navigated from the scenario's site.
+    pub not_navigated: Vec<(Journey, NavigationStudyError)>,
     /// NEES/n over all runs; `None` if no run gave an estimate.
     pub anees: Option<Anees>,
     /// NIS of zero velocity over all runs.
@@ -94,22 +105,8 @@ pub struct Anees {
 pub struct GroupAccuracy {
     /// The group.
     pub group: Group,
-    /// RMS error of the filter.
-    pub filter: f64,
-    /// RMS of the σ that the filter claims.
-    pub claimed: f64,
-    /// RMS of the Bayesian Cramér–Rao bound.
-    pub bound: f64,
-    /// Filter over bound.
-    pub ratio: Option<Ratio>,
-    /// RMS error of the closed form in its own time.
-    pub closed_form: Option<f64>,
-    /// Closed form in its own time over filter.
-    pub gain: Option<Ratio>,
-    /// RMS error of the closed form in the filter's time; none if that is too short for it.
-    pub closed_form_in_equal_time: Option<f64>,
-    /// Closed form in the filter's time over filter.
-    pub gain_in_equal_time: Option<Ratio>,
+    /// The figures.
+    pub figures: Figures,
     /// Table time in s against RMS error and RMS bound of the filter.
     pub filter_against_time: Vec<(f64, f64, f64)>,
     /// Table time in s against RMS error of the closed form.
@@ -126,18 +123,36 @@ impl AccuracyStudy {
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
         let table_time = self.scenario.duration()?;
-        let trials: Vec<Trial> = (0..self.runs)
-            .into_par_iter()
-            .map(|run| {
-                let trial = self.trial(&baseline, run);
-                done();
-                trial
-            })
-            .collect::<Result<_, _>>()?;
+        let (ways, trials) = rayon::join(
+            || {
+                let all = Journey::ALL.into_par_iter();
+                let ways = all.map(|journey| Ok((journey, Way::of(journey, &self.scenario)?)));
+                ways.collect::<Result<Vec<_>, StudyError>>()
+            },
+            || {
+                let all = (0..self.runs).into_par_iter();
+                let trials = all.map(|run| {
+                    let trial = self.trial(&baseline, run);
+                    done();
+                    trial
+                });
+                trials.collect::<Result<Vec<_>, StudyError>>()
+            },
+        );
+        let trials = trials?;
+        let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());
+        for (journey, way) in ways? {
+            match way {
+                Ok(way) => navigation.push(way.worth(&trials)),
+                Err(error) => not_navigated.push((journey, error)),
+            }
+        }
         Ok(Accuracy {
             groups: Group::all()
                 .filter_map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
                 .collect(),
+            navigation,
+            not_navigated,
             anees: anees(&trials),
             velocity: pooled(&trials, |filtered| &filtered.velocity),
             table: pooled(&trials, |filtered| &filtered.table),
@@ -181,62 +196,44 @@ impl GroupAccuracy {
         if indices.is_empty() {
             return None;
         }
-        let count = indices.len() as f64;
-        // For each run that has what is asked for, the sum of squares of the group.
-        let squares = |of: &dyn Fn(&Trial, usize) -> Option<f64>| -> Vec<f64> {
-            let sum = |trial| indices.iter().map(|&i| of(trial, i)).sum::<Option<f64>>();
-            trials.iter().filter_map(sum).collect()
+        // The mean square of the group in one run.
+        let square = |of: &ParameterVector| {
+            let sum: f64 = indices.iter().map(|&i| of[i].powi(2)).sum();
+            sum / indices.len() as f64
         };
-        let rms = |squares: &[f64]| {
-            let runs = squares.len() as f64;
-            (squares.iter().sum::<f64>() / (runs * count)).sqrt()
+        let closed = |t: &Trial, part: usize| Some(square(t.closed_form.get(part)?.as_ref()?));
+        let all = |of: &dyn Fn(&Trial) -> Option<f64>| -> Vec<f64> {
+            trials.iter().filter_map(of).collect()
         };
-        let some_rms = |squares: &[f64]| (!squares.is_empty()).then(|| rms(squares));
-        // A ratio takes only runs that have both.
-        let ratio = |over: &dyn Fn(&Trial, usize) -> Option<f64>,
-                     under: &dyn Fn(&Trial, usize) -> Option<f64>| {
-            let both = |t: &Trial, i: usize| over(t, i).zip(under(t, i));
-            Ratio::of(
-                &squares(&|t, i| both(t, i).map(|pair| pair.0)),
-                &squares(&|t, i| both(t, i).map(|pair| pair.1)),
-            )
+        let at = |moment: usize| {
+            let filter = |t: &Trial| Some(square(t.filtered.as_ref()?.track.get(moment)?));
+            let bound = |t: &Trial| t.bound_track.get(moment).map(square);
+            (rms(&all(&filter)), rms(&all(&bound)))
         };
-        let filter = |t: &Trial, i: usize| Some(t.filtered.as_ref()?.error[i].powi(2));
-        let claimed = |t: &Trial, i: usize| Some(t.filtered.as_ref()?.sigma[i].powi(2));
-        let bound = |t: &Trial, i: usize| Some(t.bound[i].powi(2));
-        let closed = |part: usize| {
-            move |t: &Trial, i: usize| Some(t.closed_form.get(part)?.as_ref()?[i].powi(2))
-        };
-        let (own, equal) = (closed(Baseline::OWN_TIME), closed(Baseline::EQUAL_TIME));
-        let moments = trial::moments(table_time);
-        let track = |m: usize| {
-            move |t: &Trial, i: usize| Some(t.filtered.as_ref()?.track.get(m)?[i].powi(2))
-        };
-        let bound_track =
-            |m: usize| move |t: &Trial, i: usize| Some(t.bound_track.get(m)?[i].powi(2));
         Some(Self {
             group,
-            filter: rms(&squares(&filter)),
-            claimed: rms(&squares(&claimed)),
-            bound: rms(&squares(&bound)),
-            ratio: ratio(&filter, &bound),
-            closed_form: some_rms(&squares(&own)),
-            gain: ratio(&own, &filter),
-            closed_form_in_equal_time: some_rms(&squares(&equal)),
-            gain_in_equal_time: ratio(&equal, &filter),
-            filter_against_time: moments
+            figures: Figures::new(trials.iter().map(|t| {
+                let filtered = t.filtered.as_ref();
+                Squares {
+                    filter: filtered.map(|f| square(&f.error)),
+                    claimed: filtered.map(|f| square(&f.sigma)),
+                    bound: square(&t.bound),
+                    closed_form: closed(t, Baseline::OWN_TIME),
+                    closed_form_in_equal_time: closed(t, Baseline::EQUAL_TIME),
+                }
+            })),
+            filter_against_time: trial::moments(table_time)
                 .enumerate()
-                .map(|(m, time)| {
-                    (
-                        time,
-                        rms(&squares(&track(m))),
-                        rms(&squares(&bound_track(m))),
-                    )
+                .map(|(moment, time)| {
+                    let (filter, bound) = at(moment);
+                    (time, filter, bound)
                 })
                 .collect(),
             closed_form_against_time: baseline
                 .parts()
-                .filter_map(|(part, time)| Some((time, some_rms(&squares(&closed(part)))?)))
+                .map(|(part, time)| (time, all(&|t| closed(t, part))))
+                .filter(|(_, squares)| !squares.is_empty())
+                .map(|(time, squares)| (time, rms(&squares)))
                 .collect(),
         })
     }

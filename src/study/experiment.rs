@@ -12,17 +12,16 @@ mod noise;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::SMatrix;
 use rayon::prelude::*;
 
 use super::Ratio;
 use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
 use super::ratio::{bootstrap, median, quantile};
-use crate::attitude::from_pitch_roll_heading;
 use crate::calibration::states::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::ModelError;
-use crate::navigation::{Sensitivity, Solution, Trajectory, sensed_errors};
+use crate::navigation::{Sensitivity, Trajectory, sensed_errors};
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
@@ -207,19 +206,14 @@ impl ExperimentStudy {
 
     /// The mission of a situation.
     fn mission(&self, situation: Situation) -> Mission {
-        let site = &self.scenario.site;
-        Mission {
-            motion: match situation {
-                Situation::SelfAligned | Situation::Aligned => Motion::Standing(Solution {
-                    attitude: from_pitch_roll_heading(0.0, 0.0, 0.0),
-                    velocity: Vector3::zeros(),
-                    latitude: site.latitude,
-                    longitude: site.longitude,
-                    height: site.height,
-                }),
-                Situation::Moving => Motion::Moving(self.trajectory.clone()),
+        match situation {
+            Situation::SelfAligned | Situation::Aligned => {
+                Mission::standing_level(&self.scenario.site, self.intervals)
+            }
+            Situation::Moving => Mission {
+                motion: Motion::Moving(self.trajectory.clone()),
+                intervals: self.intervals,
             },
-            intervals: self.intervals,
         }
     }
 
@@ -268,7 +262,7 @@ impl Minute {
     fn of(exposure: &Exposure) -> Self {
         Self {
             time: exposure.time,
-            position: exposure.by_parameter.fixed_rows::<2>(6).into_owned(),
+            position: exposure.position(),
         }
     }
 }

@@ -6,7 +6,7 @@ pub mod navigation;
 mod ratio;
 pub mod table1;
 
-pub use accuracy::{Accuracy, AccuracyStudy, GroupAccuracy};
+pub use accuracy::{Accuracy, AccuracyStudy, Figures, GroupAccuracy, NavigationAccuracy};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use table1::{Table1, Table1Study};

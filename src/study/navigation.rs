@@ -2,23 +2,30 @@
 //! nonlinear navigation, and the σ of that error that its covariance predicts, by the linear model.
 
 mod course;
+mod outlook;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
+use crate::attitude::from_pitch_roll_heading;
 use crate::calibration::states::{PARAMETERS, ParameterMatrix, parameter};
 use crate::calibration::{Comparison, ComparisonError, Named, compare};
+use crate::earth::Site;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{INPUTS, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorModel, ErrorVector, Height, Increments, NavigationError, NearPole,
-    Sensitivity, Solution, Strapdown, Trajectory, Transition, sensed_errors,
+    Sensitivity, Solution, Strapdown, Trajectory, Transition, sensed_errors, within_reach,
 };
 use crate::run::record::BodyFrame;
 use course::Course;
 
+pub use outlook::Outlook;
+
 /// Time in s between two moments of a result.
 pub const INTERVAL: f64 = 60.0;
+/// Intervals in the 40 h of the paper's study.
+pub const FORTY_HOURS: u32 = 40 * 60;
 /// Steps between two moments for a body that stands: 10 s. Against steps of a tenth 40 h differ by
 /// 1e-8°.
 const STANDING_STEPS: u32 = 6;
@@ -182,6 +189,20 @@ impl Sensed {
 }
 
 impl Mission {
+    /// Standing level at a site, heading North.
+    pub fn standing_level(site: &Site, intervals: u32) -> Self {
+        Self {
+            motion: Motion::Standing(Solution {
+                attitude: from_pitch_roll_heading(0.0, 0.0, 0.0),
+                velocity: Vector3::zeros(),
+                latitude: site.latitude,
+                longitude: site.longitude,
+                height: site.height,
+            }),
+            intervals,
+        }
+    }
+
     /// Navigates: errors and their predicted covariance at the start and after each interval.
     ///
     /// # Errors
@@ -296,6 +317,11 @@ impl Mission {
 }
 
 impl Exposure {
+    /// Horizontal position error, east and north in m, by parameter errors, true − estimated.
+    pub fn position(&self) -> SMatrix<f64, 2, PARAMETERS> {
+        self.by_parameter.fixed_rows::<2>(6).into_owned()
+    }
+
     /// Covariance of the errors from that of the parameters, in the order of
     /// [`NavigationError::to_vector`].
     pub fn covariance(&self, parameters: &ParameterMatrix) -> ErrorMatrix {
@@ -316,6 +342,7 @@ fn exposure(
     sensitivity: &Sensitivity<PARAMETERS>,
     truth: &Solution,
 ) -> Result<Exposure, NavigationStudyError> {
+    within_reach(truth.latitude)?;
     let by_state = NavigationError::by_state(truth).ok_or(NavigationStudyError::Upright)?;
     Ok(Exposure {
         time,

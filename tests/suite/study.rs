@@ -39,4 +39,19 @@ fn a_study_does_not_depend_on_the_number_of_threads() {
         let gain = of("six_position_rms") / of("ekf_rms");
         assert!((of("gain") / gain - 1.0).abs() < 1e-9, "{group}");
     }
+    for (place, name) in ["standing", "flight"].into_iter().enumerate() {
+        let mission = &document["navigation"][place];
+        assert_eq!(mission["mission"], name);
+        let of = |key: &str| mission["position_nmile"][key].as_f64().unwrap();
+        let quotient = of("ekf_rms") / of("bound_rms");
+        assert!((of("ratio") / quotient - 1.0).abs() < 1e-9, "{name}");
+        // The filter's σ are those of the bound but for where they are linearised.
+        assert!(
+            (of("claimed_rms") / of("bound_rms") - 1.0).abs() < 0.05,
+            "{name}"
+        );
+        for held in mission["containment"].as_array().unwrap() {
+            assert_eq!(held["runs"], 5);
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Ratios of each group with their intervals: error over bound, and the gain over the closed form.
+//! Ratios of each group and of navigation with their intervals: error over bound, and the gain over the closed form.
 
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -7,9 +7,9 @@ use super::super::canvas::{Area, DrawError, INK, Pen};
 use super::super::panel::{Margins, Mark, Panel};
 use super::super::{Figure, ReportError};
 use super::facts::minutes;
+use super::merit::merits;
 use super::tables;
-use crate::calibration::Group;
-use crate::study::{Accuracy, GroupAccuracy, Ratio};
+use crate::study::{Accuracy, Figures, Ratio};
 
 const MARGINS: Margins = Margins {
     left: 56.0,
@@ -24,7 +24,7 @@ const HALF: f64 = 0.13;
 
 /// RMS error over bound.
 pub(super) fn ratio(accuracy: &Accuracy) -> Result<Figure, ReportError> {
-    let ratios = of(accuracy, |g| g.ratio);
+    let ratios = of(accuracy, |f| f.ratio);
     let ends = || {
         ratios
             .iter()
@@ -37,13 +37,13 @@ pub(super) fn ratio(accuracy: &Accuracy) -> Result<Figure, ReportError> {
         let half = ends().map(|end| (end - 1.0).abs()).fold(NEAR, f64::max);
         (Axis::linear(1.0 - 1.25 * half, 1.0 + 1.25 * half), "")
     };
-    let caption = "RMS error of the EKF over the Cramér–Rao bound in each group, bars its 99 % interval. \
-                   A bar that crosses the line at 1 says that nothing shows the filter to be worse than \
+    let caption = "RMS error of the EKF over the Cramér–Rao bound, of each group of parameters and of the \
+                   position after 40 h; bars: its 99 % interval. A bar that crosses the line at 1 says that nothing shows the filter to be worse than \
                    the best there can be."
         .to_owned();
     let title = "Error over bound";
     Figure::draw("ratio.svg", title, caption, (1200, 400), |area| {
-        let mut panel = by_group(area, &format!("RMS error / RMS bound{kind}"), y)?;
+        let mut panel = by_merit(area, accuracy, &format!("RMS error / RMS bound{kind}"), y)?;
         for (place, ratio) in &ratios {
             whisker(&mut panel, *place, ratio)?;
             panel.marks(&[(*place, ratio.value)], Mark::Dot, Pen::nth(0, 3.0))?;
@@ -56,8 +56,8 @@ pub(super) fn ratio(accuracy: &Accuracy) -> Result<Figure, ReportError> {
 /// Error of the closed form over that of the filter.
 pub(super) fn gain(accuracy: &Accuracy) -> Result<Figure, ReportError> {
     let (own, equal) = (
-        of(accuracy, |g| g.gain),
-        of(accuracy, |g| g.gain_in_equal_time),
+        of(accuracy, |f| f.gain),
+        of(accuracy, |f| f.gain_in_equal_time),
     );
     let ends = own.iter().chain(&equal).map(|(_, ratio)| ratio);
     let y = log_axis(ends.flat_map(|r| [r.interval.0, r.interval.1]));
@@ -74,7 +74,12 @@ pub(super) fn gain(accuracy: &Accuracy) -> Result<Figure, ReportError> {
     });
     let title = "Gain over the closed form";
     Figure::draw("gain.svg", title, caption, (1200, 460), |area| {
-        let mut panel = by_group(area, "RMS error of closed form / RMS error of EKF", y)?;
+        let mut panel = by_merit(
+            area,
+            accuracy,
+            "RMS error of closed form / RMS error of EKF",
+            y,
+        )?;
         for (ratios, offset, shaded) in [(&own, -0.17, true), (&equal, 0.17, false)] {
             for (place, ratio) in ratios {
                 bar(&mut panel, *place + offset, ratio, shaded)?;
@@ -84,11 +89,12 @@ pub(super) fn gain(accuracy: &Accuracy) -> Result<Figure, ReportError> {
     })
 }
 
-/// Ratios with the place of their group on the axis.
-fn of(accuracy: &Accuracy, ratio: impl Fn(&GroupAccuracy) -> Option<Ratio>) -> Vec<(f64, Ratio)> {
-    let groups = accuracy.groups.iter().enumerate();
-    groups
-        .filter_map(|(place, g)| Some((place as f64, ratio(g)?)))
+/// Ratios with their place on the axis.
+fn of(accuracy: &Accuracy, ratio: impl Fn(&Figures) -> Option<Ratio>) -> Vec<(f64, Ratio)> {
+    merits(accuracy)
+        .iter()
+        .enumerate()
+        .filter_map(|(place, merit)| Some((place as f64, ratio(merit.figures)?)))
         .filter(|(_, ratio)| ratio.value.is_finite())
         .collect()
 }
@@ -98,9 +104,14 @@ fn log_axis(ends: impl Iterator<Item = f64>) -> Axis {
     Axis::log(ends.flat_map(|end| [0.6 * end, 1.8 * end]).chain([1.0]))
 }
 
-/// A panel with a place for each group and a line at 1.
-fn by_group<'a, 'b>(area: &'a Area<'b>, title: &str, y: Axis) -> Result<Panel<'a, 'b>, DrawError> {
-    let places: Vec<String> = Group::all().map(Group::title).collect();
+/// A panel with a place for each merit and a line at 1.
+fn by_merit<'a, 'b>(
+    area: &'a Area<'b>,
+    accuracy: &Accuracy,
+    title: &str,
+    y: Axis,
+) -> Result<Panel<'a, 'b>, DrawError> {
+    let places: Vec<String> = merits(accuracy).into_iter().map(|m| m.title).collect();
     let last = places.len() as f64 - 0.5;
     let x = Axis::places(places);
     let mut panel = Panel::new(area, title, MARGINS, (x, y), "", &[])?;

@@ -5,10 +5,14 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::facts::{passes, rejected};
+use super::merit::journey_name;
 use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
 use crate::imu::InstallationForm;
-use crate::study::{Accuracy, GroupAccuracy, Ratio};
+use crate::study::accuracy::{self, Region};
+use crate::study::navigation::{FORTY_HOURS, INTERVAL};
+use crate::study::{Accuracy, Figures, Ratio};
+use crate::units::{DEGREE, NAUTICAL_MILE};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -32,7 +36,34 @@ struct Document<'a> {
     rejected_observations: usize,
     form_rejections: Option<FormRejections>,
     #[serde(flatten)]
-    groups: BTreeMap<String, Group>,
+    groups: BTreeMap<String, Merit>,
+    /// One for each mission.
+    navigation: Vec<Navigation>,
+}
+
+#[derive(Serialize)]
+struct Navigation {
+    mission: &'static str,
+    hours: f64,
+    latitude_deg: f64,
+    /// Why it cannot be navigated from the scenario's site; then there are no figures.
+    not_navigated: Option<String>,
+    position_nmile: Option<Merit>,
+    containment: Vec<Containment>,
+}
+
+/// How many runs have their position error within a region that their predicted covariance marks out.
+#[derive(Serialize)]
+struct Containment {
+    region: &'static str,
+    /// Semi-axes of the region in σ.
+    sigmas: f64,
+    probability: f64,
+    runs: usize,
+    within: usize,
+    /// 99 % if the covariance is true.
+    within_interval: (usize, usize),
+    as_claimed: bool,
 }
 
 #[derive(Serialize)]
@@ -71,7 +102,7 @@ struct FormRejections {
 
 /// Figures in the unit that the key names. Intervals are of 99 %.
 #[derive(Serialize)]
-struct Group {
+struct Merit {
     ekf_rms: f64,
     claimed_rms: f64,
     bound_rms: f64,
@@ -123,8 +154,12 @@ pub fn document(accuracy: &Accuracy) -> impl Serialize {
         groups: accuracy
             .groups
             .iter()
-            .map(|of| (of.group.key(), group(accuracy, of)))
+            .map(|of| {
+                let unit = of.group.unit_value();
+                (of.group.key(), merit(accuracy, &of.figures, unit))
+            })
             .collect(),
+        navigation: navigation(accuracy),
     }
 }
 
@@ -139,14 +174,52 @@ fn consistency(nis: &Nis) -> Option<Consistency> {
     })
 }
 
-fn group(accuracy: &Accuracy, of: &GroupAccuracy) -> Group {
-    let unit = of.group.unit_value();
+fn navigation(accuracy: &Accuracy) -> Vec<Navigation> {
+    let mission = |journey| Navigation {
+        mission: journey_name(journey),
+        hours: f64::from(FORTY_HOURS) * INTERVAL / 3600.0,
+        latitude_deg: accuracy.study.scenario.site.latitude / DEGREE,
+        not_navigated: None,
+        position_nmile: None,
+        containment: Vec::new(),
+    };
+    let navigated = accuracy.navigation.iter().map(|of| Navigation {
+        position_nmile: Some(merit(accuracy, &of.figures, NAUTICAL_MILE)),
+        containment: of.containment.iter().map(containment).collect(),
+        ..mission(of.journey)
+    });
+    let others = accuracy.not_navigated.iter();
+    let others = others.map(|(journey, reason)| Navigation {
+        not_navigated: Some(reason.to_string()),
+        ..mission(*journey)
+    });
+    navigated.chain(others).collect()
+}
+
+fn containment(of: &accuracy::Containment) -> Containment {
+    let (region, sigmas) = match of.region {
+        Region::East => ("east", 1.0),
+        Region::North => ("north", 1.0),
+        Region::Ellipse(sigmas) => ("ellipse", sigmas),
+    };
+    Containment {
+        region,
+        sigmas,
+        probability: of.region.probability(),
+        runs: of.runs,
+        within: of.within,
+        within_interval: of.interval,
+        as_claimed: of.as_claimed(),
+    }
+}
+
+fn merit(accuracy: &Accuracy, of: &Figures, unit: f64) -> Merit {
     let shown = |rms: Option<f64>| rms.map(|rms| rms / unit);
     let split = |ratio: Option<Ratio>| (ratio.map(|r| r.value), ratio.map(|r| r.interval));
     let (ratio, ratio_interval) = split(of.ratio);
     let (gain, gain_interval) = split(of.gain);
     let (gain_equal_time, gain_equal_time_interval) = split(of.gain_in_equal_time);
-    Group {
+    Merit {
         ekf_rms: of.filter / unit,
         claimed_rms: of.claimed / unit,
         bound_rms: of.bound / unit,

@@ -3,15 +3,17 @@
 use super::super::number::{count, three_digits, value};
 use super::super::side_by_side::Table;
 use super::facts::minutes;
+use super::merit::{Merit, journey_name, merits, region_name};
 use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
-use crate::imu::ParameterKind;
-use crate::study::{Accuracy, GroupAccuracy, Ratio};
+use crate::study::{Accuracy, Ratio};
 
 const NONE: &str = "–";
 
 pub(super) fn tables(accuracy: &Accuracy) -> Vec<Table> {
-    vec![bound(accuracy), gain(accuracy), consistency(accuracy)]
+    let mut tables = vec![bound(accuracy), gain(accuracy), consistency(accuracy)];
+    tables.extend(containment(accuracy));
+    tables
 }
 
 /// An interval with the digits that its width leaves meaning to.
@@ -45,19 +47,16 @@ fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
     })
 }
 
-/// A row for each group, a section for each triad.
-fn by_group(
-    accuracy: &Accuracy,
-    cells: impl Fn(&GroupAccuracy) -> Vec<String>,
-) -> Vec<Vec<Vec<String>>> {
-    let row = |of: &GroupAccuracy| {
-        let mut row = vec![of.group.title(), of.group.unit().to_owned()];
+/// A row for each merit, a section for each triad and for navigation.
+fn by_merit(accuracy: &Accuracy, cells: impl Fn(&Merit) -> Vec<String>) -> Vec<Vec<Vec<String>>> {
+    let row = |of: &Merit| {
+        let mut row = vec![of.title.clone(), of.unit.to_owned()];
         row.extend(cells(of));
         row
     };
-    let triads = accuracy.groups.chunks(ParameterKind::ALL.len());
-    triads
-        .map(|groups| groups.iter().map(row).collect())
+    merits(accuracy)
+        .chunk_by(|a, b| a.sensor == b.sensor)
+        .map(|section| section.iter().map(row).collect())
         .collect()
 }
 
@@ -74,16 +73,17 @@ fn bound(accuracy: &Accuracy) -> Table {
     Table {
         title: "EKF against the Cramér–Rao bound",
         headings: headings.map(str::to_owned).to_vec(),
-        sections: by_group(accuracy, |of| {
-            let unit = of.group.unit_value();
-            [of.filter, of.claimed, of.bound]
-                .map(|rms| three_digits(rms / unit))
+        sections: by_merit(accuracy, |of| {
+            let figures = of.figures;
+            [figures.filter, figures.claimed, figures.bound]
+                .map(|rms| three_digits(rms / of.unit_value))
                 .into_iter()
-                .chain(ratio_cells(of.ratio.as_ref()))
+                .chain(ratio_cells(figures.ratio.as_ref()))
                 .collect()
         }),
         notes: [
             "RMS over all runs and the parameters of a group; σ: what the filter claims.",
+            "Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.",
             "Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.",
         ]
         .map(str::to_owned)
@@ -109,13 +109,14 @@ fn gain(accuracy: &Accuracy) -> Table {
     Table {
         title: "EKF against the closed form, RMS error",
         headings,
-        sections: by_group(accuracy, |of| {
-            let shown = |rms: f64| three_digits(rms / of.group.unit_value());
+        sections: by_merit(accuracy, |of| {
+            let figures = of.figures;
+            let shown = |rms: f64| three_digits(rms / of.unit_value);
             let some = |rms: Option<f64>| rms.map_or(NONE.to_owned(), shown);
-            let mut row = vec![shown(of.filter), some(of.closed_form)];
-            row.extend(ratio_cells(of.gain.as_ref()));
-            row.push(some(of.closed_form_in_equal_time));
-            row.extend(ratio_cells(of.gain_in_equal_time.as_ref()));
+            let mut row = vec![shown(figures.filter), some(figures.closed_form)];
+            row.extend(ratio_cells(figures.gain.as_ref()));
+            row.push(some(figures.closed_form_in_equal_time));
+            row.extend(ratio_cells(figures.gain_in_equal_time.as_ref()));
             row
         }),
         notes: vec![
@@ -167,6 +168,56 @@ fn consistency(accuracy: &Accuracy) -> Table {
         .map(str::to_owned)
         .to_vec(),
     }
+}
+
+/// Whether position errors lie within their predicted σ; none if nothing was navigated.
+fn containment(accuracy: &Accuracy) -> Option<Table> {
+    let headings = [
+        "",
+        "runs",
+        "within",
+        "claimed",
+        "99 % interval",
+        "as claimed",
+    ];
+    let sections: Vec<Vec<Vec<String>>> = accuracy
+        .navigation
+        .iter()
+        .filter(|of| !of.containment.is_empty())
+        .map(|of| {
+            let rows = of.containment.iter();
+            rows.map(|held| {
+                let share = |hits: usize| percent(hits as f64 / held.runs as f64);
+                let (low, high) = held.interval;
+                vec![
+                    format!("{}: {}", journey_name(of.journey), region_name(held.region)),
+                    count(held.runs),
+                    format!("{} %", share(held.within)),
+                    format!("{} %", percent(held.region.probability())),
+                    format!("{}…{} %", share(low), share(high)),
+                    if held.as_claimed() { "yes" } else { "NO" }.to_owned(),
+                ]
+            })
+            .collect()
+        })
+        .collect();
+    (!sections.is_empty()).then(|| Table {
+        title: "Position error after 40 h within its predicted σ",
+        headings: headings.map(str::to_owned).to_vec(),
+        sections,
+        notes: [
+            "σ and ellipses: predicted from the covariance that the filter claims, by the linear error \
+             model.",
+            "Interval: binomial, of the share of the runs if the covariance is true.",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    })
+}
+
+/// A share in per cent.
+pub(super) fn percent(share: f64) -> String {
+    value(100.0 * share, 1.0)
 }
 
 /// Number of independent directions in all runs.

@@ -7,6 +7,7 @@ use serde_json::Value;
 use super::*;
 use crate::calibration::Group;
 use crate::imu::InstallationForm;
+use crate::navigation::NearPole;
 use crate::simulation::Scenario;
 use crate::study::AccuracyStudy;
 
@@ -35,9 +36,20 @@ fn all_failed() -> Accuracy {
         trial.failure = Some("singular <IMU>".to_owned());
         trial.filtered = None;
     }
+    let positions = accuracy.navigation.iter_mut();
+    let positions = positions.map(|navigated| {
+        navigated.containment.clear();
+        for position in &mut navigated.positions {
+            position.filter = None;
+        }
+        &mut navigated.figures
+    });
+    let groups = accuracy.groups.iter_mut().map(|group| &mut group.figures);
+    for figures in groups.chain(positions) {
+        (figures.filter, figures.claimed) = (f64::NAN, f64::NAN);
+        (figures.ratio, figures.gain, figures.gain_in_equal_time) = (None, None, None);
+    }
     for group in &mut accuracy.groups {
-        (group.filter, group.claimed) = (f64::NAN, f64::NAN);
-        (group.ratio, group.gain, group.gain_in_equal_time) = (None, None, None);
         for point in &mut group.filter_against_time {
             point.1 = f64::NAN;
         }
@@ -66,7 +78,7 @@ fn every_figure_is_a_file_and_on_the_page_whether_the_filter_works_or_not() {
         write(&accuracy, directory.path()).unwrap();
         let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
         let page = read("index.html");
-        for name in ["errors", "ratio", "nees", "gain", "time"] {
+        for name in ["errors", "ratio", "nees", "gain", "time", "position"] {
             let svg = read(&format!("{name}.svg"));
             assert!(svg.starts_with("<svg width=\"1200\""), "{name}");
             assert!(svg.matches("<text").count() > 5, "{name} has labels");
@@ -95,7 +107,7 @@ fn a_document_gives_every_group_in_the_unit_of_its_key() {
     ]) {
         let of = accuracy.groups.iter().find(|g| g.group == group).unwrap();
         let number = |name: &str| document[key][name].as_f64().unwrap();
-        assert_eq!(number("ekf_rms"), of.filter / group.unit_value());
+        assert_eq!(number("ekf_rms"), of.figures.filter / group.unit_value());
         let (ekf, bound) = (number("ekf_rms"), number("bound_rms"));
         assert!((ekf / bound / number("ratio") - 1.0).abs() < 1e-9);
         let (closed, gain) = (number("six_position_rms"), number("gain"));
@@ -131,7 +143,7 @@ fn sigma_that_are_too_small_are_called_so() {
 #[test]
 fn a_group_in_which_the_closed_form_is_better_is_named() {
     let mut accuracy = small();
-    let gain = accuracy.groups[5].gain.as_mut().unwrap();
+    let gain = accuracy.groups[5].figures.gain.as_mut().unwrap();
     (gain.value, gain.interval) = (0.5, (0.4, 0.6));
     let doubts = doubts(&accuracy);
     let line = doubts
@@ -151,4 +163,44 @@ fn a_form_that_cannot_hold_the_truth_is_charged_with_what_it_costs() {
     assert_eq!(json(&accuracy)["form_holds_truth"], false);
     accuracy.study.scenario.installation.form = InstallationForm::ThreeAngle;
     assert!(!doubts(&accuracy).contains("cannot hold"));
+}
+
+#[test]
+fn position_errors_are_in_nautical_miles_and_a_mission_that_cannot_be_flown_says_why() {
+    let mut accuracy = small();
+    let document = json(&accuracy);
+    let missions: Vec<&Value> = document["navigation"].as_array().unwrap().iter().collect();
+    assert_eq!(missions.len(), 2);
+    for (mission, of) in missions.into_iter().zip(&accuracy.navigation) {
+        let position = &mission["position_nmile"];
+        let ekf = position["ekf_rms"].as_f64().unwrap();
+        assert!((ekf * 1852.0 / of.figures.filter - 1.0).abs() < 1e-12);
+        assert_eq!(mission["containment"].as_array().unwrap().len(), 4);
+        assert_eq!(mission["containment"][0]["runs"], 3);
+    }
+    assert!(summary(&accuracy).contains("position, flight"));
+
+    let flight = accuracy.navigation.pop().unwrap();
+    let pole = NearPole { latitude: 1.57 };
+    accuracy.not_navigated = vec![(flight.journey, pole.into())];
+    assert!(doubts(&accuracy).contains("Not navigated from this site, flight"));
+    let document = json(&accuracy);
+    assert_eq!(document["navigation"][1]["mission"], "flight");
+    assert!(document["navigation"][1]["position_nmile"].is_null());
+}
+
+#[test]
+fn position_errors_beyond_their_predicted_sigma_are_called_so() {
+    let mut accuracy = small();
+    let held = &mut accuracy.navigation[0].containment[1];
+    (held.within, held.interval) = (0, (1, 3));
+    let doubts = doubts(&accuracy);
+    assert!(
+        doubts.contains("standing, the position error does not lie"),
+        "{doubts}"
+    );
+    assert!(
+        doubts.contains("north within 1σ 0.0 % (claimed 68.3 %)"),
+        "{doubts}"
+    );
 }

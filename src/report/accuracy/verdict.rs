@@ -2,10 +2,12 @@
 
 use super::super::number::{count, value};
 use super::facts::minutes;
-use super::tables::{self, interval, ratio};
+use super::merit::{journey_name, merits, region_name};
+use super::tables::{self, interval, percent, ratio};
 use crate::calibration::outcome::Nis;
 use crate::imu::Output;
-use crate::study::{Accuracy, GroupAccuracy, Ratio};
+use crate::study::accuracy::Containment;
+use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
 
 /// One thing that the study says.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,6 +31,8 @@ pub(super) fn verdict(accuracy: &Accuracy) -> Vec<Sentence> {
     sentences.push(nees(accuracy));
     sentences.extend(observations(accuracy).map(|(name, nis)| innovations(accuracy, name, nis)));
     sentences.extend(observations(accuracy).map(|(name, nis)| whiteness(name, nis)));
+    sentences.extend(accuracy.navigation.iter().filter_map(containment));
+    sentences.extend(not_navigated(accuracy));
     sentences.extend(form(accuracy));
     sentences.extend(gain(accuracy));
     if accuracy.trials.len() < FEW {
@@ -87,28 +91,22 @@ fn beside_one(ratio: &Ratio) -> std::cmp::Ordering {
     }
 }
 
-/// Groups with a ratio, named with it.
+/// What has a ratio, named with it.
 fn named(
     accuracy: &Accuracy,
-    of: impl Fn(&GroupAccuracy) -> Option<Ratio>,
+    of: impl Fn(&Figures) -> Option<Ratio>,
     chosen: impl Fn(&Ratio) -> bool,
 ) -> Vec<String> {
-    let with_ratio = accuracy.groups.iter().filter_map(|g| Some((g, of(g)?)));
+    let merits = merits(accuracy).into_iter();
+    let with_ratio = merits.filter_map(|m| Some((of(m.figures)?, m.title)));
     with_ratio
-        .filter(|(_, ratio)| chosen(ratio))
-        .map(|(g, r)| {
-            format!(
-                "{} {} ({})",
-                g.group.title(),
-                ratio(&r),
-                interval(r.interval)
-            )
-        })
+        .filter(|(ratio, _)| chosen(ratio))
+        .map(|(r, title)| format!("{title} {} ({})", ratio(&r), interval(r.interval)))
         .collect()
 }
 
 fn against_bound(accuracy: &Accuracy) -> Sentence {
-    let of = |g: &'_ GroupAccuracy| g.ratio;
+    let of = |figures: &Figures| figures.ratio;
     let (form, truth) = (
         accuracy.study.form,
         accuracy.study.scenario.installation.form,
@@ -127,7 +125,7 @@ fn against_bound(accuracy: &Accuracy) -> Sentence {
     }
     let outside = named(accuracy, of, |ratio| beside_one(ratio).is_ne());
     let text = if outside.is_empty() {
-        "RMS error over bound is 1 within its 99 % interval in every group: nothing shows the filter to \
+        "RMS error over bound is 1 within its 99 % interval everywhere: nothing shows the filter to \
          be worse than the best there can be."
             .to_owned()
     } else {
@@ -226,6 +224,54 @@ fn whiteness(name: &str, nis: &Nis) -> Sentence {
     }
 }
 
+fn containment(of: &NavigationAccuracy) -> Option<Sentence> {
+    let runs = of.containment.first()?.runs;
+    let all = || of.containment.iter();
+    let shown = |chosen: &dyn Fn(&&Containment) -> bool| -> String {
+        let shares: Vec<String> = all()
+            .filter(chosen)
+            .map(|held| {
+                let found = held.within as f64 / held.runs as f64;
+                format!(
+                    "{} {} % (claimed {} %)",
+                    region_name(held.region),
+                    percent(found),
+                    percent(held.region.probability())
+                )
+            })
+            .collect();
+        shares.join(", ")
+    };
+    let good = all().all(Containment::as_claimed);
+    let journey = journey_name(of.journey);
+    let runs = count(runs);
+    let text = if good {
+        format!(
+            "After 40 h, {journey}, the position error lies within its predicted σ as often as claimed \
+             in {runs} runs: {}.",
+            shown(&|_| true)
+        )
+    } else {
+        format!(
+            "After 40 h, {journey}, the position error does not lie within its predicted σ as often as \
+             claimed in {runs} runs: {}.",
+            shown(&|held| !held.as_claimed())
+        )
+    };
+    Some(Sentence { good, text })
+}
+
+fn not_navigated(accuracy: &Accuracy) -> impl Iterator<Item = Sentence> {
+    let all = accuracy.not_navigated.iter();
+    all.map(|(journey, reason)| Sentence {
+        good: false,
+        text: format!(
+            "Not navigated from this site, {}: {reason}.",
+            journey_name(*journey)
+        ),
+    })
+}
+
 fn form(accuracy: &Accuracy) -> Option<Sentence> {
     let (rejections, tested @ 1..) = accuracy.rejections() else {
         return None;
@@ -257,7 +303,7 @@ fn gain(accuracy: &Accuracy) -> Vec<Sentence> {
         minutes(accuracy.table_time),
         minutes(accuracy.baseline.table_time),
     );
-    let chosen = |side| named(accuracy, |g| g.gain, move |r| beside_one(r) == side);
+    let chosen = |side| named(accuracy, |f| f.gain, move |r| beside_one(r) == side);
     [
         (
             std::cmp::Ordering::Greater,

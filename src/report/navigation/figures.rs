@@ -127,7 +127,7 @@ fn panel(area: &Area, quantity: Quantity, sides: &[Side]) -> Result<(), DrawErro
 }
 
 /// Ticks at whole hours, or parts of an hour in a short navigation.
-fn time(hours: f64) -> Axis {
+pub(super) fn time(hours: f64) -> Axis {
     let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0, 48.0, 96.0];
     match steps.into_iter().find(|step| hours / step <= 12.0) {
         Some(step) if hours > 0.0 => Axis::stepped(0.0, hours, step),

@@ -1,6 +1,9 @@
 //! What is reported of a navigation error, and in which unit.
 
+use nalgebra::SVector;
+
 use crate::navigation::NavigationError;
+use crate::navigation::error_model::STATES;
 use crate::study::navigation::Moment;
 use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
@@ -46,6 +49,11 @@ impl Quantity {
         Self::new(Kind::Position, Some(7)),
         Self::new(Kind::Position, None),
     ];
+
+    /// Position east.
+    pub(super) const EAST: Self = Self::ALL[6];
+    /// Position north.
+    pub(super) const NORTH: Self = Self::ALL[7];
 
     const fn new(kind: Kind, component: Option<usize>) -> Self {
         Self { kind, component }
@@ -137,11 +145,15 @@ impl Quantity {
 
     /// Predicted 1σ in the usual unit; of a horizontal length the root of its mean square.
     pub(super) fn sigma(self, moment: &Moment) -> Option<f64> {
-        let sigma = moment.sigma()?;
+        Some(self.of_sigma(&moment.sigma()?))
+    }
+
+    /// The same from the σ of all errors, in the order of [`NavigationError::to_vector`].
+    pub(super) fn of_sigma(self, sigma: &SVector<f64, STATES>) -> f64 {
         let si = match self.component {
             Some(component) => sigma[component],
             None => sigma[self.kind.first()].hypot(sigma[self.kind.first() + 1]),
         };
-        Some(si / self.unit_value())
+        si / self.unit_value()
     }
 }

@@ -21,6 +21,8 @@ pub struct Trial {
     pub filtered: Option<Filtered>,
     /// σ of the bound.
     pub bound: ParameterVector,
+    /// Covariance of the bound.
+    pub(super) bound_covariance: ParameterMatrix,
     /// σ of the bound at each of the [`moments`].
     pub(super) bound_track: Vec<ParameterVector>,
     /// Error of the closed form for each part of its dwells; none where it failed.
@@ -34,6 +36,8 @@ pub struct Filtered {
     pub error: ParameterVector,
     /// σ that it claims.
     pub sigma: ParameterVector,
+    /// Covariance that it claims.
+    pub(super) covariance: ParameterMatrix,
     /// NEES/n.
     pub nees: Option<Nees>,
     /// Number of passes.
@@ -74,6 +78,7 @@ impl AccuracyStudy {
         let bound =
             bound(&record, &attainable).map_err(|source| StudyError::Bound { run, source })?;
         let outcome = estimate(&record, self.form, &|_| {});
+        let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,
             failure: match &outcome {
@@ -83,7 +88,8 @@ impl AccuracyStudy {
             filtered: outcome
                 .ok()
                 .map(|outcome| Filtered::new(&outcome, &truth, duration)),
-            bound: bound.estimate.in_general_form().sigma(),
+            bound: attained.sigma(),
+            bound_covariance: attained.covariance,
             bound_track: track(&bound.history, form, duration)
                 .map(|estimate| estimate.sigma())
                 .collect(),
@@ -111,6 +117,7 @@ impl Filtered {
         Self {
             error,
             sigma: estimate.sigma(),
+            covariance: estimate.covariance,
             nees: nees(&error, &estimate.covariance, &all),
             passes: outcome.passes.len(),
             velocity: outcome.consistency.velocity,

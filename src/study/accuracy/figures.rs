@@ -1,0 +1,69 @@
+//! Root mean squares of an error over the runs, by every method, and their ratios.
+
+use crate::study::Ratio;
+
+/// Figures of one kind of error over all runs, in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figures {
+    /// RMS error of the filter.
+    pub filter: f64,
+    /// RMS of the σ that the filter claims.
+    pub claimed: f64,
+    /// RMS of the Bayesian Cramér–Rao bound.
+    pub bound: f64,
+    /// Filter over bound.
+    pub ratio: Option<Ratio>,
+    /// RMS error of the closed form in its own time.
+    pub closed_form: Option<f64>,
+    /// Closed form in its own time over filter.
+    pub gain: Option<Ratio>,
+    /// RMS error of the closed form in the filter's time; none if that is too short for it.
+    pub closed_form_in_equal_time: Option<f64>,
+    /// Closed form in the filter's time over filter.
+    pub gain_in_equal_time: Option<Ratio>,
+}
+
+/// Mean squares of one run; none where a method gave nothing.
+pub(super) struct Squares {
+    pub(super) filter: Option<f64>,
+    pub(super) claimed: Option<f64>,
+    pub(super) bound: f64,
+    pub(super) closed_form: Option<f64>,
+    pub(super) closed_form_in_equal_time: Option<f64>,
+}
+
+impl Figures {
+    pub(super) fn new(runs: impl Iterator<Item = Squares>) -> Self {
+        let runs: Vec<Squares> = runs.collect();
+        let of = |one: &dyn Fn(&Squares) -> Option<f64>| -> Vec<f64> {
+            runs.iter().filter_map(one).collect()
+        };
+        let some = |squares: Vec<f64>| (!squares.is_empty()).then(|| rms(&squares));
+        // A ratio takes only runs that have both.
+        let ratio = |over: &dyn Fn(&Squares) -> Option<f64>,
+                     under: &dyn Fn(&Squares) -> Option<f64>| {
+            let both = runs.iter().filter_map(|s| over(s).zip(under(s)));
+            let (over, under): (Vec<f64>, Vec<f64>) = both.unzip();
+            Ratio::of(&over, &under)
+        };
+        let filter = |s: &Squares| s.filter;
+        let bound = |s: &Squares| Some(s.bound);
+        let own = |s: &Squares| s.closed_form;
+        let equal = |s: &Squares| s.closed_form_in_equal_time;
+        Self {
+            filter: rms(&of(&filter)),
+            claimed: rms(&of(&|s| s.claimed)),
+            bound: rms(&of(&bound)),
+            ratio: ratio(&filter, &bound),
+            closed_form: some(of(&own)),
+            gain: ratio(&own, &filter),
+            closed_form_in_equal_time: some(of(&equal)),
+            gain_in_equal_time: ratio(&equal, &filter),
+        }
+    }
+}
+
+/// Root of the mean; NaN of none.
+pub(super) fn rms(squares: &[f64]) -> f64 {
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
