@@ -7,7 +7,7 @@ use super::outcome::{Estimate, Moment};
 use super::pass::{Gate, Linearisation, Mode, pass};
 use super::schedule::{Schedule, first_reading};
 use super::standstill::velocity_sigma;
-use crate::imu::{PerSensor, Triad};
+use crate::imu::{FurtherVector, PerSensor, Triad};
 use crate::run::Run;
 
 /// What no estimator of a run can beat.
@@ -37,6 +37,7 @@ pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationEr
     };
     let at = Linearisation {
         triads: *truth,
+        further: FurtherVector::zeros(),
         initial_attitude,
     };
     let sigma = velocity_sigma(run, &dwells);

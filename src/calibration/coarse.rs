@@ -10,7 +10,7 @@ use super::error::CalibrationError;
 use super::outcome::{from_vector, to_vector};
 use super::pass::{Linearisation, singular};
 use super::schedule::first_reading;
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::imu::{FurtherVector, InstallationForm, PerSensor, Triad};
 use crate::run::{Dwell, Run};
 use equations::Equations;
 
@@ -41,6 +41,7 @@ pub fn coarse_start(
     match (&run.table, first_reading(run, dwells)) {
         (Some(table), Some(initial_attitude)) => Ok(Linearisation {
             triads: table::from_table(run, table, dwells, form)?,
+            further: FurtherVector::zeros(),
             initial_attitude,
         }),
         _ => {

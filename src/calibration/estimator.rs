@@ -7,7 +7,7 @@ use super::error::CalibrationError;
 use super::filter::Start;
 use super::form::{FormTest, form_test};
 use super::observability::Observability;
-use super::outcome::{Estimate, Innovation, Outcome, Pass, to_vector};
+use super::outcome::{Estimate, Further, Innovation, Outcome, Pass, to_vector};
 use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
@@ -95,6 +95,11 @@ pub fn estimate(
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
         prior_attitude: problem.initial_attitude,
+        further: Further {
+            values: held.estimate.further,
+            sigma: held.further_sigma,
+            prior_sigma: problem.further_sigma,
+        },
         linearised_at: held.at,
         converged,
         consistency: consistency(&held.innovations),
@@ -188,6 +193,7 @@ pub(super) fn problem<'a>(
         initial_attitude,
         prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
+        further_sigma: run.further_sigma,
         start: Start {
             attitude: match run.table {
                 // The one reading that gave it has both errors.
@@ -298,6 +304,7 @@ mod tests {
     use super::super::schedule::first_reading;
     use super::*;
     use crate::attitude::exp;
+    use crate::imu::FurtherVector;
     use crate::simulation::Scenario;
     use crate::units::PPM;
 
@@ -317,6 +324,7 @@ mod tests {
         let estimate = |shift: f64| {
             let at = Linearisation {
                 triads: from_vector(form, &problem.prior_mean.add_scalar(shift * PPM)),
+                further: FurtherVector::zeros(),
                 initial_attitude: exp(Vector3::new(1.0, -2.0, 3.0) * (shift * ARCSEC)) * reading,
             };
             let mode = Mode::Held(Gate::Open);

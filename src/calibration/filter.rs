@@ -1,21 +1,18 @@
 //! The Kalman filter: covariance in block form, observations one scalar at a time.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::observability::AttitudeCovariance;
 use super::states::{
-    ATTITUDE, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS, POSITION, ParameterMatrix,
-    ParameterVector, STATES, StateMatrix, StateVector, TABLE, VELOCITY,
+    ATTITUDE, FURTHER_PARAMETER, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS, POSITION,
+    ParameterMatrix, ParameterVector, TABLE, VELOCITY,
 };
 use crate::attitude::{exp, log};
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor};
+use crate::imu::{FurtherVector, PARAMETERS as PER_TRIAD, PerSensor};
 use crate::navigation::{Block, State};
 
 const GYRO: usize = PARAMETER;
 const ACCEL: usize = PARAMETER + PER_TRIAD;
-/// States that do not move.
-const CONSTANT: usize = STATES - NAVIGATION;
-
 /// Three states that an observation sees, and three that it sees with the opposite sign.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sight {
@@ -40,18 +37,18 @@ impl Sight {
         minus: Some(TABLE),
     };
 
-    fn of(self, x: &StateVector) -> Vector3<f64> {
+    fn of<const N: usize>(self, x: &SVector<f64, N>) -> Vector3<f64> {
         let plus = x.fixed_rows::<3>(self.plus).into_owned();
         self.minus
             .map_or(plus, |minus| plus - x.fixed_rows::<3>(minus))
     }
 }
 
-/// Mean and covariance of the errors.
+/// Mean and covariance of the errors: N is [`STATES`], or [`ALL_STATES`] with further terms.
 #[derive(Debug, Clone)]
-pub(super) struct Filter {
-    x: StateVector,
-    p: StateMatrix,
+pub(super) struct Filter<const N: usize> {
+    x: SVector<f64, N>,
+    p: SMatrix<f64, N, N>,
 }
 
 /// Uncertainty at the first sample, 1σ.
@@ -64,7 +61,7 @@ pub(super) struct Start {
     pub table: f64,
 }
 
-impl Filter {
+impl<const N: usize> Filter<N> {
     /// Before the first sample: `parameters` and `attitude` are the means of δθ and φ₀.
     pub fn new(
         start: Start,
@@ -72,13 +69,13 @@ impl Filter {
         parameter_sigma: &ParameterVector,
         attitude: Vector3<f64>,
     ) -> Self {
-        let mut x = StateVector::zeros();
+        let mut x = SVector::<f64, N>::zeros();
         x.fixed_rows_mut::<PARAMETERS>(PARAMETER)
             .copy_from(parameters);
         x.fixed_rows_mut::<3>(ATTITUDE).copy_from(&attitude);
         x.fixed_rows_mut::<3>(INITIAL_ATTITUDE).copy_from(&attitude);
 
-        let mut p = StateMatrix::zeros();
+        let mut p = SMatrix::<f64, N, N>::zeros();
         for (index, sigma) in parameter_sigma.iter().enumerate() {
             p[(PARAMETER + index, PARAMETER + index)] = sigma.powi(2);
         }
@@ -98,32 +95,51 @@ impl Filter {
         Self { x, p }
     }
 
+    /// The same with further parameters: mean of their error, and σ.
+    pub fn with_further(mut self, mean: &FurtherVector, sigma: &FurtherVector) -> Self {
+        for k in 0..N - FURTHER_PARAMETER {
+            let state = FURTHER_PARAMETER + k;
+            self.x[state] = mean[k];
+            self.p[(state, state)] = sigma[k].powi(2);
+        }
+        self
+    }
+
     /// Carries mean and covariance over a block. Only its top rows differ from identity, so of
     /// `Φ P Φᵀ + Q` only the rows and columns of the navigation errors change.
     pub fn propagate(&mut self, block: &Block) {
         let PerSensor { gyro, accel } = &block.parameters;
-        let x = block.navigation * self.x.fixed_rows::<NAVIGATION>(0)
+        let mut x = block.navigation * self.x.fixed_rows::<NAVIGATION>(0)
             + gyro * self.x.fixed_rows::<PER_TRIAD>(GYRO)
             + accel * self.x.fixed_rows::<PER_TRIAD>(ACCEL);
-        self.x.fixed_rows_mut::<NAVIGATION>(0).copy_from(&x);
-
-        let rows = block.navigation * self.p.fixed_view::<NAVIGATION, STATES>(0, 0)
-            + gyro * self.p.fixed_view::<PER_TRIAD, STATES>(GYRO, 0)
-            + accel * self.p.fixed_view::<PER_TRIAD, STATES>(ACCEL, 0);
-        let corner = rows.fixed_view::<NAVIGATION, NAVIGATION>(0, 0) * block.navigation.transpose()
+        let mut rows = block.navigation * self.p.fixed_view::<NAVIGATION, N>(0, 0)
+            + gyro * self.p.fixed_view::<PER_TRIAD, N>(GYRO, 0)
+            + accel * self.p.fixed_view::<PER_TRIAD, N>(ACCEL, 0);
+        for further in &block.further {
+            let state = FURTHER_PARAMETER + further.parameter;
+            x += further.column * self.x[state];
+            rows += further.column * self.p.row(state);
+        }
+        let mut corner = rows.fixed_view::<NAVIGATION, NAVIGATION>(0, 0)
+            * block.navigation.transpose()
             + rows.fixed_view::<NAVIGATION, PER_TRIAD>(0, GYRO) * gyro.transpose()
             + rows.fixed_view::<NAVIGATION, PER_TRIAD>(0, ACCEL) * accel.transpose()
             + block.noise;
+        for further in &block.further {
+            let state = FURTHER_PARAMETER + further.parameter;
+            corner += rows.column(state) * further.column.transpose();
+        }
+        self.x.fixed_rows_mut::<NAVIGATION>(0).copy_from(&x);
         self.p
             .fixed_view_mut::<NAVIGATION, NAVIGATION>(0, 0)
             .copy_from(&corner);
-        let side = rows.fixed_view::<NAVIGATION, CONSTANT>(0, NAVIGATION);
-        self.p
-            .fixed_view_mut::<NAVIGATION, CONSTANT>(0, NAVIGATION)
-            .copy_from(&side);
-        self.p
-            .fixed_view_mut::<CONSTANT, NAVIGATION>(NAVIGATION, 0)
-            .copy_from(&side.transpose());
+        for constant in NAVIGATION..N {
+            for moving in 0..NAVIGATION {
+                let covariance = rows[(moving, constant)];
+                self.p[(moving, constant)] = covariance;
+                self.p[(constant, moving)] = covariance;
+            }
+        }
     }
 
     /// The innovation of an observed difference in units of its own σ, its components independent:
@@ -147,11 +163,11 @@ impl Filter {
         for axis in 0..3 {
             let plus = sight.plus + axis;
             let minus = sight.minus.map(|minus| minus + axis);
-            let across = |p: &StateMatrix| -> StateVector {
+            let across = |p: &SMatrix<f64, N, N>| -> SVector<f64, N> {
                 let column = p.column(plus).into_owned();
                 minus.map_or(column, |minus| column - p.column(minus))
             };
-            let along = |v: &StateVector| v[plus] - minus.map_or(0.0, |minus| v[minus]);
+            let along = |v: &SVector<f64, N>| v[plus] - minus.map_or(0.0, |minus| v[minus]);
 
             let ph = across(&self.p);
             let gain = ph / (along(&ph) + variance);
@@ -162,7 +178,7 @@ impl Filter {
             self.p.ger(1.0, &rest, &gain, 1.0);
         }
         // Rounding differs on the two sides of the diagonal, and the difference would grow.
-        for column in 0..STATES {
+        for column in 0..N {
             for row in 0..column {
                 let mean = 0.5 * (self.p[(row, column)] + self.p[(column, row)]);
                 self.p[(row, column)] = mean;
@@ -207,8 +223,10 @@ impl Filter {
             position: take(POSITION),
             initial_attitude: take(INITIAL_ATTITUDE),
             parameters: self.parameters(),
+            further: self.further(),
         };
         self.x.fixed_rows_mut::<PARAMETERS>(PARAMETER).fill(0.0);
+        self.x.rows_range_mut(FURTHER_PARAMETER..).fill(0.0);
         feedback
     }
 
@@ -222,6 +240,18 @@ impl Filter {
         self.p
             .fixed_view::<PARAMETERS, PARAMETERS>(PARAMETER, PARAMETER)
             .into_owned()
+    }
+
+    /// Mean of the errors of further parameters; zero without them.
+    pub fn further(&self) -> FurtherVector {
+        let of = |k: usize| self.x.get(FURTHER_PARAMETER + k).copied();
+        FurtherVector::from_fn(|k, _| of(k).unwrap_or(0.0))
+    }
+
+    /// 1σ of the errors of further parameters; zero without them.
+    pub fn further_sigma(&self) -> FurtherVector {
+        let of = |state: usize| self.p.get((state, state)).copied();
+        FurtherVector::from_fn(|k, _| of(FURTHER_PARAMETER + k).unwrap_or(0.0).max(0.0).sqrt())
     }
 
     /// Covariance of the parameter errors with the initial attitude error in units of its σ.
@@ -251,19 +281,22 @@ pub(super) struct Feedback {
     pub position: Vector3<f64>,
     pub initial_attitude: Vector3<f64>,
     pub parameters: ParameterVector,
+    pub further: FurtherVector,
 }
 
 const _: () = assert!(GYRO + PER_TRIAD == ACCEL && NAVIGATION == crate::navigation::NAVIGATION);
 
 #[cfg(test)]
 mod tests {
-    use super::super::states::parameter;
+    use super::super::states::{STATES, parameter};
     use super::*;
     use crate::imu::Sensor;
     use crate::navigation::{BlockMatrix, ParameterBlock};
     use approx::assert_relative_eq;
 
-    fn filter() -> Filter {
+    type StateMatrix = SMatrix<f64, STATES, STATES>;
+
+    fn filter() -> Filter<STATES> {
         let start = Start {
             attitude: Vector3::repeat(3e-4),
             velocity: 1e-3,
@@ -292,6 +325,7 @@ mod tests {
                 gyro: ParameterBlock::from_fn(wave),
                 accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
             },
+            further: Vec::new(),
             noise: noise * noise.transpose(),
         }
     }

@@ -6,7 +6,9 @@ use super::form::FormTest;
 use super::observability::Observability;
 use super::pass::Linearisation;
 use super::states::{ParameterMatrix, ParameterVector, parameter, sensor_and_parameter};
-use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{
+    FURTHER, FurtherVector, InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
+};
 
 /// Both triads with the covariance of their parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +39,24 @@ impl Estimate {
     /// Indices of the estimated parameters.
     pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.covariance.nrows()).filter(|&i| self.covariance[(i, i)] > 0.0)
+    }
+}
+
+/// Parameters of further terms, in the order of [`crate::imu::Term::ALL`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Further {
+    /// The estimates.
+    pub values: FurtherVector,
+    /// 1σ of each; zero where the term is off.
+    pub sigma: FurtherVector,
+    /// 1σ before the run, around zero.
+    pub prior_sigma: FurtherVector,
+}
+
+impl Further {
+    /// Indices of the parameters that were estimated.
+    pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..FURTHER).filter(|&k| self.prior_sigma[k] > 0.0)
     }
 }
 
@@ -81,6 +101,8 @@ pub struct Outcome {
     /// Mean of the initial attitude before the run, `C_b_n`: a reading of the table or, without, the
     /// coarse alignment.
     pub prior_attitude: Matrix3<f64>,
+    /// The instrument's further terms.
+    pub further: Further,
     /// What the run showed of the parameters and what it left as it was.
     pub observability: Observability,
     /// Where the last pass linearised.

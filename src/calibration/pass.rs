@@ -10,10 +10,10 @@ use super::filter::{Filter, Sight, Start};
 use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
 use super::schedule::{Schedule, Standing};
-use super::states::{ParameterMatrix, ParameterVector};
+use super::states::{ALL_STATES, ParameterMatrix, ParameterVector, STATES};
 use crate::attitude::{exp, log};
-use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
-use crate::navigation::{Navigator, State};
+use crate::imu::{FURTHER, FurtherVector, InstallationForm, PerSensor, Sensor, Triad};
+use crate::navigation::{FurtherTerms, Navigator, State};
 use crate::run::Run;
 
 /// What all passes over a run share.
@@ -26,6 +26,8 @@ pub(super) struct Problem<'a> {
     pub initial_attitude: Matrix3<f64>,
     pub prior_mean: ParameterVector,
     pub prior_sigma: ParameterVector,
+    /// 1σ of each further parameter before the run, whose mean is zero; zero where its term is off.
+    pub further_sigma: FurtherVector,
     pub start: Start,
     pub variance: Variance,
     /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
@@ -51,6 +53,8 @@ pub(super) struct Variance {
 pub struct Linearisation {
     /// The instrument.
     pub triads: PerSensor<Triad>,
+    /// Parameters of its further terms.
+    pub further: FurtherVector,
     /// `C_b_n` at the first sample.
     pub initial_attitude: Matrix3<f64>,
 }
@@ -65,6 +69,7 @@ impl Linearisation {
                 self.triads.gyro.form,
                 &(from + (to_vector(&other.triads) - from) * fraction),
             ),
+            further: self.further + (other.further - self.further) * fraction,
             initial_attitude: exp(turn * fraction) * self.initial_attitude,
         }
     }
@@ -98,6 +103,7 @@ pub(super) struct PassResult {
     /// The estimate: where the next pass linearises.
     pub estimate: Linearisation,
     pub covariance: ParameterMatrix,
+    pub further_sigma: FurtherVector,
     pub attitude_covariance: AttitudeCovariance,
     /// Whitened innovations squared, summed; the prior is in it, since the filter starts from it.
     /// A rejected observation counts as much as the gate lets pass.
@@ -128,15 +134,19 @@ pub(super) fn pass(
     at: &Linearisation,
     mode: Mode,
 ) -> Result<PassResult, CalibrationError> {
-    Pass::new(problem, at, mode)?.run()
+    if problem.further_sigma == FurtherVector::zeros() {
+        Pass::<STATES>::new(problem, at, mode)?.run()
+    } else {
+        Pass::<ALL_STATES>::new(problem, at, mode)?.run()
+    }
 }
 
-struct Pass<'a> {
+struct Pass<'a, const N: usize> {
     problem: &'a Problem<'a>,
     mode: Mode<'a>,
     at: Linearisation,
     navigator: Navigator<'a>,
-    filter: Filter,
+    filter: Filter<N>,
     innovations: Vec<Innovation>,
     history: Vec<Moment>,
     merit: f64,
@@ -148,17 +158,17 @@ struct Pass<'a> {
 
 /// Where a dwell begins, to come back to: after a turn the innovations' covariance is wide, and an
 /// outlier that it lets in shuts the gate on the good observations that follow.
-struct Begin<'a> {
+struct Begin<'a, const N: usize> {
     step: usize,
     at: Linearisation,
     navigator: Navigator<'a>,
-    filter: Filter,
+    filter: Filter<N>,
     innovations: usize,
     history: usize,
     merit: f64,
 }
 
-impl<'a> Pass<'a> {
+impl<'a, const N: usize> Pass<'a, N> {
     fn new(
         problem: &'a Problem,
         at: &Linearisation,
@@ -168,17 +178,29 @@ impl<'a> Pass<'a> {
         let walk = PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
         let start = State::at_rest(at.initial_attitude);
         let navigator = Navigator::new(&run.imu, &run.site, walk, &at.triads, start)
-            .ok_or_else(|| singular(&at.triads))?;
+            .ok_or_else(|| singular(&at.triads))?
+            .with_further(FurtherTerms {
+                on: (0..FURTHER)
+                    .filter(|&k| problem.further_sigma[k] > 0.0)
+                    .collect(),
+                values: at.further,
+            });
         // The prior keeps its own mean, wherever the pass linearises; a live pass begins at the
         // point it is given and finds its way from there.
-        let (parameters, attitude) = match mode {
-            Mode::Live => (ParameterVector::zeros(), Vector3::zeros()),
+        let (parameters, further, attitude) = match mode {
+            Mode::Live => (
+                ParameterVector::zeros(),
+                FurtherVector::zeros(),
+                Vector3::zeros(),
+            ),
             Mode::Held(_) => (
                 problem.prior_mean - to_vector(&at.triads),
+                -at.further,
                 log(&(problem.initial_attitude * at.initial_attitude.transpose())),
             ),
         };
-        let filter = Filter::new(problem.start, &parameters, &problem.prior_sigma, attitude);
+        let filter = Filter::new(problem.start, &parameters, &problem.prior_sigma, attitude)
+            .with_further(&further, &problem.further_sigma);
         Ok(Self {
             problem,
             mode,
@@ -195,7 +217,7 @@ impl<'a> Pass<'a> {
 
     fn run(mut self) -> Result<PassResult, CalibrationError> {
         let steps = &self.problem.schedule.steps;
-        let mut begin: Option<Begin> = None;
+        let mut begin: Option<Begin<N>> = None;
         let mut next = 0;
         while let Some(step) = steps.get(next) {
             let time = self.problem.run.imu.time(step.samples.end);
@@ -230,6 +252,7 @@ impl<'a> Pass<'a> {
             at: self.at,
             estimate: self.estimate(),
             covariance: self.filter.parameter_covariance(),
+            further_sigma: self.filter.further_sigma(),
             attitude_covariance: self.filter.attitude_covariance(),
             merit: self.merit,
             innovations: self.innovations,
@@ -237,7 +260,7 @@ impl<'a> Pass<'a> {
         })
     }
 
-    fn begin(&mut self, step: usize) -> Begin<'a> {
+    fn begin(&mut self, step: usize) -> Begin<'a, N> {
         self.row = [0; 2];
         self.shutting.clear();
         Begin {
@@ -253,7 +276,7 @@ impl<'a> Pass<'a> {
 
     /// The observation that shut the gate: where several in a row were rejected, the dwell's first of
     /// their kind that was not. None if there is no such thing, or were too many already.
-    fn shutting(&self, begin: &Begin) -> Option<usize> {
+    fn shutting(&self, begin: &Begin<N>) -> Option<usize> {
         if self.shutting.len() >= MOST_SHUTTING {
             return None;
         }
@@ -265,7 +288,7 @@ impl<'a> Pass<'a> {
             .next()
     }
 
-    fn come_back(&mut self, begin: &Begin<'a>, shutting: usize) {
+    fn come_back(&mut self, begin: &Begin<'a, N>, shutting: usize) {
         self.at = begin.at;
         self.navigator = begin.navigator.clone();
         self.filter = begin.filter.clone();
@@ -370,6 +393,8 @@ impl<'a> Pass<'a> {
             self.problem.form,
             &(to_vector(&self.at.triads) + feedback.parameters),
         );
+        self.at.further += feedback.further;
+        self.navigator.set_further(self.at.further);
         self.navigator
             .set_triads(&self.at.triads)
             .ok_or_else(|| singular(&self.at.triads))
@@ -381,6 +406,7 @@ impl<'a> Pass<'a> {
                 self.problem.form,
                 &(to_vector(&self.at.triads) + self.filter.parameters()),
             ),
+            further: self.at.further + self.filter.further(),
             initial_attitude: exp(self.filter.initial_attitude()) * self.at.initial_attitude,
         }
     }

@@ -1,15 +1,19 @@
 //! From an estimate to the record that others read.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::observability::Direction;
-use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
+use super::outcome::{Consistency, Estimate, Further, Nis, Outcome, parameter_name};
 use super::states::{PARAMETERS, sensor_and_parameter};
-use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{
+    InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, Triad,
+};
 use crate::run::Run;
 use crate::run::record::{
     Aiding, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord, EQUATION, Method,
-    NisRecord, TestVector, TriadRecord,
+    NisRecord, TermRecord, TestVector, TriadRecord,
 };
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -28,6 +32,7 @@ impl Outcome {
                 BodyFrame::Table => Aiding::Table,
                 BodyFrame::Accelerometer => Aiding::Velocity,
             }),
+            terms: self.further.records(),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
@@ -35,6 +40,20 @@ impl Outcome {
             warnings: self.warnings.clone(),
             ..self.estimate.record(run)
         }
+    }
+}
+
+impl Further {
+    /// Its estimated parameters by name.
+    pub fn records(&self) -> BTreeMap<String, TermRecord> {
+        let record = |k: usize| {
+            let record = TermRecord {
+                value: self.values[k],
+                sigma: Some(self.sigma[k]),
+            };
+            Some((Term::parameter_name(k)?, record))
+        };
+        self.estimated().filter_map(record).collect()
     }
 }
 

@@ -9,10 +9,11 @@
 //! | accel | 12 | the same for the accelerometers |
 //! | table | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad |
 //! | initial attitude | 3 | φ at the first sample, kept as constants, rad |
+//! | further terms | 22 | true − estimated, see [`crate::imu::Term`]; only where one is on |
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
+use crate::imu::{FURTHER, PARAMETERS as PER_TRIAD, Sensor};
 
 /// Attitude error φ.
 pub const ATTITUDE: usize = 0;
@@ -30,13 +31,13 @@ pub const PARAMETERS: usize = 2 * PER_TRIAD;
 pub const TABLE: usize = PARAMETER + PARAMETERS;
 /// Initial attitude error φ₀.
 pub const INITIAL_ATTITUDE: usize = TABLE + 3;
-/// Number of states.
+/// Number of states of an instrument without further terms.
 pub const STATES: usize = INITIAL_ATTITUDE + 3;
+/// First parameter of further terms.
+pub const FURTHER_PARAMETER: usize = STATES;
+/// Number of states with those of further terms.
+pub const ALL_STATES: usize = FURTHER_PARAMETER + FURTHER;
 
-/// A vector of all states.
-pub type StateVector = SVector<f64, STATES>;
-/// A matrix of all states.
-pub type StateMatrix = SMatrix<f64, STATES, STATES>;
 /// A vector of the parameters of both triads.
 pub type ParameterVector = SVector<f64, PARAMETERS>;
 /// A matrix of the parameters of both triads.

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
 use turncal::calibration::{self, CalibrationError, ClosedForm, Outcome, in_body_frame, triads_of};
-use turncal::imu::{InstallationForm, PerSensor, Triad};
+use turncal::imu::{InstallationForm, PerSensor, Term, Triad};
 use turncal::report::{self, Navigated, Report};
 use turncal::run::{CalibrationRecord, Run};
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
@@ -39,6 +39,9 @@ pub struct Calibrate {
     /// What the filter observes [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
+    /// Further error terms to estimate, beside those that the run switches on
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    with: Vec<FurtherTerm>,
     /// True calibration; the estimator never sees it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -77,6 +80,33 @@ pub enum Aiding {
     Velocity,
 }
 
+/// A further error term.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum FurtherTerm {
+    /// Accelerometers: square of specific force
+    AccelSecondOrder,
+    /// Accelerometers: size of specific force, whatever its sign
+    AccelAsymmetry,
+    /// Accelerometers that do not stand in one point
+    SizeEffect,
+    /// Accelerometer samples later than the gyros'
+    TimeOffset,
+    /// Gyros that sense specific force
+    GSensitivity,
+}
+
+impl From<FurtherTerm> for Term {
+    fn from(term: FurtherTerm) -> Self {
+        match term {
+            FurtherTerm::AccelSecondOrder => Self::AccelSecondOrder,
+            FurtherTerm::AccelAsymmetry => Self::AccelAsymmetry,
+            FurtherTerm::SizeEffect => Self::SizeEffect,
+            FurtherTerm::TimeOffset => Self::TimeOffset,
+            FurtherTerm::GSensitivity => Self::GSensitivity,
+        }
+    }
+}
+
 impl From<Installation> for InstallationForm {
     fn from(form: Installation) -> Self {
         match form {
@@ -105,6 +135,9 @@ impl Calibrate {
             // What the filter is not to observe is not there.
             Some(Aiding::Velocity) => run.table = None,
             Some(Aiding::Table) | None => {}
+        }
+        for &term in &self.with {
+            run.switch_on(term.into());
         }
         let form = self.installation.into();
         let truth = self

@@ -10,10 +10,12 @@ use serde::{Deserialize, Serialize};
 
 mod installation;
 mod signal;
+mod terms;
 mod triad;
 
 pub use installation::{ANGLES, InstallationForm};
 pub use signal::{Instability, Noise, NoiseSource, Output, Pulses};
+pub use terms::{FURTHER, FurtherResponse, FurtherVector, Sensed, Term};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 
 /// Names of the body axes, in order.

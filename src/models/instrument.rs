@@ -6,7 +6,9 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::Deserialize;
 
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
-use crate::imu::{ANGLES, Instability, InstallationForm, Noise, PerSensor, Prior, Sensor};
+use crate::imu::{
+    ANGLES, FurtherVector, Instability, InstallationForm, Noise, PerSensor, Prior, Sensor, Term,
+};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// A grade of instrument.
@@ -20,6 +22,8 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// How one instrument of the grade differs from the next before calibration.
     pub variation: PerSensor<Variation>,
+    /// 1σ of the parameters of its further terms, around zero; zero where it has none.
+    pub further_sigma: FurtherVector,
 }
 
 /// How a triad's scale factors and biases differ between instruments of a grade.
@@ -115,7 +119,7 @@ impl Instrument {
     /// If there is none of that name or it is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let text = text(Room::Imu, name_or_path, named_in)?;
-        let InstrumentFile { gyro, accel } = text.parse()?;
+        let InstrumentFile { gyro, accel, terms } = text.parse()?;
         Ok(Self {
             name: text.name(),
             pulse: PerSensor {
@@ -148,6 +152,7 @@ impl Instrument {
                     bias: accel.bias_ug.times(MICRO_G),
                 },
             },
+            further_sigma: terms.in_si(),
         })
     }
 
@@ -175,6 +180,44 @@ struct InstallationFile {
 struct InstrumentFile {
     gyro: GyroFile,
     accel: AccelFile,
+    #[serde(default)]
+    terms: TermsFile,
+}
+
+/// Further terms, each as in a run's `[imu.terms]`.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
+struct TermsFile {
+    accel_second_order: Option<TermFile>,
+    accel_asymmetry: Option<TermFile>,
+    size_effect: Option<TermFile>,
+    time_offset: Option<TermFile>,
+    g_sensitivity: Option<TermFile>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TermFile {
+    sigma: Positive,
+}
+
+impl TermsFile {
+    fn in_si(&self) -> FurtherVector {
+        let mut sigma = FurtherVector::zeros();
+        for term in Term::ALL {
+            let given = match term {
+                Term::AccelSecondOrder => self.accel_second_order,
+                Term::AccelAsymmetry => self.accel_asymmetry,
+                Term::SizeEffect => self.size_effect,
+                Term::TimeOffset => self.time_offset,
+                Term::GSensitivity => self.g_sensitivity,
+            };
+            for parameter in term.parameters() {
+                sigma[parameter] = given.map_or(0.0, |given| given.sigma.0 * term.unit().1);
+            }
+        }
+        sigma
+    }
 }
 
 #[derive(Deserialize)]

@@ -1,11 +1,11 @@
 //! What navigation hands to a filter: the error model over a stretch of samples.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::increments::Increments;
 use super::state::State;
 use crate::attitude::skew;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
+use crate::imu::{FurtherResponse, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, Triad};
 
 /// Attitude, velocity and position error.
 pub const NAVIGATION: usize = 9;
@@ -33,8 +33,19 @@ pub struct Block {
     pub navigation: BlockMatrix,
     /// Transition from the parameter errors of each triad.
     pub parameters: PerSensor<ParameterBlock>,
+    /// Transition from the parameter errors of further terms that are on.
+    pub further: Vec<FurtherColumn>,
     /// Covariance that noise adds to the navigation errors.
     pub noise: BlockMatrix,
+}
+
+/// What the error of one further parameter makes of the navigation errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FurtherColumn {
+    /// The parameter's index among [`crate::imu::FURTHER`].
+    pub parameter: usize,
+    /// Navigation errors by the parameter's error, true − estimated.
+    pub column: SVector<f64, NAVIGATION>,
 }
 
 /// Integrals over a stretch of samples from which its [`Block`] follows.
@@ -52,9 +63,54 @@ pub(super) struct Moments {
     /// ∫f_n dt.
     force: Vector3<f64>,
     duration: f64,
+    further: Vec<FurtherMoment>,
+}
+
+/// Integrals of what one further parameter does.
+#[derive(Debug, Clone)]
+struct FurtherMoment {
+    parameter: usize,
+    sensor: Sensor,
+    /// ∫C_b_n ∂t/∂q dt.
+    input: Vector3<f64>,
+    /// ∫[f_n×] (∫C_b_n ∂t/∂q dt) dt, for a parameter of the gyros.
+    tilt: Vector3<f64>,
 }
 
 impl Moments {
+    /// Of no time, with these further parameters on.
+    pub(super) fn with_further(parameters: &[usize]) -> Self {
+        let moment = |&parameter: &usize| {
+            Some(FurtherMoment {
+                parameter,
+                sensor: Term::of(parameter)?.sensor(),
+                input: Vector3::zeros(),
+                tilt: Vector3::zeros(),
+            })
+        };
+        Self {
+            further: parameters.iter().filter_map(moment).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a sample's worth of further terms: attitude at its middle, response of both triads, velocity
+    /// change by specific force in `n`.
+    pub(super) fn add_further(
+        &mut self,
+        attitude: &Matrix3<f64>,
+        responses: &PerSensor<FurtherResponse>,
+        force: &Vector3<f64>,
+        period: f64,
+    ) {
+        for moment in &mut self.further {
+            let response = responses.get(moment.sensor).column(moment.parameter);
+            let step = attitude * response * period;
+            moment.tilt += force.cross(&(moment.input + step * 0.5));
+            moment.input += step;
+        }
+    }
+
     /// Adds a sample: attitude at its middle, increments along body axes, velocity change by
     /// specific force in `n`.
     #[inline]
@@ -100,7 +156,21 @@ impl Moments {
             accel: integrals(attitude.tr_mul(force)).into(),
             force: force * duration,
             duration,
+            further: Vec::new(),
         }
+    }
+
+    /// Adds further terms to those of a body that stands.
+    pub(super) fn stand_further(
+        &mut self,
+        parameters: &[usize],
+        attitude: &Matrix3<f64>,
+        responses: &PerSensor<FurtherResponse>,
+    ) {
+        self.further = Self::with_further(parameters).further;
+        // A tilt that grows evenly acts on the force of the whole time for half of it, as in a sample.
+        let (force, duration) = (self.force, self.duration);
+        self.add_further(attitude, responses, &force, duration);
     }
 
     /// The block of these integrals. `random_walk` are the noise densities of both triads, rad/√s
@@ -147,11 +217,34 @@ impl Moments {
                 .copy_from(&(velocity * (t / 2.0)));
         }
 
+        let further = self.further.iter().map(|moment| {
+            let mut column = SVector::<f64, NAVIGATION>::zeros();
+            let mut set = |row: usize, v: Vector3<f64>| {
+                column.fixed_rows_mut::<3>(3 * row).copy_from(&v);
+            };
+            match moment.sensor {
+                Sensor::Gyro => {
+                    set(0, -moment.input);
+                    set(1, -moment.tilt);
+                    set(2, -moment.tilt * (t / 3.0));
+                }
+                Sensor::Accel => {
+                    set(1, moment.input);
+                    set(2, moment.input * (t / 2.0));
+                }
+            }
+            FurtherColumn {
+                parameter: moment.parameter,
+                column,
+            }
+        });
+
         Block {
             state,
             duration: t,
             navigation,
             parameters,
+            further: further.collect(),
             noise: self.noise(random_walk),
         }
     }

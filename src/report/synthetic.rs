@@ -100,6 +100,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         }
     }
     Run {
+        further_sigma: Default::default(),
         name: "three-axis-made-up".to_owned(),
         site: Site::with_normal_gravity(39.9 * DEGREE, 116.3 * DEGREE, 50.0),
         meta: BTreeMap::from([
@@ -266,6 +267,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         estimate,
         prior_sigma,
         prior_mean,
+        further: Default::default(),
         prior_attitude: nalgebra::Matrix3::identity(),
         observability: Observability {
             directions: vec![Direction {
@@ -286,6 +288,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         },
         linearised_at: Linearisation {
             triads: from_vector(form, &(truth + drawn)),
+            further: Default::default(),
             initial_attitude: nalgebra::Matrix3::identity(),
         },
         passes: vec![

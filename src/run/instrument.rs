@@ -9,7 +9,9 @@ use super::error::RunError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
 use super::quantity::{OUTPUTS, units};
-use crate::imu::{Instability, Noise, Nominal, Output, PerSensor, Prior, Sensor};
+use crate::imu::{
+    FurtherVector, Instability, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
+};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// What `[imu]` and the tables below it say.
@@ -17,6 +19,7 @@ pub(super) struct Instrument<'a> {
     pub log: ImuLog<'a>,
     pub noise: PerSensor<Noise>,
     pub prior: PerSensor<Prior>,
+    pub further_sigma: FurtherVector,
     pub unit: PerSensor<String>,
 }
 
@@ -45,7 +48,6 @@ impl<'a> Instrument<'a> {
             ],
             "the instrument and its record",
         )?;
-        no_terms(&fields)?;
         let output = fields
             .need("output", "what a row holds: pulse, increment or rate")?
             .choice(&OUTPUTS)?;
@@ -105,6 +107,7 @@ impl<'a> Instrument<'a> {
                 },
             },
             noise: noise(&fields)?,
+            further_sigma: further_sigma(&fields)?,
             prior: PerSensor {
                 gyro: gyro.prior,
                 accel: accel.prior,
@@ -117,20 +120,23 @@ impl<'a> Instrument<'a> {
     }
 }
 
-fn no_terms(imu: &Fields) -> Result<(), RunError> {
-    let Some(terms) = imu.open_table("terms")? else {
-        return Ok(());
+/// 1σ of the parameters of the terms that `[imu.terms]` switches on.
+fn further_sigma(imu: &Fields) -> Result<FurtherVector, RunError> {
+    let mut sigma = FurtherVector::zeros();
+    let names = Term::ALL.map(Term::name);
+    let Some(terms) = imu.table("terms", &names)? else {
+        return Ok(sigma);
     };
-    match terms.all().next() {
-        Some((name, field)) => Err(field.error(
-            "scale factors, installation and biases only",
-            format_args!(
-                "`{name}` is not modelled yet in turncal {}; remove it from [imu.terms].",
-                env!("CARGO_PKG_VERSION")
-            ),
-        )),
-        None => Ok(()),
+    for term in Term::ALL {
+        let meaning = "1σ of each of its parameters";
+        if let Some(fields) = terms.table(term.name(), &["sigma"])? {
+            let given = fields.need("sigma", meaning)?.positive()?;
+            for parameter in term.parameters() {
+                sigma[parameter] = given * term.unit().1;
+            }
+        }
     }
+    Ok(sigma)
 }
 
 fn noise(imu: &Fields) -> Result<PerSensor<Noise>, RunError> {

@@ -29,7 +29,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::earth::Site;
-use crate::imu::{InstallationForm, Noise, Nominal, PerSensor, Prior, Triad, TriadVector};
+use crate::imu::{
+    FurtherVector, InstallationForm, Noise, Nominal, PerSensor, Prior, Term, Triad, TriadVector,
+};
 use record::BodyFrame;
 
 /// Everything that a calibration needs to know of one record.
@@ -47,6 +49,8 @@ pub struct Run {
     pub noise: PerSensor<Noise>,
     /// Knowledge of each triad before calibration.
     pub prior: PerSensor<Prior>,
+    /// 1σ of each parameter of further terms before calibration, around zero; zero where a term is off.
+    pub further_sigma: FurtherVector,
     /// Nominal scale of each triad: the file's quantity per second for one rad/s or m/s².
     pub nominal: PerSensor<Nominal>,
     /// The file's quantity, such as `count`.
@@ -67,6 +71,15 @@ impl Run {
         match self.table {
             Some(_) => BodyFrame::Table,
             None => BodyFrame::Accelerometer,
+        }
+    }
+
+    /// Switches a further term on, with its usual σ unless the run states one.
+    pub fn switch_on(&mut self, term: Term) {
+        for parameter in term.parameters() {
+            if self.further_sigma[parameter] == 0.0 {
+                self.further_sigma[parameter] = term.usual_sigma();
+            }
         }
     }
 

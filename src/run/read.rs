@@ -83,6 +83,7 @@ impl Run {
             imu,
             noise: instrument.noise,
             prior: instrument.prior,
+            further_sigma: instrument.further_sigma,
             nominal: instrument.log.nominal,
             unit: instrument.unit,
             standstill,

@@ -53,6 +53,9 @@ pub struct CalibrationRecord {
     /// Covariance of the estimated parameters, in their units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
+    /// Parameters of further terms by name, such as `accel.second_order.x`, in SI.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub terms: BTreeMap<String, TermRecord>,
     /// Number of passes over the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
@@ -83,6 +86,16 @@ pub struct CalibrationRecord {
     /// `[meta]` of the run.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meta: BTreeMap<String, String>,
+}
+
+/// A parameter of a further term.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TermRecord {
+    /// Its value, in SI.
+    pub value: f64,
+    /// 1σ; none for a truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
 }
 
 /// How a calibration was found.
@@ -197,6 +210,7 @@ impl CalibrationRecord {
             sigma: None,
             parameters: Vec::new(),
             covariance: Vec::new(),
+            terms: BTreeMap::new(),
             passes: None,
             converged: None,
             consistency: None,

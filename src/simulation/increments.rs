@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::earth::Site;
-use crate::imu::PerSensor;
+use crate::imu::{self, FurtherVector, PerSensor, Sensor};
 use crate::turntable::Motion;
 
 /// How increments are integrated.
@@ -21,15 +21,16 @@ pub struct Integrator {
 ///
 /// `ω_ib = ω_nb + C_n_b ω_ie`, `f = −C_n_b g + ω̇_ib × r + ω_ib × (ω_ib × r)`, with r the lever arm.
 ///
-/// While the table stands both are constant and computed once.
+/// to which the instrument's further terms with these parameters are added. While the table stands both are constant and computed once.
 pub fn true_increments(
     motion: &Motion,
     site: &Site,
     integrator: &Integrator,
+    further: &FurtherVector,
 ) -> PerSensor<Vec<Vector3<f64>>> {
     let &Integrator { period, .. } = integrator;
     let samples = (motion.duration() / period + 1e-6) as usize;
-    let sensed = Sensed::new(motion, site, integrator.lever_arm);
+    let sensed = Sensed::new(motion, site, integrator.lever_arm, *further);
     let mut gyro = Vec::with_capacity(samples);
     let mut accel = Vec::with_capacity(samples);
     let mut push = |(angle, velocity): (Vector3<f64>, Vector3<f64>)| {
@@ -66,15 +67,22 @@ struct Sensed<'a> {
     earth_rate_n: Vector3<f64>,
     gravity_n: Vector3<f64>,
     lever_arm: Vector3<f64>,
+    further: FurtherVector,
 }
 
 impl<'a> Sensed<'a> {
-    fn new(motion: &'a Motion, site: &Site, lever_arm: Vector3<f64>) -> Self {
+    fn new(
+        motion: &'a Motion,
+        site: &Site,
+        lever_arm: Vector3<f64>,
+        further: FurtherVector,
+    ) -> Self {
         Self {
             motion,
             earth_rate_n: site.earth_rate_n(),
             gravity_n: site.gravity_n(),
             lever_arm,
+            further,
         }
     }
 
@@ -87,7 +95,17 @@ impl<'a> Sensed<'a> {
         let r = self.lever_arm;
         let force = acceleration.cross(&r) + rate.cross(&rate.cross(&r))
             - state.attitude.tr_mul(&self.gravity_n);
-        (rate, force)
+        if self.further == FurtherVector::zeros() {
+            return (rate, force);
+        }
+        let sensed = imu::Sensed {
+            rate,
+            rate_over_earth: state.rate,
+            angular_acceleration: acceleration,
+            force,
+        };
+        let added = |sensor| sensed.response(sensor) * self.further;
+        (rate + added(Sensor::Gyro), force + added(Sensor::Accel))
     }
 
     /// The integrals over sample `k`, in parts that do not reach across a break.
@@ -157,7 +175,12 @@ mod tests {
     #[test]
     fn standing_still_senses_earth_rate_and_gravity_upwards() {
         let (motion, site) = demo();
-        let ideal = true_increments(&motion, &site, &integrator(Vector3::zeros(), 4));
+        let ideal = true_increments(
+            &motion,
+            &site,
+            &integrator(Vector3::zeros(), 4),
+            &FurtherVector::zeros(),
+        );
         for (start, end) in motion.dwells() {
             let still = sample(start) + 1..sample(end) - 1;
             let time = still.len() as f64 * PERIOD;
@@ -188,7 +211,7 @@ mod tests {
             period: MILLISECOND,
             ..integrator(lever_arm, 2)
         };
-        let ideal = true_increments(motion, site, &fine);
+        let ideal = true_increments(motion, site, &fine, &FurtherVector::zeros());
         let mut attitude = motion.at(0.0).attitude;
         let mut velocity = Vector3::zeros();
         let (mut last_angle, mut last_force) = (Vector3::zeros(), Vector3::zeros());
@@ -243,8 +266,13 @@ mod tests {
     fn increments_do_not_depend_on_the_step() {
         let (motion, site) = demo();
         let arm = Vector3::new(0.3, -0.2, 0.1);
-        let coarse = true_increments(&motion, &site, &integrator(arm, 4));
-        let fine = true_increments(&motion, &site, &integrator(arm, 16));
+        let coarse = true_increments(&motion, &site, &integrator(arm, 4), &FurtherVector::zeros());
+        let fine = true_increments(
+            &motion,
+            &site,
+            &integrator(arm, 16),
+            &FurtherVector::zeros(),
+        );
         for (coarse, fine) in coarse.gyro.iter().zip(&fine.gyro) {
             assert!((coarse - fine).norm() < 1e-14);
         }

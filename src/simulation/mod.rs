@@ -15,7 +15,7 @@ pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 
 use crate::attitude::exp;
-use crate::imu::{NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
+use crate::imu::{FurtherVector, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
 use crate::run::{ImuRecord, Run, Standstill, TableRecord};
 use crate::turntable::{Imperfection, Motion, TableError};
 
@@ -26,6 +26,8 @@ pub struct Simulated {
     pub run: Run,
     /// The instrument's true parameters.
     pub truth: PerSensor<Triad>,
+    /// Those of its further terms.
+    pub further: FurtherVector,
     /// What a sample holds when the run is written to a file.
     pub output: Output,
 }
@@ -40,6 +42,7 @@ enum Draws {
     Imperfection,
     Positions,
     Readings,
+    Further,
 }
 
 impl Draws {
@@ -67,7 +70,8 @@ impl Scenario {
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
         let motion = Motion::new(&self.table, &self.path, &imperfection)?;
         let read = Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))?;
-        let ideal = true_increments(&motion, &self.site, &self.integrator);
+        let further = self.draw_further(&mut Draws::Further.generator(seed, stream));
+        let ideal = true_increments(&motion, &self.site, &self.integrator, &further);
 
         let truth = PerSensor::from_fn(|sensor| {
             let draws = match sensor {
@@ -124,6 +128,7 @@ impl Scenario {
             },
             noise: self.instrument.noise,
             prior: PerSensor::from_fn(|sensor| self.instrument.prior(sensor, &self.installation)),
+            further_sigma: self.instrument.further_sigma,
             nominal,
             unit,
             standstill: Standstill {
@@ -139,6 +144,7 @@ impl Scenario {
         Ok(Simulated {
             run,
             truth,
+            further,
             output: self.output,
         })
     }

@@ -2,11 +2,12 @@
 
 use nalgebra::{SVector, Vector3};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 use super::Integrator;
 use crate::earth::Site;
-use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, Triad};
+use crate::imu::{ANGLES, FurtherVector, InstallationForm, Output, PerSensor, Sensor, Triad};
 use crate::models::{
     self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
@@ -159,6 +160,14 @@ impl Scenario {
             }
         }
         Ok(())
+    }
+
+    /// The true parameters of further terms.
+    pub(super) fn draw_further(&self, rng: &mut ChaCha8Rng) -> FurtherVector {
+        self.instrument.further_sigma.map(|sigma| {
+            let unit: f64 = StandardNormal.sample(rng);
+            sigma * unit
+        })
     }
 
     /// One triad's true parameters.

@@ -9,7 +9,7 @@ use super::equations::Equations;
 use super::heading::{Gyrocompass, Rest, gyrocompass};
 use crate::attitude::exp;
 use crate::earth::ROTATION_RATE;
-use crate::imu::{PerSensor, Sensor, Triad, TriadVector};
+use crate::imu::{FurtherVector, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::{Block, Navigator, State};
 use crate::run::{Dwell, MeanOutput, Run};
 
@@ -36,6 +36,7 @@ pub(super) fn gyros_and_attitude(
         .collect();
     let mut at = Linearisation {
         triads: *triads,
+        further: FurtherVector::zeros(),
         initial_attitude: level(&up[0]),
     };
     // Within Earth rate the output at rest is the bias.

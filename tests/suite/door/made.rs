@@ -27,6 +27,7 @@ pub fn made_run(name: &str) -> Run {
         bias_sigma: Vector3::new(1e-6, 2e-6, 3e-6),
     };
     Run {
+        further_sigma: Default::default(),
         name: name.to_owned(),
         site: Site::with_normal_gravity(0.7, -1.9, 123.4),
         meta: [("serial", "A \"7\""), ("notes", "two\nlines")]

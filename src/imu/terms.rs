@@ -1,0 +1,238 @@
+//! Further error terms of an instrument, beside `K`, `E` and `D`: each changes what a triad takes for
+//! its input, `N = K C (u + t(q)) + D`, and is linear in parameters `q` of its own.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::{AXES, Sensor};
+use crate::units::{DEG_PER_H, MICRO_G, PPM, STANDARD_GRAVITY};
+
+/// Number of parameters of all terms.
+pub const FURTHER: usize = 22;
+/// The parameters of all terms, in the order of [`Term::ALL`]; zero where a term is off.
+pub type FurtherVector = SVector<f64, FURTHER>;
+/// What each parameter adds to the input of a triad.
+pub type FurtherResponse = SMatrix<f64, 3, FURTHER>;
+
+/// A further error term.
+///
+/// Source: IEEE Std 1293-2018, §5.3 (accelerometers: second order, asymmetry); IEEE Std 952-2020, §5
+/// (gyros: acceleration sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect,
+/// time offset).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Term {
+    /// Accelerometers add `q_i f_i²`; q in s²/m.
+    AccelSecondOrder,
+    /// Accelerometers add `q_i |f_i|`: another scale factor down than up.
+    AccelAsymmetry,
+    /// Accelerometers x and y stand away from z by r_x and r_y, in m along body axes: they add row i
+    /// of `([ω̇×] + [ω×]²) r_i`. One lever arm common to all three cannot be told from rest.
+    SizeEffect,
+    /// Accelerometer samples are those of a time this much later than the gyros', in s: where the body
+    /// stays at its place they add `q ḟ = −q (ω − ω_ie) × f`.
+    TimeOffset,
+    /// Gyros add `Q f`, Q row by row, in rad/s per m/s².
+    GSensitivity,
+}
+
+/// How a body moves in a sample, along body axes.
+#[derive(Debug, Clone, Copy)]
+pub struct Sensed {
+    /// Angular rate against inertial space, rad/s.
+    pub rate: Vector3<f64>,
+    /// Angular rate against the Earth, rad/s.
+    pub rate_over_earth: Vector3<f64>,
+    /// Angular acceleration, rad/s².
+    pub angular_acceleration: Vector3<f64>,
+    /// Specific force, m/s².
+    pub force: Vector3<f64>,
+}
+
+impl Term {
+    /// Every term, in the order of the parameters.
+    pub const ALL: [Self; 5] = [
+        Self::AccelSecondOrder,
+        Self::AccelAsymmetry,
+        Self::SizeEffect,
+        Self::TimeOffset,
+        Self::GSensitivity,
+    ];
+
+    /// The name that files and commands use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AccelSecondOrder => "accel-second-order",
+            Self::AccelAsymmetry => "accel-asymmetry",
+            Self::SizeEffect => "size-effect",
+            Self::TimeOffset => "time-offset",
+            Self::GSensitivity => "g-sensitivity",
+        }
+    }
+
+    /// The unit of its parameters in files and reports: its name, and its value in SI.
+    pub fn unit(self) -> (&'static str, f64) {
+        match self {
+            Self::AccelSecondOrder => ("µg/g²", MICRO_G / STANDARD_GRAVITY.powi(2)),
+            Self::AccelAsymmetry => ("ppm", PPM),
+            Self::SizeEffect => ("mm", 1e-3),
+            Self::TimeOffset => ("ms", 1e-3),
+            Self::GSensitivity => ("°/h/g", DEG_PER_H / STANDARD_GRAVITY),
+        }
+    }
+
+    /// 1σ of each of its parameters where nothing better is known, in SI: ten times what precise
+    /// instruments have.
+    pub fn usual_sigma(self) -> f64 {
+        let in_unit = match self {
+            Self::AccelSecondOrder => 100.0,
+            Self::AccelAsymmetry => 100.0,
+            Self::SizeEffect => 100.0,
+            Self::TimeOffset => 10.0,
+            Self::GSensitivity => 1.0,
+        };
+        in_unit * self.unit().1
+    }
+
+    /// Indices of its parameters.
+    pub fn parameters(self) -> std::ops::Range<usize> {
+        let size = |term| match term {
+            Self::AccelSecondOrder | Self::AccelAsymmetry => 3,
+            Self::SizeEffect => 6,
+            Self::TimeOffset => 1,
+            Self::GSensitivity => 9,
+        };
+        let before = Self::ALL.into_iter().take_while(|&term| term != self);
+        let first = before.map(size).sum();
+        first..first + size(self)
+    }
+
+    /// Whose input it changes.
+    pub fn sensor(self) -> Sensor {
+        match self {
+            Self::GSensitivity => Sensor::Gyro,
+            _ => Sensor::Accel,
+        }
+    }
+
+    /// The term of a parameter.
+    pub fn of(parameter: usize) -> Option<Self> {
+        let has = |term: &Self| term.parameters().contains(&parameter);
+        Self::ALL.into_iter().find(has)
+    }
+
+    /// The name of a parameter in files; `None` beyond the last.
+    pub fn parameter_name(parameter: usize) -> Option<String> {
+        let term = Self::of(parameter)?;
+        let k = parameter - term.parameters().start;
+        Some(match term {
+            Self::AccelSecondOrder => format!("accel.second_order.{}", AXES[k]),
+            Self::AccelAsymmetry => format!("accel.asymmetry.{}", AXES[k]),
+            // Accelerometer, then component of its lever arm.
+            Self::SizeEffect => format!("accel.lever_arm.{}{}", AXES[k / 3], AXES[k % 3]),
+            Self::TimeOffset => "accel.time_offset".to_owned(),
+            Self::GSensitivity => format!("gyro.g_sensitivity.{}{}", AXES[k / 3], AXES[k % 3]),
+        })
+    }
+}
+
+impl Sensed {
+    /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter.
+    pub fn response(&self, sensor: Sensor) -> FurtherResponse {
+        let mut response = FurtherResponse::zeros();
+        let f = &self.force;
+        match sensor {
+            Sensor::Gyro => {
+                let first = Term::GSensitivity.parameters().start;
+                for row in 0..3 {
+                    for column in 0..3 {
+                        response[(row, first + 3 * row + column)] = f[column];
+                    }
+                }
+            }
+            Sensor::Accel => {
+                let turning = self.of_lever_arm();
+                for axis in 0..3 {
+                    let at = |term: Term, k: usize| (axis, term.parameters().start + k);
+                    response[at(Term::AccelSecondOrder, axis)] = f[axis] * f[axis];
+                    response[at(Term::AccelAsymmetry, axis)] = f[axis].abs();
+                    if axis < 2 {
+                        for component in 0..3 {
+                            response[at(Term::SizeEffect, 3 * axis + component)] =
+                                turning[(axis, component)];
+                        }
+                    }
+                }
+                response
+                    .column_mut(Term::TimeOffset.parameters().start)
+                    .copy_from(&-self.rate_over_earth.cross(f));
+            }
+        }
+        response
+    }
+
+    /// `[ω̇×] + [ω×]²`.
+    fn of_lever_arm(&self) -> Matrix3<f64> {
+        let rate = self.rate.cross_matrix();
+        self.angular_acceleration.cross_matrix() + rate * rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
+        let sensed = Sensed {
+            rate: Vector3::new(0.1, -0.2, 0.3),
+            rate_over_earth: Vector3::new(0.1, -0.2, 0.3),
+            angular_acceleration: Vector3::new(1.0, 2.0, 3.0),
+            force: Vector3::new(4.0, -5.0, 6.0),
+        };
+        let mut names: Vec<String> = (0..FURTHER).map_while(Term::parameter_name).collect();
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), FURTHER);
+        assert_eq!(Term::parameter_name(FURTHER), None);
+        for parameter in 0..FURTHER {
+            let sensor = Term::of(parameter).unwrap().sensor();
+            for of in Sensor::ALL {
+                let responds = sensed.response(of).column(parameter).norm() > 0.0;
+                assert_eq!(responds, of == sensor, "{parameter}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_accelerometer_on_an_arm_senses_centripetal_and_tangential_acceleration() {
+        // 2 rad/s about z, faster by 3 rad/s², accelerometer x at 0.1 m along x and 0.2 m along y.
+        let sensed = Sensed {
+            rate: Vector3::new(0.0, 0.0, 2.0),
+            rate_over_earth: Vector3::new(0.0, 0.0, 2.0),
+            angular_acceleration: Vector3::new(0.0, 0.0, 3.0),
+            force: Vector3::new(1.0, 0.0, 0.0),
+        };
+        let mut q = FurtherVector::zeros();
+        q[Term::SizeEffect.parameters().start] = 0.1;
+        q[Term::SizeEffect.parameters().start + 1] = 0.2;
+        let added = sensed.response(Sensor::Accel) * q;
+        // −ω² x − ω̇ y along x, nothing along y for the accelerometer x.
+        assert!((added - Vector3::new(-4.0 * 0.1 - 3.0 * 0.2, 0.0, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn samples_of_a_later_time_see_gravity_turned_further() {
+        let rate = Vector3::new(0.0, 0.4, 0.0);
+        let up = |t: f64| crate::attitude::exp(-rate * t) * Vector3::new(0.0, 0.0, 9.8);
+        let sensed = Sensed {
+            rate,
+            rate_over_earth: rate,
+            angular_acceleration: Vector3::zeros(),
+            force: up(1.0),
+        };
+        let offset = 1e-3;
+        let mut q = FurtherVector::zeros();
+        q[Term::TimeOffset.parameters().start] = offset;
+        let added = sensed.response(Sensor::Accel) * q;
+        assert!((up(1.0 + offset) - up(1.0) - added).norm() < 1e-6);
+    }
+}
