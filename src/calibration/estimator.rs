@@ -14,7 +14,7 @@ use super::standstill::velocity_sigma;
 use super::states::ParameterVector;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor, Term};
 use crate::run::Run;
 use crate::run::record::BodyFrame;
 use crate::units::{ARCSEC, DEGREE};
@@ -252,6 +252,17 @@ fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();
     warnings.extend(outcome.observability.warnings(form, &unobserved));
+    let hidden: Vec<String> = outcome
+        .further
+        .unobserved()
+        .filter_map(Term::parameter_name)
+        .collect();
+    if !hidden.is_empty() {
+        warnings.push(format!(
+            "Not observed by this path, σ not even halved: {}.",
+            hidden.join(", ")
+        ));
+    }
     for sensor in Sensor::ALL {
         if run.noise.get(sensor).instability.is_some() {
             warnings.push(format!(

@@ -54,6 +54,12 @@ pub struct Further {
 }
 
 impl Further {
+    /// Indices of the parameters that the run did not observe.
+    pub fn unobserved(&self) -> impl Iterator<Item = usize> + '_ {
+        self.estimated()
+            .filter(|&k| self.sigma[k] > OBSERVED_BELOW * self.prior_sigma[k])
+    }
+
     /// Indices of the parameters that were estimated.
     pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
         (0..FURTHER).filter(|&k| self.prior_sigma[k] > 0.0)

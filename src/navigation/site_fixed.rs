@@ -235,7 +235,7 @@ fn instruments(triads: &PerSensor<Triad>, period: f64) -> Option<PerSensor<Instr
 mod tests {
     use super::*;
     use crate::attitude::log;
-    use crate::imu::{InstallationForm, PARAMETERS, TriadVector};
+    use crate::imu::{FURTHER, InstallationForm, PARAMETERS, TriadVector};
     use approx::assert_relative_eq;
     use nalgebra::SVector;
 
@@ -358,6 +358,40 @@ mod tests {
                     epsilon = 5e-3
                 );
             }
+        }
+    }
+
+    #[test]
+    fn transition_of_further_parameters_is_the_derivative_of_navigation() {
+        let walk = PerSensor::default();
+        let with = |values: FurtherVector| {
+            Navigator::new(&record(), &site(), walk, &triads(), start())
+                .unwrap()
+                .with_further(FurtherTerms {
+                    on: (0..FURTHER).collect(),
+                    values,
+                })
+                .advance(0..SAMPLES)
+        };
+        let nominal = with(FurtherVector::zeros());
+        assert_eq!(nominal.further.len(), FURTHER);
+        for further in &nominal.further {
+            let mut step = FurtherVector::zeros();
+            step[further.parameter] = 1e-6;
+            // δq is true − estimated, so the computed parameter goes the other way.
+            let shifted = |sign: f64| error(&with(-step * sign).state, &nominal.state);
+            let difference = (shifted(1.0) - shifted(-1.0)) / 2e-6;
+            let scale = difference.norm().max(1e-3);
+            assert_relative_eq!(
+                further.column.rows(0, 6).into_owned(),
+                difference.rows(0, 6).into_owned(),
+                epsilon = 1e-3 * scale
+            );
+            assert_relative_eq!(
+                further.column.rows(6, 3).into_owned(),
+                difference.rows(6, 3).into_owned(),
+                epsilon = 0.05 * scale
+            );
         }
     }
 

@@ -11,6 +11,7 @@ mod correlation;
 mod estimates;
 pub mod experiment;
 mod facts;
+mod further;
 pub mod group;
 mod innovations;
 pub mod navigation;

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::Report;
+use super::further;
 use super::group::Group;
 use super::number::{self, count, sigma, three_digits, value};
 use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, Outcome, parameter_name};
@@ -132,6 +133,23 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
         let rows = group.parameters(form).into_iter();
         rows.filter_map(|i| row(group, i)).collect()
     });
+    let of_terms = report.outcome.map_or_else(Vec::new, |outcome| {
+        further::rows(&outcome.further)
+            .into_iter()
+            .map(|row| {
+                let shown = format!("{} ± {}", row.value, row.sigma);
+                vec![
+                    row.name,
+                    shown,
+                    row.unit.to_owned(),
+                    row.prior,
+                    row.sigma,
+                    ratio(row.remaining, 1.0),
+                ]
+            })
+            .collect()
+    });
+    let sections = sections.chain((!of_terms.is_empty()).then_some(of_terms));
     table(&headings, sections)
 }
 

@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
-use super::{Report, navigation, side_by_side};
+use super::{Report, further, navigation, side_by_side};
 use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
@@ -84,6 +84,28 @@ impl Report<'_> {
                     row.push(value(error / s, 1.0));
                 }
                 table.add_row(row);
+            }
+        }
+        if let Some(outcome) = self.outcome {
+            for row in further::rows(&outcome.further) {
+                let mut cells = vec![
+                    if row.first {
+                        row.title.to_owned()
+                    } else {
+                        String::new()
+                    },
+                    row.axis,
+                    row.value,
+                    "±".to_owned(),
+                    row.sigma,
+                    row.unit.to_owned(),
+                    row.prior,
+                    three_digits(1.0 / row.remaining),
+                ];
+                if truth.is_some() {
+                    cells.extend(["–".to_owned(), "–".to_owned()]);
+                }
+                table.add_row(cells);
             }
         }
         align(table)

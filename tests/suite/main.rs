@@ -13,4 +13,5 @@ mod shared;
 mod simulated;
 mod study;
 mod table1;
+mod terms;
 mod velocity;

@@ -1,0 +1,124 @@
+//! Further terms of the instrument: recovered where they are modelled, betrayed where they are not.
+
+use nalgebra::SMatrix;
+use rayon::prelude::*;
+use turncal::calibration::outcome::to_vector;
+use turncal::calibration::{Outcome, estimate, mean_square_interval};
+use turncal::imu::{FURTHER, FurtherVector, InstallationForm, Term};
+use turncal::run::CalibrationRecord;
+use turncal::simulation::{Scenario, Simulated};
+
+use crate::shared::{read, shared};
+
+const FORM: InstallationForm = InstallationForm::General;
+/// Fixed before the first run was made.
+const SEED: u64 = 41;
+
+/// An instrument with one term, a tenth of what is usual before calibration and more than σ after it.
+fn scenario(term: Term) -> Scenario {
+    let mut scenario = Scenario::load("demo").unwrap();
+    for parameter in term.parameters() {
+        scenario.instrument.further_sigma[parameter] = term.usual_sigma();
+    }
+    scenario
+}
+
+/// Squares of the errors of a term's parameters over their σ, of several runs.
+fn squares(term: Term, runs: u64) -> Vec<f64> {
+    let scenario = scenario(term);
+    let trial = |stream| {
+        let Simulated { run, further, .. } = scenario.simulate(SEED, stream).unwrap();
+        let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+        assert!(outcome.converged, "{}: {stream}", term.name());
+        let error = outcome.further.values - further;
+        let normalised = error.component_div(&outcome.further.sigma);
+        assert!(outcome.further.unobserved().next().is_none());
+        term.parameters()
+            .map(|k| normalised[k].powi(2))
+            .collect::<Vec<f64>>()
+    };
+    let trials: Vec<Vec<f64>> = (0..runs).into_par_iter().map(trial).collect();
+    trials.concat()
+}
+
+#[test]
+fn each_term_is_recovered_as_well_as_its_sigma_says() {
+    for (term, runs) in [
+        (Term::AccelSecondOrder, 4),
+        (Term::AccelAsymmetry, 4),
+        (Term::SizeEffect, 4),
+        (Term::TimeOffset, 8),
+        (Term::GSensitivity, 4),
+    ] {
+        let squares = squares(term, runs);
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        // Parameters of one run are correlated, so the interval is that of fewer numbers.
+        let (low, high) = mean_square_interval(squares.len() / 3 + 1, 0.002);
+        println!(
+            "{}: mean square over σ² {mean:.2} of {}",
+            term.name(),
+            squares.len()
+        );
+        assert!((low..high).contains(&mean), "{}: {mean}", term.name());
+    }
+}
+
+fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
+    let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
+    run.further_sigma = FurtherVector::zeros();
+    let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+    let error = outcome.estimate.vector() - to_vector(&truth);
+    let normalised = error.component_div(&outcome.estimate.sigma());
+    (outcome, normalised)
+}
+
+#[test]
+fn a_term_that_is_not_modelled_spoils_parameters_and_shows_in_the_innovations() {
+    for term in Term::ALL {
+        let (outcome, normalised) = without_terms(term);
+        let nis = outcome.consistency.all.mean;
+        println!("{}: NIS {nis:.2}, {:.1} σ", term.name(), normalised.amax());
+        assert!(normalised.amax() > 5.0, "{}", term.name());
+        assert!(nis > 1.2, "{}: {nis}", term.name());
+        assert!(outcome.warnings.iter().any(|w| w.contains("NIS")));
+    }
+}
+
+#[test]
+fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
+    let Some(directory) = shared("nineteen-position-full") else {
+        return;
+    };
+    let mut run = read(&directory);
+    for term in [Term::AccelSecondOrder, Term::SizeEffect, Term::TimeOffset] {
+        run.switch_on(term);
+    }
+    let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+    let truth = CalibrationRecord::read(&directory.join("truth.json")).unwrap();
+    let truth = turncal::calibration::triads_of(&truth, &run.nominal, FORM);
+    let error = outcome.estimate.vector() - to_vector(&truth);
+    for index in outcome.estimate.estimated() {
+        let sigmas = error[index] / outcome.estimate.sigma()[index];
+        assert!(sigmas.abs() < 4.0, "{index}: {sigmas}");
+    }
+    // truth.json: f − Ka2 f², lever arms subtracted, f − tGA ω × f.
+    let g = |micro_g: f64| -micro_g * 9.797e-6 / 9.797f64.powi(2);
+    let arms = [-0.01, -0.02, -0.03, -0.04, -0.05, -0.06];
+    let mut expected = FurtherVector::zeros();
+    for (k, value) in [10.0, 20.0, 30.0].map(g).into_iter().enumerate() {
+        expected[Term::AccelSecondOrder.parameters().start + k] = value;
+    }
+    for (k, value) in arms.into_iter().enumerate() {
+        expected[Term::SizeEffect.parameters().start + k] = value;
+    }
+    expected[Term::TimeOffset.parameters().start] = 0.005;
+    for k in 0..FURTHER {
+        let sigma = outcome.further.sigma[k];
+        let off = (outcome.further.values[k] - expected[k]).abs();
+        assert!(
+            off <= 4.0 * sigma,
+            "{:?}: {off} of σ {sigma}",
+            Term::parameter_name(k)
+        );
+    }
+}
