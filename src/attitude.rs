@@ -78,6 +78,14 @@ pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
     ]
 }
 
+/// The smallest turn, as a rotation vector, that brings a direction to Up.
+pub fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
+    let across = direction.cross(&Vector3::z());
+    let angle = across.norm().atan2(direction.z);
+    // Head over heels has no smallest turn; any will do.
+    across.try_normalize(0.0).unwrap_or(Vector3::x()) * angle
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

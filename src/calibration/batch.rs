@@ -25,6 +25,7 @@ use super::states::{
     sensor_and_parameter,
 };
 use crate::attitude::{exp, log};
+use crate::imu::Triad;
 use crate::navigation::{Block, BlockMatrix, Navigator, State};
 use crate::run::Run;
 
@@ -77,6 +78,8 @@ pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, Calibrat
 
 struct Batch<'a> {
     problem: &'a Problem<'a>,
+    /// The accelerometers where the outcome's last pass linearised.
+    accel: Triad,
     navigator: Navigator<'a>,
     information: Information,
 }
@@ -90,6 +93,7 @@ impl<'a> Batch<'a> {
             .ok_or_else(|| singular(&at.triads))?;
         Ok(Self {
             problem,
+            accel: at.triads.accel,
             navigator,
             information: Information::new(
                 problem,
@@ -114,7 +118,7 @@ impl<'a> Batch<'a> {
         mut accepted: impl FnMut() -> bool,
     ) -> Result<(), CalibrationError> {
         let variance = self.problem.variance;
-        let tied = State::at_rest(standing.attitude.unwrap_or(self.navigator.state.attitude));
+        let tied = standing.tied(&self.navigator.state, &self.accel);
         self.information.refer(&self.navigator.state, &tied);
         self.navigator.state = tied;
 

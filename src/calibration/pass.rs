@@ -309,9 +309,7 @@ impl<'a, const N: usize> Pass<'a, N> {
     ) -> Result<(), CalibrationError> {
         let variance = self.problem.variance;
         if matches!(self.mode, Mode::Held(_)) {
-            // The table's own mean reading is within arc seconds of the truth in every pass, so what
-            // noise adds up to over a long record never leaves the linear range.
-            let tied = State::at_rest(standing.attitude.unwrap_or(self.navigator.state.attitude));
+            let tied = standing.tied(&self.navigator.state, &self.at.triads.accel);
             self.filter.refer(&self.navigator.state, &tied);
             self.navigator.state = tied;
         }

@@ -7,7 +7,7 @@ use super::super::outcome::{from_vector, to_vector};
 use super::super::pass::{Linearisation, singular};
 use super::equations::Equations;
 use super::heading::{Gyrocompass, Rest, gyrocompass};
-use crate::attitude::exp;
+use crate::attitude::{exp, tilt};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{FurtherVector, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::{Block, Navigator, State};
@@ -193,12 +193,4 @@ impl Chain {
         }
         Ok(equations)
     }
-}
-
-/// The smallest turn that brings a direction to Up.
-fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
-    let across = direction.cross(&Vector3::z());
-    let angle = across.norm().atan2(direction.z);
-    // Head over heels has no smallest turn; any will do.
-    across.try_normalize(0.0).unwrap_or(Vector3::x()) * angle
 }
