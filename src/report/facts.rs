@@ -125,15 +125,15 @@ pub(super) fn model(report: &Report) -> Markup {
     rows.push(("body frame", report.run.body_frame().words().to_owned()));
     if let Some(outcome) = report.outcome {
         let held = outcome.passes.iter().filter(|pass| !pass.live).count();
-        let live = if held < outcome.passes.len() {
-            "a live pass and "
+        let passes = if held < outcome.passes.len() {
+            format!("one live pass and {held} held")
         } else {
-            ""
+            format!("{held} held passes")
         };
         rows.push((
             "filter",
             format!(
-                "error-state EKF, {live}{held} held; velocity at standstill {} mm/s (1σ, white)",
+                "error-state EKF, {passes}; velocity at standstill {} mm/s (1σ, white)",
                 sigma(outcome.velocity_sigma / MILLISECOND)
             ),
         ));
