@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
 use turncal::calibration::{self, CalibrationError, ClosedForm, Outcome, in_body_frame, triads_of};
@@ -23,6 +24,7 @@ use super::progress::Activity;
 #[command(after_help = "Examples:
   turncal calibrate my-run/run.toml
   turncal calibrate my-run/run.toml -o result --truth my-run/truth.json
+  turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale")]
 pub struct Calibrate {
     /// The run's run.toml
@@ -125,6 +127,11 @@ enum Result {
 
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
+        if let (Method::SixPosition, Some(Aiding::Velocity)) = (self.method, self.aiding) {
+            let message = "--method six-position takes attitudes from the table's log and observes no \
+                           velocity; leave out --aiding velocity, or use --method ekf\n";
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let mut run = Run::read(&self.run)?;
         match self.aiding {

@@ -22,7 +22,7 @@ pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
 pub(super) const QUIET: RGBColor = RGBColor(110, 110, 110);
 /// Grid lines.
 pub(super) const GRID: RGBColor = RGBColor(218, 218, 214);
-/// The time during which the table stands.
+/// The time of a dwell.
 pub(super) const DWELL: RGBColor = RGBColor(243, 243, 238);
 /// Bands of ±3σ.
 pub(super) const BAND: RGBColor = RGBColor(196, 214, 228);

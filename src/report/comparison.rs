@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::canvas::{Area, DrawError, INK, Pen, QUIET};
 use super::group::{Group, axis_name, short_name};
-use super::panel::{Margins, Mark, Panel};
+use super::panel::{Margins, Mark, Panel, all_fixed};
 use super::{Figure, Report, ReportError};
 use crate::calibration::outcome::Estimate;
 use crate::calibration::states::{ParameterVector, sensor_and_parameter};
@@ -51,7 +51,11 @@ fn error_panel(
         return Ok(());
     };
     let form = first.form();
-    let indices = group.parameters(form);
+    let mut indices = group.parameters(form);
+    indices.retain(|&i| methods.iter().any(|(_, m)| m.covariance[(i, i)] > 0.0));
+    if indices.is_empty() {
+        return all_fixed(area, group);
+    }
     let unit = group.unit_value();
     let shown: Vec<(&str, Vec<(f64, f64)>)> = methods
         .iter()

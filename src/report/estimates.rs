@@ -35,9 +35,13 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
         Some(truth) => (truth, "truth"),
         None => (outcome.estimate.vector(), "final value"),
     };
+    let live = if outcome.live_history.is_empty() {
+        ""
+    } else {
+        "; thin line: the live pass, from the coarse start on"
+    };
     let caption = format!(
-        "Thick line: estimate of the last pass less {less}; band: its ±3σ; thin line: the live pass, \
-         from the coarse start on. The vertical axis is linear within the final σ of the group and \
+        "Thick line: estimate of the last pass less {less}; band: its ±3σ{live}. The vertical axis is linear within the final σ of the group and \
          logarithmic beyond, and ends at {EXTENT} times that σ; what lies beyond is drawn at its \
          edge. The thick line should stay in its band."
     );

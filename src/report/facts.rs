@@ -83,7 +83,7 @@ pub(super) fn run(run: &Run) -> Markup {
                 sigma(table.reading_sigma / ARCSEC)
             ),
         ),
-        None => text("turntable", "no record".to_owned()),
+        None => text("turntable", "its log was not used".to_owned()),
     });
     facts(rows)
 }
@@ -125,11 +125,15 @@ pub(super) fn model(report: &Report) -> Markup {
     rows.push(("body frame", report.run.body_frame().words().to_owned()));
     if let Some(outcome) = report.outcome {
         let held = outcome.passes.iter().filter(|pass| !pass.live).count();
+        let passes = if held < outcome.passes.len() {
+            format!("one live pass and {held} held")
+        } else {
+            format!("{held} held passes")
+        };
         rows.push((
             "filter",
             format!(
-                "error-state EKF, {} passes, {held} of them held; velocity at standstill {} mm/s (1σ, white)",
-                outcome.passes.len(),
+                "error-state EKF, {passes}; velocity at standstill {} mm/s (1σ, white)",
                 sigma(outcome.velocity_sigma / MILLISECOND)
             ),
         ));
@@ -137,7 +141,18 @@ pub(super) fn model(report: &Report) -> Markup {
     if let Some(ClosedForm { note, .. }) = report.closed_form {
         rows.push(("closed form", note.to_owned()));
     }
-    rows.push(("dwells", count(report.dwells.len())));
+    let (observed, found_in) = match report.run.table {
+        Some(_) => (
+            "standstill and the attitude of the table",
+            "the table's log",
+        ),
+        None => ("standstill alone", "the IMU's own readings"),
+    };
+    if report.outcome.is_some() {
+        rows.push(("observed", observed.to_owned()));
+    }
+    let dwells = count(report.dwells.len());
+    rows.push(("dwells", format!("{dwells}, found in {found_in}")));
     facts(
         rows.into_iter()
             .map(|(name, value)| (name.to_owned(), value)),

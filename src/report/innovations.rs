@@ -29,13 +29,20 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
     if kinds.is_empty() {
         return Ok(None);
     }
+    let nis: Vec<String> = [
+        ("velocity", &outcome.consistency.velocity),
+        ("table attitude", &outcome.consistency.table),
+    ]
+    .into_iter()
+    .filter(|(_, nis)| nis.count > 0)
+    .map(|(name, nis)| sentence(name, nis))
+    .collect();
     let caption = format!(
         "Innovations of the last pass in units of their own σ; they should look like white noise of \
          unit variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the \
          extremes of each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more. \
-         {} {}",
-        sentence("velocity", &outcome.consistency.velocity),
-        sentence("table attitude", &outcome.consistency.table),
+         {}",
+        nis.join(" ")
     );
     let size = (1200, 40 + 250 * kinds.len() as u32);
     let figure = Figure::draw("innovations.svg", "Innovations", caption, size, |area| {
@@ -91,9 +98,6 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
 }
 
 fn sentence(name: &str, nis: &Nis) -> String {
-    if nis.count == 0 {
-        return format!("No {name} was observed.");
-    }
     format!(
         "NIS of {name} {} (95 % interval {}–{}, {} scalars).",
         number::value(nis.mean, 0.01),

@@ -9,6 +9,7 @@ use super::axis::Axis;
 use super::canvas::{
     Area, BAND, DWELL, DrawError, FINE, GRID, INK, LETTER, Pen, QUIET, font, px, write,
 };
+use super::group::Group;
 
 /// A mark at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +40,7 @@ pub(super) struct Panel<'a, 'b> {
 }
 
 impl<'a, 'b> Panel<'a, 'b> {
-    /// Lays out a panel and shades the time during which the table stands.
+    /// Lays out a panel and shades the dwells.
     pub(super) fn new(
         area: &'a Area<'b>,
         title: &str,
@@ -217,6 +218,12 @@ impl<'a, 'b> Panel<'a, 'b> {
             .copied()
             .filter(move |(x, y)| *x >= low && *x <= high && y.is_finite())
     }
+}
+
+/// In the place of a group of which nothing was estimated.
+pub(super) fn all_fixed(area: &Area, group: Group) -> Result<(), DrawError> {
+    let text = format!("{}: all fixed", group.title());
+    write(area, &text, (56.0, 6.0), (HPos::Left, VPos::Top), &INK, 1.0)
 }
 
 /// Ascending heights moved until they are `spacing` apart, within the frame while there is room.

@@ -28,7 +28,7 @@ type Line = Vec<(f64, f64)>;
 pub(super) fn figure(report: &Report) -> Result<Figure, ReportError> {
     let table = report.run.table.as_ref();
     let mut caption = String::from(
-        "Rates are the raw gyro outputs about the body axes. Grey: the table stands, dwells are \
+        "Rates are the raw gyro outputs about the body axes. Grey: dwells, \
          numbered where there is room.",
     );
     if table.is_some() {

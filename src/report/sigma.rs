@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::canvas::{INK, Pen, envelope};
 use super::group::{Group, axis_name};
-use super::panel::{Margins, Panel};
+use super::panel::{Margins, Panel, all_fixed};
 use super::{Figure, Report, ReportError};
 use crate::calibration::outcome::Outcome;
 
@@ -19,7 +19,7 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
     let truth = report.truth_vector();
     let mut caption = String::from(
         "1σ of every parameter in the last pass, one panel for each group, logarithmic. \
-         Grey: the table stands; white: it turns. A line that stays level was not observed.",
+         Grey: standing; white: turning. A line that stays level was not observed.",
     );
     if truth.is_some() {
         caption.push_str(
@@ -34,6 +34,10 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
         |area| {
             for (group, area) in Group::all().zip(area.split_evenly((2, 3))) {
                 let indices = group.estimated(&outcome.estimate);
+                if indices.is_empty() {
+                    all_fixed(&area, group)?;
+                    continue;
+                }
                 let lines: Vec<Vec<(f64, f64)>> = indices
                     .iter()
                     .map(|&i| {

@@ -60,8 +60,8 @@ pub(super) fn groups(report: &Report) -> Markup {
     let rows = Group::all().map(|group| {
         let mut row = vec![group.title(), group.unit().to_owned()];
         for (_, estimate) in &methods {
-            let indices = group.parameters(estimate.form());
-            let claimed = group.spread(&estimate.sigma(), &group.estimated(estimate));
+            let indices = group.estimated(estimate);
+            let claimed = group.spread(&estimate.sigma(), &indices);
             row.push(claimed.map_or("–".to_owned(), |(_, rms)| sigma(rms)));
             if let Some(truth) = &truth {
                 let error = group.spread(&(estimate.vector() - truth), &indices);
@@ -111,11 +111,11 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
             group.unit().to_owned(),
         ];
         if let Some(prior) = &prior {
-            row.push(three_digits(prior[i] / unit));
             row.extend(if fixed {
-                ["–".to_owned(), "–".to_owned()]
+                ["–", "–", "–"].map(str::to_owned)
             } else {
-                [sigma(s), ratio(posterior[i], prior[i])]
+                let prior = (three_digits(prior[i] / unit), ratio(posterior[i], prior[i]));
+                [prior.0, sigma(s), prior.1]
             });
         }
         if let Some(truth) = &truth {
@@ -208,12 +208,9 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
         ("zero velocity", outcome.consistency.velocity),
         ("table attitude", outcome.consistency.table),
     ]
+    .into_iter()
+    .filter(|(_, nis)| nis.count > 0)
     .map(|(name, nis)| {
-        if nis.count == 0 {
-            return [name, "not observed", "", "", "0"]
-                .map(str::to_owned)
-                .to_vec();
-        }
         let (low, high) = nis.interval;
         let verdict = if nis.mean < low {
             ", below"
@@ -238,7 +235,7 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
             "lag-one correlation",
             "scalars",
         ],
-        [rows.to_vec()],
+        [rows.collect()],
     )
 }
 

@@ -136,11 +136,9 @@ impl Report<'_> {
             let mut claimed = Vec::new();
             for (_, estimate) in &methods {
                 let indices = group.estimated(estimate);
-                let error = estimate.vector() - truth;
-                let (largest, rms) = group.spread(&error, &indices).unwrap_or_default();
-                let (_, sigma) = group
-                    .spread(&estimate.sigma(), &indices)
-                    .unwrap_or_default();
+                let of = |v| group.spread(&v, &indices).unwrap_or((f64::NAN, f64::NAN));
+                let (largest, rms) = of(estimate.vector() - truth);
+                let (_, sigma) = of(estimate.sigma());
                 claimed.push(sigma);
                 row.extend([largest, rms, sigma].map(three_digits));
             }
@@ -163,16 +161,24 @@ fn passes(outcome: &Outcome) -> String {
             value(nis.interval.1, 0.01)
         )
     };
+    let observed = [
+        ("velocity", consistency.velocity),
+        ("table", consistency.table),
+    ];
+    let observed: Vec<String> = observed
+        .iter()
+        .filter(|(_, of)| of.count > 0)
+        .map(|(name, of)| format!("{name} {}", nis(of)))
+        .collect();
     format!(
-        "{} after {} passes; NIS with its 95 % interval: velocity {}, table {}",
+        "{} after {} passes; NIS with its 95 % interval: {}",
         if outcome.converged {
             "converged"
         } else {
             "NOT CONVERGED"
         },
         outcome.passes.len(),
-        nis(&consistency.velocity),
-        nis(&consistency.table),
+        observed.join(", "),
     )
 }
 

@@ -1,8 +1,9 @@
 //! What holds of every report, whatever it was given.
 
+use super::group::Group;
 use super::synthetic::synthetic;
 use super::*;
-use crate::calibration::outcome::{Nis, parameter_name};
+use crate::calibration::outcome::{Nis, Observation, parameter_name};
 use crate::calibration::states::{PARAMETERS, ParameterMatrix};
 use crate::imu::InstallationForm;
 use crate::navigation::NearPole;
@@ -151,16 +152,55 @@ fn a_closed_form_alone_is_reported() {
 fn a_run_without_a_table_is_reported() {
     let mut made_up = synthetic(InstallationForm::General);
     made_up.run.table = None;
-    made_up.outcome.innovations.clear();
+    made_up.outcome.live_history.clear();
+    made_up.outcome.passes.retain(|pass| !pass.live);
+    let innovations = &mut made_up.outcome.innovations;
+    innovations.retain(|i| i.observation == Observation::Velocity);
     made_up.outcome.consistency.table = Nis {
         mean: f64::NAN,
         count: 0,
         interval: (f64::NAN, f64::NAN),
         lag_one: f64::NAN,
     };
-    let files = written(&made_up.report());
+    let report = made_up.report();
+    let files = written(&report);
     assert_sound(&files);
-    assert!(!names(&files).contains(&"innovations.svg"));
+    let page = page::page(&report, &report.figures().unwrap());
+    for absent in ["table attitude", "live"] {
+        assert!(!page.contains(absent), "{absent}");
+    }
+    assert!(!report.summary().contains("table –"));
+}
+
+#[test]
+fn a_group_of_fixed_parameters_has_neither_error_nor_axes() {
+    let mut made_up = synthetic(InstallationForm::ThreeAngle);
+    let mut groups = Group::all();
+    let installation = groups.find(|group| group.title() == "accel installation E");
+    let fixed = installation
+        .unwrap()
+        .parameters(InstallationForm::ThreeAngle);
+    for &i in &fixed {
+        for covariance in [
+            &mut made_up.outcome.estimate.covariance,
+            &mut made_up.closed.covariance,
+        ] {
+            covariance.row_mut(i).fill(0.0);
+            covariance.column_mut(i).fill(0.0);
+        }
+    }
+    let report = made_up.report();
+    let files = written(&report);
+    assert_sound(&files);
+    for name in ["sigma.svg", "comparison.svg"] {
+        let (_, text) = files.iter().find(|(file, _)| file == name).unwrap();
+        assert!(text.contains("accel installation E: all fixed"), "{name}");
+    }
+    let row = report.summary();
+    let row = row
+        .lines()
+        .rfind(|line| line.contains("accel installation E"));
+    assert!(row.unwrap().contains("–"), "{row:?}");
 }
 
 #[test]

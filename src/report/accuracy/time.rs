@@ -70,18 +70,24 @@ fn panel(area: &Area, of: &GroupAccuracy) -> Result<(), DrawError> {
     panel.line(&bound, Pen::dashed(INK, 1.25))?;
     panel.line(&closed, Pen::nth(1, 1.0))?;
     panel.marks(&closed, Mark::Ring, Pen::nth(1, 1.25))?;
-    let (below, above) = (((4.0, 7.0), VPos::Top), ((4.0, -6.0), VPos::Bottom));
+    let below = ((4.0, 7.0), (HPos::Right, VPos::Top));
+    let above = ((4.0, -6.0), (HPos::Right, VPos::Bottom));
+    let beyond = ((4.0, -4.0), (HPos::Left, VPos::Bottom));
+    let under_filter = |p: &(f64, f64)| filter.last().is_some_and(|end| p.1 < end.1);
     let together = filter.last().zip(bound.last());
     let together = together.is_some_and(|(a, b)| (a.1 / b.1).ln().abs() < TOGETHER.ln());
     let mut names = vec![(&closed, "closed form", below)];
     if together {
-        names.push((&filter, "EKF and bound", below));
+        // Where the closed form runs below, there is room above it.
+        let free = closed.iter().all(under_filter);
+        let free = free && !closed.is_empty();
+        names.push((&filter, "EKF and bound", if free { beyond } else { below }));
     } else {
         names.extend([(&filter, "EKF", above), (&bound, "bound", below)]);
     }
-    for (points, name, (moved, v)) in names {
+    for (points, name, (moved, anchor)) in names {
         if let Some(&end) = points.last() {
-            panel.text(end, moved, name, (HPos::Right, v))?;
+            panel.text(end, moved, name, anchor)?;
         }
     }
     panel.finish()

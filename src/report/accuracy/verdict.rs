@@ -311,7 +311,7 @@ fn gain(accuracy: &Accuracy) -> Vec<Sentence> {
         ),
         (
             std::cmp::Ordering::Equal,
-            format!("No difference shown between the EKF in {filter} and the closed form in {closed}, by a factor of"),
+            format!("No difference is shown between the EKF in {filter} and the closed form in {closed}; the gain is"),
         ),
         (
             std::cmp::Ordering::Less,

@@ -3,11 +3,11 @@
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::axis::Axis;
-use super::super::canvas::{Area, DrawError};
+use super::super::canvas::{Area, DrawError, write};
+use super::super::number::{sigma, three_digits};
 use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
 use super::distribution::pen;
-use super::tables::nmile;
 use super::{estimator_name, in_general, miles, situation_name};
 use crate::calibration::Group;
 use crate::study::Experiment;
@@ -16,6 +16,9 @@ use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
 /// Half the width of a bar, and from one to the next, in places of the axis.
 const HALF: f64 = 0.12;
 const APART: f64 = 0.28;
+/// Where the names of the bars begin, and from one to the next, in shown pixels.
+const LEGEND: f64 = 650.0;
+const NAME: f64 = 180.0;
 
 pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let names: Vec<String> = Estimator::ALL
@@ -24,7 +27,8 @@ pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let caption = format!(
         "Root mean square of the position error at the end that each group would make alone, and of all \
          together, from the claimed covariance in the general form, and of the errors there were; \
-         logarithmic, the same axis for both. Bars from left to right: {}.",
+         logarithmic, the same axis for both. Bars from left to right: {}; one without a number is \
+         less than the axis shows.",
         names.join(", ")
     );
     let shown: Vec<&Navigated> = experiment
@@ -51,7 +55,7 @@ pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
         (1200, 360 * rows as u32),
         |area| {
             for (navigated, area) in shown.iter().zip(area.split_evenly((rows, 1))) {
-                panel(&area, navigated, y.clone())?;
+                panel(&area, experiment, navigated, y.clone())?;
             }
             Ok(())
         },
@@ -68,7 +72,12 @@ fn heights(worth: &Worth) -> Vec<f64> {
         .collect()
 }
 
-fn panel(area: &Area, navigated: &Navigated, y: Axis) -> Result<(), DrawError> {
+fn panel(
+    area: &Area,
+    experiment: &Experiment,
+    navigated: &Navigated,
+    y: Axis,
+) -> Result<(), DrawError> {
     let all = ["all, claimed", "all, actual"].map(str::to_owned);
     let x = Axis::places(Group::all().map(Group::title).chain(all));
     let foot = y.low();
@@ -90,6 +99,10 @@ fn panel(area: &Area, navigated: &Navigated, y: Axis) -> Result<(), DrawError> {
         let Some(worth) = in_general(navigated, estimator) else {
             continue;
         };
+        let name = format!("■ {}", estimator_name(experiment, estimator));
+        let place = (LEGEND + NAME * n as f64, 6.0);
+        let color = pen(estimator).color;
+        write(area, &name, place, (HPos::Left, VPos::Top), &color, 1.0)?;
         for (place, height) in heights(worth).into_iter().enumerate() {
             let x = place as f64 + APART * (n as f64 - 1.0);
             let (left, right) = (x - HALF, x + HALF);
@@ -110,9 +123,14 @@ fn panel(area: &Area, navigated: &Navigated, y: Axis) -> Result<(), DrawError> {
             if height < foot {
                 continue;
             }
-            let metres = height * crate::units::NAUTICAL_MILE;
+            // Three digits of a small number would not fit above its bar.
+            let number = if height < 1.0 {
+                sigma(height)
+            } else {
+                three_digits(height)
+            };
             let above = (HPos::Center, VPos::Bottom);
-            panel.text((x, height_shown), (0.0, -3.0), &nmile(metres), above)?;
+            panel.text((x, height_shown), (0.0, -3.0), &number, above)?;
         }
     }
     panel.finish()

@@ -76,6 +76,8 @@ fn panel(
     )?;
     let noise = miles(navigated.noise.median);
     panel.line(&[(noise, -0.5), (noise, top)], Pen::dashed(QUIET, 1.25))?;
+    let left_of_it = (HPos::Right, VPos::Bottom);
+    panel.text((noise, -0.5), (-4.0, -3.0), "noise alone", left_of_it)?;
     for (place, worth) in methods.iter().enumerate() {
         boxed(&mut panel, place as f64, worth)?;
     }

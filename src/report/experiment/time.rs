@@ -16,7 +16,8 @@ const LEAST: f64 = 0.01;
 pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let caption = String::from(
         "Median over all instruments of the horizontal position error, logarithmic, the same axes for \
-         all. Colour: what calibrated; solid: general form, dashed: six-angle, dotted: three-angle.",
+         all. Colour: what calibrated; solid: general form, dashed: six-angle, dotted: three-angle. \
+         The lines of general and six-angle lie upon each other where both forms give the same.",
     );
     let ends = experiment.navigations.iter().flat_map(|n| &n.methods);
     let points = ends.flat_map(line).map(|p| p.1).filter(|y| *y > LEAST);
