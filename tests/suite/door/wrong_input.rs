@@ -195,7 +195,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
         (
             "[standstill]",
             "[imu.terms]\nlever_arm = { sigma = 0.1 }\n[standstill]",
-            "lever_arm & not modelled yet & 0.1.0",
+            "lever_arm & unknown field & size-effect",
         ),
         (
             "position_sigma_m = 1.0",
