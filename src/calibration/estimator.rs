@@ -110,7 +110,7 @@ pub fn estimate(
         passes,
         warnings: run.notes.clone(),
     };
-    outcome.warnings.extend(warnings(run, &outcome));
+    outcome.warnings.extend(warnings(&outcome));
     Ok(outcome)
 }
 
@@ -236,7 +236,7 @@ fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
     }
 }
 
-fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
+fn warnings(outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
     if !outcome.converged {
         warnings.push(format!(
@@ -262,18 +262,6 @@ fn warnings(run: &Run, outcome: &Outcome) -> Vec<String> {
             "Not observed by this path, σ not even halved: {}.",
             hidden.join(", ")
         ));
-    }
-    for sensor in Sensor::ALL {
-        if run.noise.get(sensor).instability.is_some() {
-            warnings.push(format!(
-                "The noise figures state a bias instability of the {}, for which the filter has no \
-                 state yet: σ do not contain it.",
-                match sensor {
-                    Sensor::Gyro => "gyros",
-                    Sensor::Accel => "accelerometers",
-                }
-            ));
-        }
     }
     if let Some(test) = outcome.form_test.filter(FormTest::rejects) {
         warnings.push(format!(

@@ -4,11 +4,11 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::observability::AttitudeCovariance;
 use super::states::{
-    ATTITUDE, FURTHER_PARAMETER, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS, POSITION,
-    ParameterMatrix, ParameterVector, TABLE, VELOCITY,
+    ATTITUDE, DRIFT, FURTHER_PARAMETER, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS,
+    POSITION, ParameterMatrix, ParameterVector, STATES_WITH_DRIFT, TABLE, VELOCITY,
 };
 use crate::attitude::{exp, log};
-use crate::imu::{FurtherVector, PARAMETERS as PER_TRIAD, PerSensor};
+use crate::imu::{FurtherVector, Instability, PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, State};
 
 const GYRO: usize = PARAMETER;
@@ -44,11 +44,13 @@ impl Sight {
     }
 }
 
-/// Mean and covariance of the errors: N is [`STATES`], or [`ALL_STATES`] with further terms.
+/// Mean and covariance of the errors: N is [`STATES`](super::states::STATES), or more where
+/// biases wander or further terms are on.
 #[derive(Debug, Clone)]
 pub(super) struct Filter<const N: usize> {
     x: SVector<f64, N>,
     p: SMatrix<f64, N, N>,
+    instability: PerSensor<Option<Instability>>,
 }
 
 /// Uncertainty at the first sample, 1σ.
@@ -92,12 +94,41 @@ impl<const N: usize> Filter<N> {
             set(POSITION, POSITION, start.position);
             set(TABLE, TABLE, start.table);
         }
-        Self { x, p }
+        Self {
+            x,
+            p,
+            instability: PerSensor::default(),
+        }
+    }
+
+    /// The same with biases that wander as first-order Gauss–Markov processes (Brown and Hwang,
+    /// *Introduction to Random Signals*, 4th ed., §3.8).
+    pub fn with_drift(mut self, instability: PerSensor<Option<Instability>>) -> Self {
+        self.instability = instability;
+        for (state, instability, _) in self.drifts() {
+            self.p[(state, state)] = instability.sigma.powi(2);
+        }
+        self
+    }
+
+    /// Each wandering bias: its state, how it wanders, and the parameter that is its constant part.
+    fn drifts(&self) -> impl Iterator<Item = (usize, Instability, usize)> + use<N> {
+        let instability = self.instability;
+        let states = if N >= STATES_WITH_DRIFT { 0..6 } else { 0..0 };
+        states.filter_map(move |k| {
+            let (sensor, first) = if k < 3 {
+                (Sensor::Gyro, GYRO)
+            } else {
+                (Sensor::Accel, ACCEL)
+            };
+            let constant = first + PER_TRIAD - 3 + k % 3;
+            Some((DRIFT + k, (*instability.get(sensor))?, constant))
+        })
     }
 
     /// The same with further parameters: mean of their error, and σ.
     pub fn with_further(mut self, mean: &FurtherVector, sigma: &FurtherVector) -> Self {
-        for k in 0..N - FURTHER_PARAMETER {
+        for k in 0..N.saturating_sub(FURTHER_PARAMETER) {
             let state = FURTHER_PARAMETER + k;
             self.x[state] = mean[k];
             self.p[(state, state)] = sigma[k].powi(2);
@@ -109,25 +140,39 @@ impl<const N: usize> Filter<N> {
     /// `Φ P Φᵀ + Q` only the rows and columns of the navigation errors change.
     pub fn propagate(&mut self, block: &Block) {
         let PerSensor { gyro, accel } = &block.parameters;
+        // A bias does the same whether it wanders or stays.
+        let of_bias = |constant: usize| -> SVector<f64, NAVIGATION> {
+            if constant < ACCEL {
+                gyro.column(constant - GYRO).into_owned()
+            } else {
+                accel.column(constant - ACCEL).into_owned()
+            }
+        };
+        let drifts = self
+            .drifts()
+            .map(|(state, _, constant)| (state, of_bias(constant)));
+        let further = block
+            .further
+            .iter()
+            .map(|further| (FURTHER_PARAMETER + further.parameter, further.column));
+        let more: Vec<(usize, SVector<f64, NAVIGATION>)> = drifts.chain(further).collect();
         let mut x = block.navigation * self.x.fixed_rows::<NAVIGATION>(0)
             + gyro * self.x.fixed_rows::<PER_TRIAD>(GYRO)
             + accel * self.x.fixed_rows::<PER_TRIAD>(ACCEL);
         let mut rows = block.navigation * self.p.fixed_view::<NAVIGATION, N>(0, 0)
             + gyro * self.p.fixed_view::<PER_TRIAD, N>(GYRO, 0)
             + accel * self.p.fixed_view::<PER_TRIAD, N>(ACCEL, 0);
-        for further in &block.further {
-            let state = FURTHER_PARAMETER + further.parameter;
-            x += further.column * self.x[state];
-            rows += further.column * self.p.row(state);
+        for (state, column) in &more {
+            x += column * self.x[*state];
+            rows += column * self.p.row(*state);
         }
         let mut corner = rows.fixed_view::<NAVIGATION, NAVIGATION>(0, 0)
             * block.navigation.transpose()
             + rows.fixed_view::<NAVIGATION, PER_TRIAD>(0, GYRO) * gyro.transpose()
             + rows.fixed_view::<NAVIGATION, PER_TRIAD>(0, ACCEL) * accel.transpose()
             + block.noise;
-        for further in &block.further {
-            let state = FURTHER_PARAMETER + further.parameter;
-            corner += rows.column(state) * further.column.transpose();
+        for (state, column) in &more {
+            corner += rows.column(*state) * column.transpose();
         }
         self.x.fixed_rows_mut::<NAVIGATION>(0).copy_from(&x);
         self.p
@@ -139,6 +184,18 @@ impl<const N: usize> Filter<N> {
                 self.p[(moving, constant)] = covariance;
                 self.p[(constant, moving)] = covariance;
             }
+        }
+        self.wander(block.duration);
+    }
+
+    /// Wandering biases forget as time goes by, and are driven.
+    fn wander(&mut self, duration: f64) {
+        for (state, instability, _) in self.drifts() {
+            let keep = (-duration / instability.correlation_time).exp();
+            self.x[state] *= keep;
+            self.p.row_mut(state).scale_mut(keep);
+            self.p.column_mut(state).scale_mut(keep);
+            self.p[(state, state)] += instability.sigma.powi(2) * (1.0 - keep * keep);
         }
     }
 
@@ -226,7 +283,8 @@ impl<const N: usize> Filter<N> {
             further: self.further(),
         };
         self.x.fixed_rows_mut::<PARAMETERS>(PARAMETER).fill(0.0);
-        self.x.rows_range_mut(FURTHER_PARAMETER..).fill(0.0);
+        let further = FURTHER_PARAMETER.min(N);
+        self.x.rows_range_mut(further..).fill(0.0);
         feedback
     }
 
@@ -290,7 +348,6 @@ const _: () = assert!(GYRO + PER_TRIAD == ACCEL && NAVIGATION == crate::navigati
 mod tests {
     use super::super::states::{STATES, parameter};
     use super::*;
-    use crate::imu::Sensor;
     use crate::navigation::{BlockMatrix, ParameterBlock};
     use approx::assert_relative_eq;
 
@@ -356,6 +413,50 @@ mod tests {
             assert_relative_eq!(filter.x, x, max_relative = 1e-12);
             filter.observe(Sight::TABLE, &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
         }
+    }
+
+    #[test]
+    fn a_wandering_bias_does_what_the_constant_one_does_and_forgets() {
+        let wandering = Instability {
+            sigma: 2e-6,
+            correlation_time: 3.0,
+        };
+        let start = Start {
+            attitude: Vector3::repeat(3e-4),
+            velocity: 1e-3,
+            position: 1.0,
+            table: 5e-6,
+        };
+        let sigma = ParameterVector::from_element(1e-4);
+        let mut filter = Filter::<STATES_WITH_DRIFT>::new(start, &sigma, &sigma, Vector3::zeros())
+            .with_drift(PerSensor::from_fn(|_| Some(wandering)));
+        for k in 0..5 {
+            let block = block(f64::from(k));
+            let mut phi = SMatrix::<f64, STATES_WITH_DRIFT, STATES_WITH_DRIFT>::identity();
+            phi.fixed_view_mut::<STATES, STATES>(0, 0)
+                .copy_from(&dense_transition(&block));
+            let keep = (-block.duration / 3.0f64).exp();
+            for axis in 0..6 {
+                let bias = if axis < 3 { GYRO } else { ACCEL } + 9 + axis % 3;
+                let column = phi.fixed_view::<NAVIGATION, 1>(0, bias).into_owned();
+                phi.fixed_view_mut::<NAVIGATION, 1>(0, DRIFT + axis)
+                    .copy_from(&column);
+                phi[(DRIFT + axis, DRIFT + axis)] = keep;
+            }
+            let mut p = phi * filter.p * phi.transpose();
+            let mut corner = p.fixed_view_mut::<9, 9>(0, 0);
+            corner += block.noise;
+            for state in DRIFT..DRIFT + 6 {
+                p[(state, state)] += wandering.sigma.powi(2) * (1.0 - keep * keep);
+            }
+            let x = phi * filter.x;
+            filter.propagate(&block);
+            assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
+            assert_relative_eq!(filter.x, x, max_relative = 1e-12);
+            filter.observe(Sight::VELOCITY, &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+        }
+        // Without observations of it a stationary process stays as uncertain as it was.
+        assert!(filter.p[(DRIFT, DRIFT)] <= wandering.sigma.powi(2));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::filter::{Filter, Sight, Start};
 use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
 use super::schedule::{Schedule, Standing};
-use super::states::{ALL_STATES, ParameterMatrix, ParameterVector, STATES};
+use super::states::{ALL_STATES, ParameterMatrix, ParameterVector, STATES, STATES_WITH_DRIFT};
 use crate::attitude::{exp, log};
 use crate::imu::{FURTHER, FurtherVector, InstallationForm, PerSensor, Sensor, Triad};
 use crate::navigation::{FurtherTerms, Navigator, State};
@@ -134,10 +134,15 @@ pub(super) fn pass(
     at: &Linearisation,
     mode: Mode,
 ) -> Result<PassResult, CalibrationError> {
-    if problem.further_sigma == FurtherVector::zeros() {
-        Pass::<STATES>::new(problem, at, mode)?.run()
-    } else {
+    // Only the states that a run needs: covariance costs with their square.
+    let noise = &problem.run.noise;
+    let drifts = |sensor| noise.get(sensor).instability.is_some();
+    if problem.further_sigma != FurtherVector::zeros() {
         Pass::<ALL_STATES>::new(problem, at, mode)?.run()
+    } else if Sensor::ALL.into_iter().any(drifts) {
+        Pass::<STATES_WITH_DRIFT>::new(problem, at, mode)?.run()
+    } else {
+        Pass::<STATES>::new(problem, at, mode)?.run()
     }
 }
 
@@ -200,6 +205,9 @@ impl<'a, const N: usize> Pass<'a, N> {
             ),
         };
         let filter = Filter::new(problem.start, &parameters, &problem.prior_sigma, attitude)
+            .with_drift(PerSensor::from_fn(|sensor| {
+                run.noise.get(sensor).instability
+            }))
             .with_further(&further, &problem.further_sigma);
         Ok(Self {
             problem,

@@ -9,6 +9,7 @@
 //! | accel | 12 | the same for the accelerometers |
 //! | table | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad |
 //! | initial attitude | 3 | φ at the first sample, kept as constants, rad |
+//! | drift | 6 | what the biases of gyros, then accelerometers, are off D now, rad/s and m/s²; only where noise figures state an instability |
 //! | further terms | 22 | true − estimated, see [`crate::imu::Term`]; only where one is on |
 
 use nalgebra::{SMatrix, SVector};
@@ -31,10 +32,14 @@ pub const PARAMETERS: usize = 2 * PER_TRIAD;
 pub const TABLE: usize = PARAMETER + PARAMETERS;
 /// Initial attitude error φ₀.
 pub const INITIAL_ATTITUDE: usize = TABLE + 3;
-/// Number of states of an instrument without further terms.
+/// Number of states of an instrument whose biases stay and that has no further terms.
 pub const STATES: usize = INITIAL_ATTITUDE + 3;
+/// Wandering of the biases of both triads.
+pub const DRIFT: usize = STATES;
+/// Number of states with those of wandering biases.
+pub const STATES_WITH_DRIFT: usize = DRIFT + 6;
 /// First parameter of further terms.
-pub const FURTHER_PARAMETER: usize = STATES;
+pub const FURTHER_PARAMETER: usize = STATES_WITH_DRIFT;
 /// Number of states with those of further terms.
 pub const ALL_STATES: usize = FURTHER_PARAMETER + FURTHER;
 

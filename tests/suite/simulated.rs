@@ -42,6 +42,23 @@ pub fn trial(scenario: &Scenario, stream: u64) -> Trial {
     }
 }
 
+/// A tactical instrument, whose biases wander by more than the filter's σ without states for them.
+#[test]
+fn claimed_accuracy_is_true_where_biases_wander() {
+    const RUNS: u64 = 24;
+    let scenario = Scenario::load("two-axis").unwrap();
+    assert!(scenario.instrument.noise.accel.instability.is_some());
+    let trials: Vec<Trial> = (0..RUNS)
+        .into_par_iter()
+        .map(|stream| trial(&scenario, stream))
+        .collect();
+    assert!(trials.iter().all(|t| t.outcome.converged));
+    let anees = trials.iter().map(|t| t.nees).sum::<f64>() / (RUNS as f64 * PARAMETERS as f64);
+    let (low, high) = mean_square_interval(PARAMETERS * RUNS as usize, 0.002);
+    println!("ANEES/24 {anees:.4} of {RUNS} runs, 99.8 % interval {low:.4} to {high:.4}");
+    assert!((low..high).contains(&anees), "ANEES/24 {anees}");
+}
+
 #[test]
 fn claimed_accuracy_is_true_from_the_papers_initial_errors_on() {
     let scenario = Scenario::load("demo").unwrap();
