@@ -95,6 +95,8 @@ pub fn estimate(
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
         prior_attitude: problem.initial_attitude,
+        prior_attitude_sigma: problem.start.attitude,
+        attitude_sigma: held.attitude_sigma,
         further: Further {
             values: held.estimate.further,
             sigma: held.further_sigma,
@@ -252,6 +254,13 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();
     warnings.extend(outcome.observability.warnings(form, &unobserved));
+    if !outcome.heading_observed() {
+        warnings.push(format!(
+            "The heading is not observed: its σ is {:.1}° after the run. Earth rate is too little for \
+             the noise of the gyros, or their biases hide it; parameters are found nevertheless.",
+            outcome.attitude_sigma.z / DEGREE
+        ));
+    }
     let hidden: Vec<String> = outcome
         .further
         .unobserved()

@@ -314,15 +314,21 @@ impl<const N: usize> Filter<N> {
 
     /// Covariance of the parameter errors with the initial attitude error in units of its σ.
     pub fn attitude_covariance(&self) -> AttitudeCovariance {
-        let sigma = |axis| self.p[(INITIAL_ATTITUDE + axis, INITIAL_ATTITUDE + axis)].sqrt();
+        let sigma = self.initial_attitude_sigma();
         AttitudeCovariance::from_fn(|i, axis| {
-            self.p[(PARAMETER + i, INITIAL_ATTITUDE + axis)] / sigma(axis)
+            self.p[(PARAMETER + i, INITIAL_ATTITUDE + axis)] / sigma[axis]
         })
     }
 
     /// 1σ of the parameter errors.
     pub fn parameter_sigma(&self) -> ParameterVector {
         ParameterVector::from_fn(|i, _| self.p[(PARAMETER + i, PARAMETER + i)].max(0.0).sqrt())
+    }
+
+    /// 1σ of the initial attitude error φ₀, East, North and Up.
+    pub fn initial_attitude_sigma(&self) -> Vector3<f64> {
+        let variance = |axis: usize| self.p[(INITIAL_ATTITUDE + axis, INITIAL_ATTITUDE + axis)];
+        Vector3::from_fn(|axis, _| variance(axis).max(0.0).sqrt())
     }
 
     /// Mean of the initial attitude error φ₀.

@@ -1,6 +1,6 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::form::FormTest;
 use super::observability::Observability;
@@ -107,6 +107,10 @@ pub struct Outcome {
     /// Mean of the initial attitude before the run, `C_b_n`: a reading of the table or, without, the
     /// coarse alignment.
     pub prior_attitude: Matrix3<f64>,
+    /// 1σ of the initial attitude before the run, rad about East, North and Up …
+    pub prior_attitude_sigma: Vector3<f64>,
+    /// … and after it; the last is that of the heading.
+    pub attitude_sigma: Vector3<f64>,
     /// The instrument's further terms.
     pub further: Further,
     /// What the run showed of the parameters and what it left as it was.
@@ -134,6 +138,11 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Whether the run observed the heading.
+    pub fn heading_observed(&self) -> bool {
+        self.attitude_sigma.z < OBSERVED_BELOW * self.prior_attitude_sigma.z
+    }
+
     /// Indices of the parameters that the run did not observe.
     pub fn unobserved(&self) -> Vec<usize> {
         let sigma = self.estimate.sigma();

@@ -105,6 +105,8 @@ pub(super) struct PassResult {
     pub covariance: ParameterMatrix,
     pub further_sigma: FurtherVector,
     pub attitude_covariance: AttitudeCovariance,
+    /// 1σ of the initial attitude, East, North and Up.
+    pub attitude_sigma: Vector3<f64>,
     /// Whitened innovations squared, summed; the prior is in it, since the filter starts from it.
     /// A rejected observation counts as much as the gate lets pass.
     pub merit: f64,
@@ -262,6 +264,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             covariance: self.filter.parameter_covariance(),
             further_sigma: self.filter.further_sigma(),
             attitude_covariance: self.filter.attitude_covariance(),
+            attitude_sigma: self.filter.initial_attitude_sigma(),
             merit: self.merit,
             innovations: self.innovations,
             history: self.history,

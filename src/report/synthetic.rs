@@ -269,6 +269,8 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         prior_mean,
         further: Default::default(),
         prior_attitude: nalgebra::Matrix3::identity(),
+        prior_attitude_sigma: nalgebra::Vector3::repeat(60.0 * crate::units::ARCSEC),
+        attitude_sigma: nalgebra::Vector3::repeat(crate::units::ARCSEC),
         observability: Observability {
             directions: vec![Direction {
                 remaining: 0.002,

@@ -4,10 +4,14 @@ use nalgebra::{SVector, Vector3};
 use rayon::prelude::*;
 use turncal::calibration::outcome::to_vector;
 use turncal::calibration::{Nees, Outcome, estimate, mean_square_interval, nees};
-use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Triad};
+use turncal::earth::Site;
+use turncal::imu::{
+    InstallationForm, Output, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Triad,
+};
+use turncal::models::{InstallationModel, Instrument, Place};
 use turncal::run::record::BodyFrame;
 use turncal::simulation::{Given, Scenario, Simulated};
-use turncal::units::{ARCSEC, PPM};
+use turncal::units::{ARCSEC, DEGREE, PPM};
 
 /// Fixed before the first run was made.
 const SEED: u64 = 5;
@@ -125,4 +129,56 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
     assert!(scale > 100.0 && angle > 30.0, "{scale} ppm, {angle}″");
     let said = |words: &str| level.warnings.iter().any(|w| w.contains(words));
     assert!(said("gyro scale z"), "{:?}", level.warnings);
+}
+
+/// A module of 2 % and 2° whose gyros turn on with a bias of 1 °/s.
+fn mems() -> Scenario {
+    let mut scenario = scenario("three-axis");
+    let directory = tempfile::tempdir().unwrap();
+    let model = directory.path().join("mems.toml");
+    let text = "[gyro]\npulse_arcsec = 1.0\nangle_random_walk_deg_per_sqrt_h = 0.3\n\
+         scale_ppm = { sigma = 20000.0 }\nbias_deg_per_h = { sigma = 3600.0 }\n\
+         [accel]\npulse_um_per_s = 100.0\nvelocity_random_walk_ug_per_sqrt_hz = 60.0\n\
+         scale_ppm = { sigma = 20000.0 }\nbias_ug = { sigma = 20000.0 }\n";
+    std::fs::write(&model, text).unwrap();
+    scenario.instrument = Instrument::load(model.to_str().unwrap(), &Place::CommandLine).unwrap();
+    let installation = directory.path().join("two-degrees.toml");
+    std::fs::write(
+        &installation,
+        "form = \"general\"\nangles_deg = { sigma = 2.0 }\n",
+    )
+    .unwrap();
+    scenario.installation =
+        InstallationModel::load(installation.to_str().unwrap(), &Place::CommandLine).unwrap();
+    scenario.output = Output::Rate;
+    scenario
+}
+
+#[test]
+fn a_mems_module_of_two_per_cent_and_two_degrees_is_calibrated_without_a_table() {
+    const RUNS: u64 = 16;
+    let scenario = mems();
+    let trials: Vec<Trial> = (0..RUNS)
+        .into_par_iter()
+        .map(|stream| trial(&scenario, stream))
+        .collect();
+    assert!(trials.iter().all(|t| t.outcome.converged));
+    assert!(trials.iter().all(|t| t.outcome.heading_observed()));
+    let scalars = trials.iter().map(|t| t.nees.count).sum();
+    let (low, high) = mean_square_interval(scalars, 0.002);
+    let anees = trials.iter().map(|t| t.nees.mean).sum::<f64>() / RUNS as f64;
+    println!("ANEES/21 {anees:.3}, 99.8 % interval {low:.3} to {high:.3}");
+    assert!((low..high).contains(&anees), "{anees}");
+}
+
+#[test]
+fn where_earth_rate_points_up_the_heading_is_said_to_be_unobserved() {
+    let mut scenario = scenario("three-axis");
+    scenario.site = Site::with_normal_gravity(89.999 * DEGREE, 0.0, 0.0);
+    let Trial { outcome, nees } = trial(&scenario, 0);
+    assert!(outcome.converged && !outcome.heading_observed());
+    let said = |w: &String| w.contains("heading is not observed");
+    assert!(outcome.warnings.iter().any(said), "{:?}", outcome.warnings);
+    // What does not depend on it is as accurate as it claims.
+    assert!((0.3..2.2).contains(&nees.mean), "NEES/21 {}", nees.mean);
 }
