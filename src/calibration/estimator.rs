@@ -97,6 +97,7 @@ pub fn estimate(
         prior_attitude: problem.initial_attitude,
         prior_attitude_sigma: problem.start.attitude,
         attitude_sigma: held.attitude_sigma,
+        table_errors: held.table_errors,
         further: Further {
             values: held.estimate.further,
             sigma: held.further_sigma,
@@ -177,6 +178,7 @@ pub(super) fn problem<'a>(
     initial_attitude: Matrix3<f64>,
     velocity_sigma: f64,
 ) -> Problem<'a> {
+    let table_errors = run.table.as_ref().map(|t| t.errors).unwrap_or_default();
     let (position_sigma, reading_sigma) = run.table.as_ref().map_or((0.0, 0.0), |table| {
         (table.position_sigma, table.reading_sigma)
     });
@@ -196,11 +198,16 @@ pub(super) fn problem<'a>(
         prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
         further_sigma: run.further_sigma,
+        table_errors,
         start: Start {
             attitude: match run.table {
                 // The one reading that gave it has both errors.
                 Some(_) => Vector3::repeat(
-                    INITIAL_ATTITUDE.max(10.0 * position_sigma.hypot(reading_sigma)),
+                    INITIAL_ATTITUDE.max(
+                        10.0 * position_sigma
+                            .hypot(reading_sigma)
+                            .hypot(table_errors.base.max()),
+                    ),
                 ),
                 None => Vector3::from(COARSE_ATTITUDE),
             },

@@ -4,20 +4,24 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::observability::AttitudeCovariance;
 use super::states::{
-    ATTITUDE, DRIFT, FURTHER_PARAMETER, INITIAL_ATTITUDE, NAVIGATION, PARAMETER, PARAMETERS,
-    POSITION, ParameterMatrix, ParameterVector, STATES_WITH_DRIFT, TABLE, VELOCITY,
+    ATTITUDE, AXES, BASE, DRIFT, FURTHER_PARAMETER, INITIAL_ATTITUDE, NAVIGATION, PARAMETER,
+    PARAMETERS, POSITION, ParameterMatrix, ParameterVector, STATES_WITH_DRIFT, STATES_WITH_TABLE,
+    TABLE, VELOCITY,
 };
 use crate::attitude::{exp, log};
 use crate::imu::{FurtherVector, Instability, PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, State};
+use crate::run::{AXIS_TILTS, TABLE_ERRORS, TableErrors, Tilts};
 
 const GYRO: usize = PARAMETER;
 const ACCEL: usize = PARAMETER + PER_TRIAD;
-/// Three states that an observation sees, and three that it sees with the opposite sign.
+/// What an observation of three components sees: three states, less others.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sight {
     plus: usize,
     minus: Option<usize>,
+    /// Where the table's own errors are states: how its attitude turns with the tilt of each axis.
+    tilts: Option<Tilts>,
 }
 
 impl Sight {
@@ -25,22 +29,48 @@ impl Sight {
     pub const VELOCITY: Self = Self {
         plus: VELOCITY,
         minus: None,
+        tilts: None,
     };
     /// δp: computed minus the site's position.
     pub const POSITION: Self = Self {
         plus: POSITION,
         minus: None,
-    };
-    /// φ − τ: computed attitude against the table's.
-    pub const TABLE: Self = Self {
-        plus: ATTITUDE,
-        minus: Some(TABLE),
+        tilts: None,
     };
 
-    fn of<const N: usize>(self, x: &SVector<f64, N>) -> Vector3<f64> {
-        let plus = x.fixed_rows::<3>(self.plus).into_owned();
-        self.minus
-            .map_or(plus, |minus| plus - x.fixed_rows::<3>(minus))
+    /// φ − τ: computed attitude against the table's; less ε and what the axes' tilts make, where they
+    /// are states.
+    pub fn table(tilts: Option<Tilts>) -> Self {
+        Self {
+            plus: ATTITUDE,
+            minus: Some(TABLE),
+            tilts,
+        }
+    }
+
+    /// Each state that a component sees, and how.
+    fn row(&self, component: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let of_base = self.tilts.map(|_| (BASE + component, -1.0));
+        let of_axes = self.tilts.iter().flat_map(move |tilts| {
+            (0..AXIS_TILTS).map(move |k| (AXES + k, -tilts[(component, k)]))
+        });
+        std::iter::once((self.plus + component, 1.0))
+            .chain(self.minus.map(|minus| (minus + component, -1.0)))
+            .chain(of_base)
+            .chain(of_axes)
+    }
+
+    fn along<const N: usize>(&self, component: usize, v: &SVector<f64, N>) -> f64 {
+        let row = self.row(component);
+        row.map(|(state, weight)| weight * v[state]).sum()
+    }
+
+    fn across<const N: usize>(&self, component: usize, p: &SMatrix<f64, N, N>) -> SVector<f64, N> {
+        let mut sum = SVector::<f64, N>::zeros();
+        for (state, weight) in self.row(component) {
+            sum.axpy(weight, &p.column(state), 1.0);
+        }
+        sum
     }
 }
 
@@ -109,6 +139,30 @@ impl<const N: usize> Filter<N> {
             self.p[(state, state)] = instability.sigma.powi(2);
         }
         self
+    }
+
+    /// The same with errors of the table's own: σ of its base about East, North and Up, and of the tilt
+    /// of its axes.
+    pub fn with_table(mut self, errors: &TableErrors) -> Self {
+        if N >= STATES_WITH_TABLE {
+            for axis in 0..3 {
+                self.p[(BASE + axis, BASE + axis)] = errors.base[axis].powi(2);
+            }
+            for axis in AXES..AXES + AXIS_TILTS {
+                self.p[(axis, axis)] = errors.axes.powi(2);
+            }
+        }
+        self
+    }
+
+    /// Estimate and σ of the table's own errors: base, then tilts of axes; zero without them.
+    pub fn table_errors(&self) -> [SVector<f64, TABLE_ERRORS>; 2] {
+        let x = |k: usize| self.x.get(BASE + k).copied();
+        let variance = |k: usize| self.p.get((BASE + k, BASE + k)).copied();
+        [
+            SVector::from_fn(|k, _| x(k).unwrap_or(0.0)),
+            SVector::from_fn(|k, _| variance(k).unwrap_or(0.0).max(0.0).sqrt()),
+        ]
     }
 
     /// Each wandering bias: its state, how it wanders, and the parameter that is its constant part.
@@ -203,35 +257,28 @@ impl<const N: usize> Filter<N> {
     /// `L⁻¹ (z − H x)` with `L Lᵀ = H P Hᵀ + R`, `R` the same variance on all axes.
     /// `None` if that is not positive definite.
     pub fn whitened(&self, sight: Sight, z: &Vector3<f64>, variance: f64) -> Option<Vector3<f64>> {
-        let corner = |row: usize, column: usize| self.p.fixed_view::<3, 3>(row, column);
-        let mut s = corner(sight.plus, sight.plus) + Matrix3::identity() * variance;
-        if let Some(minus) = sight.minus {
-            s += corner(minus, minus) - corner(sight.plus, minus) - corner(minus, sight.plus);
+        let mut s = Matrix3::identity() * variance;
+        for column in 0..3 {
+            let ph = sight.across(column, &self.p);
+            for row in 0..3 {
+                s[(row, column)] += sight.along(row, &ph);
+            }
         }
-        s.cholesky()?
-            .l()
-            .solve_lower_triangular(&(z - sight.of(&self.x)))
+        let seen = Vector3::from_fn(|component, _| sight.along(component, &self.x));
+        s.cholesky()?.l().solve_lower_triangular(&(z - seen))
     }
 
     /// Takes in an observed difference, one scalar after the other, in Joseph's form, which keeps
     /// the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
     /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
     pub fn observe(&mut self, sight: Sight, z: &Vector3<f64>, variance: f64) {
-        for axis in 0..3 {
-            let plus = sight.plus + axis;
-            let minus = sight.minus.map(|minus| minus + axis);
-            let across = |p: &SMatrix<f64, N, N>| -> SVector<f64, N> {
-                let column = p.column(plus).into_owned();
-                minus.map_or(column, |minus| column - p.column(minus))
-            };
-            let along = |v: &SVector<f64, N>| v[plus] - minus.map_or(0.0, |minus| v[minus]);
-
-            let ph = across(&self.p);
-            let gain = ph / (along(&ph) + variance);
-            self.x += gain * (z[axis] - along(&self.x));
+        for component in 0..3 {
+            let ph = sight.across(component, &self.p);
+            let gain = ph / (sight.along(component, &ph) + variance);
+            self.x += gain * (z[component] - sight.along(component, &self.x));
             // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ.
             self.p.ger(-1.0, &gain, &ph, 1.0);
-            let rest = gain * variance - across(&self.p);
+            let rest = gain * variance - sight.across(component, &self.p);
             self.p.ger(1.0, &rest, &gain, 1.0);
         }
         // Rounding differs on the two sides of the diagonal, and the difference would grow.
@@ -417,7 +464,7 @@ mod tests {
             filter.propagate(&block);
             assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
             assert_relative_eq!(filter.x, x, max_relative = 1e-12);
-            filter.observe(Sight::TABLE, &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+            filter.observe(Sight::table(None), &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
         }
     }
 
@@ -471,7 +518,7 @@ mod tests {
         filter.propagate(&block(0.3));
         let variance = 1e-9;
         let z = Vector3::new(1e-3, -2e-3, 5e-4);
-        for sight in [Sight::VELOCITY, Sight::TABLE] {
+        for sight in [Sight::VELOCITY, Sight::table(None)] {
             let mut h = nalgebra::SMatrix::<f64, 3, STATES>::zeros();
             for axis in 0..3 {
                 h[(axis, sight.plus + axis)] = 1.0;
@@ -518,7 +565,7 @@ mod tests {
         for k in 0..4000 {
             filter.propagate(&turning(f64::from(k) * 0.37));
             filter.observe(Sight::VELOCITY, &Vector3::zeros(), 1e-12);
-            filter.observe(Sight::TABLE, &Vector3::zeros(), 1e-12);
+            filter.observe(Sight::table(None), &Vector3::zeros(), 1e-12);
             if k % 50 == 0 {
                 filter.redraw_table(5e-6);
             }

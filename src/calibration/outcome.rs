@@ -1,6 +1,6 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::form::FormTest;
 use super::observability::Observability;
@@ -9,6 +9,7 @@ use super::states::{ParameterMatrix, ParameterVector, parameter, sensor_and_para
 use crate::imu::{
     FURTHER, FurtherVector, InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
 };
+use crate::run::TABLE_ERRORS;
 
 /// Both triads with the covariance of their parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,6 +114,9 @@ pub struct Outcome {
     pub attitude_sigma: Vector3<f64>,
     /// The instrument's further terms.
     pub further: Further,
+    /// Estimate and 1σ of the table's own errors: base about East, North and Up, then tilts of its axes,
+    /// rad; zero where they are no states.
+    pub table_errors: [SVector<f64, TABLE_ERRORS>; 2],
     /// What the run showed of the parameters and what it left as it was.
     pub observability: Observability,
     /// Where the last pass linearised.

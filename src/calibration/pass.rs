@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
@@ -10,11 +10,13 @@ use super::filter::{Filter, Sight, Start};
 use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
 use super::schedule::{Schedule, Standing};
-use super::states::{ALL_STATES, ParameterMatrix, ParameterVector, STATES, STATES_WITH_DRIFT};
+use super::states::{
+    ALL_STATES, ParameterMatrix, ParameterVector, STATES, STATES_WITH_DRIFT, STATES_WITH_TABLE,
+};
 use crate::attitude::{exp, log};
 use crate::imu::{FURTHER, FurtherVector, InstallationForm, PerSensor, Sensor, Triad};
 use crate::navigation::{FurtherTerms, Navigator, State};
-use crate::run::Run;
+use crate::run::{Run, TABLE_ERRORS, TableErrors};
 
 /// What all passes over a run share.
 #[derive(Debug, Clone)]
@@ -28,6 +30,7 @@ pub(super) struct Problem<'a> {
     pub prior_sigma: ParameterVector,
     /// 1σ of each further parameter before the run, whose mean is zero; zero where its term is off.
     pub further_sigma: FurtherVector,
+    pub table_errors: TableErrors,
     pub start: Start,
     pub variance: Variance,
     /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
@@ -104,6 +107,8 @@ pub(super) struct PassResult {
     pub estimate: Linearisation,
     pub covariance: ParameterMatrix,
     pub further_sigma: FurtherVector,
+    /// Estimate and 1σ of the table's own errors.
+    pub table_errors: [SVector<f64, TABLE_ERRORS>; 2],
     pub attitude_covariance: AttitudeCovariance,
     /// 1σ of the initial attitude, East, North and Up.
     pub attitude_sigma: Vector3<f64>,
@@ -141,6 +146,8 @@ pub(super) fn pass(
     let drifts = |sensor| noise.get(sensor).instability.is_some();
     if problem.further_sigma != FurtherVector::zeros() {
         Pass::<ALL_STATES>::new(problem, at, mode)?.run()
+    } else if problem.table_errors.any() {
+        Pass::<STATES_WITH_TABLE>::new(problem, at, mode)?.run()
     } else if Sensor::ALL.into_iter().any(drifts) {
         Pass::<STATES_WITH_DRIFT>::new(problem, at, mode)?.run()
     } else {
@@ -210,6 +217,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             .with_drift(PerSensor::from_fn(|sensor| {
                 run.noise.get(sensor).instability
             }))
+            .with_table(&problem.table_errors)
             .with_further(&further, &problem.further_sigma);
         Ok(Self {
             problem,
@@ -263,6 +271,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             estimate: self.estimate(),
             covariance: self.filter.parameter_covariance(),
             further_sigma: self.filter.further_sigma(),
+            table_errors: self.filter.table_errors(),
             attitude_covariance: self.filter.attitude_covariance(),
             attitude_sigma: self.filter.initial_attitude_sigma(),
             merit: self.merit,
@@ -343,7 +352,8 @@ impl<'a, const N: usize> Pass<'a, N> {
         if let Some((reading, count)) = &standing.reading {
             let difference = -log(&(attitude * reading.transpose()));
             let variance = variance.reading / *count as f64 + variance.attitude;
-            self.observe(time, Observation::Table, Sight::TABLE, difference, variance)?;
+            let sight = Sight::table(standing.tilts);
+            self.observe(time, Observation::Table, sight, difference, variance)?;
         }
         match self.mode {
             Mode::Live => self.feed_back(),

@@ -8,7 +8,7 @@ use super::CalibrationError;
 use crate::attitude::{self, exp, tilt};
 use crate::imu::{Sensor, Triad};
 use crate::navigation::State;
-use crate::run::{Dwell, Run, TableRecord};
+use crate::run::{Dwell, Run, TableRecord, Tilts};
 
 /// A stretch of samples that one block of the error model covers.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +25,8 @@ pub(super) struct Standing {
     pub first: bool,
     /// Mean of the table's readings during the whole dwell, `C_b_n`; none without a table.
     pub attitude: Option<Matrix3<f64>>,
+    /// How the table's attitude turns with tilts of its axes, where its own errors are states.
+    pub tilts: Option<Tilts>,
     /// Mean output of the accelerometers during the whole dwell.
     pub accel: Vector3<f64>,
     /// Mean of the table's readings during the stretch, and how many they were.
@@ -69,6 +71,11 @@ impl Schedule {
                 unread.start += 1;
             }
             let accel = dwell.mean(Sensor::Accel, run).output;
+            let tilts = run.table.as_ref().filter(|table| table.errors.any());
+            let tilts = tilts.zip(dwell.position.as_ref()).map(|(table, position)| {
+                let of_reading = table.tilts.get(position.readings.start);
+                of_reading.copied().unwrap_or_default()
+            });
             let mut first = true;
             cut(dwell.samples.clone(), stretch, |samples| {
                 let until = run.imu.time(samples.end) + 1e-3 * run.imu.period;
@@ -84,6 +91,7 @@ impl Schedule {
                         first,
                         attitude: dwell.position.as_ref().map(|p| p.attitude),
                         accel,
+                        tilts,
                         reading,
                     }),
                 });

@@ -10,11 +10,14 @@
 //! | table | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad |
 //! | initial attitude | 3 | φ at the first sample, kept as constants, rad |
 //! | drift | 6 | what the biases of gyros, then accelerometers, are off D now, rad/s and m/s²; only where noise figures state an instability |
+//! | base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; only where the run states σ of them |
+//! | axes | 4 | tilts of the table's axes across themselves, see [`crate::run::TableRecord`], rad |
 //! | further terms | 22 | true − estimated, see [`crate::imu::Term`]; only where one is on |
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::imu::{FURTHER, PARAMETERS as PER_TRIAD, Sensor};
+use crate::run::AXIS_TILTS;
 
 /// Attitude error φ.
 pub const ATTITUDE: usize = 0;
@@ -38,8 +41,14 @@ pub const STATES: usize = INITIAL_ATTITUDE + 3;
 pub const DRIFT: usize = STATES;
 /// Number of states with those of wandering biases.
 pub const STATES_WITH_DRIFT: usize = DRIFT + 6;
+/// Error of the table's base ε.
+pub const BASE: usize = STATES_WITH_DRIFT;
+/// Tilts of the table's axes.
+pub const AXES: usize = BASE + 3;
+/// Number of states with those of the table's own errors.
+pub const STATES_WITH_TABLE: usize = AXES + AXIS_TILTS;
 /// First parameter of further terms.
-pub const FURTHER_PARAMETER: usize = STATES_WITH_DRIFT;
+pub const FURTHER_PARAMETER: usize = STATES_WITH_TABLE;
 /// Number of states with those of further terms.
 pub const ALL_STATES: usize = FURTHER_PARAMETER + FURTHER;
 

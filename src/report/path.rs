@@ -177,6 +177,8 @@ mod tests {
             attitude,
             position_sigma: 0.0,
             reading_sigma: 0.0,
+            errors: Default::default(),
+            tilts: Vec::new(),
         }
     }
 

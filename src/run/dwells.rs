@@ -247,6 +247,8 @@ mod tests {
             time,
             position_sigma: ARCSEC,
             reading_sigma: 0.5 * ARCSEC,
+            errors: Default::default(),
+            tilts: Vec::new(),
         });
         let dwells = run.dwells();
         assert_eq!(dwells.len(), 2);

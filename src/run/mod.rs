@@ -14,6 +14,7 @@ mod quantity;
 mod read;
 pub mod record;
 mod segments;
+mod table_errors;
 mod table_log;
 mod whole;
 mod write;
@@ -21,6 +22,7 @@ mod write;
 pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
 pub use record::CalibrationRecord;
+pub use table_errors::{AXIS_TILTS, TABLE_ERRORS, TableErrors, Tilts, tilts};
 pub use whole::{WholeDirectory, write_whole};
 pub use write::write_run;
 
@@ -152,6 +154,11 @@ pub struct TableRecord {
     pub position_sigma: f64,
     /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
+    /// 1σ of what it does not read.
+    pub errors: TableErrors,
+    /// How the attitude turns with tilts of the axes at each reading; empty where it does not tell the
+    /// axes apart.
+    pub tilts: Vec<Tilts>,
 }
 
 /// How still the IMU is while the table stands.

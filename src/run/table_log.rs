@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use super::csv_file::CsvFile;
 use super::error::RunError;
 use super::fields::Fields;
-use super::{ImuRecord, TableRecord};
+use super::{ImuRecord, TableErrors, TableRecord, Tilts, tilts};
 use crate::attitude;
 use crate::units::{ARCSEC, DEGREE};
 
@@ -121,6 +121,18 @@ impl AttitudeColumns<usize> {
             }
         }
     }
+
+    /// How the attitude turns with tilts of the axes; none for a quaternion.
+    fn tilts(&self, csv: &CsvFile) -> Result<Option<Tilts>, RunError> {
+        let Self::Angles(angles) = self else {
+            return Ok(None);
+        };
+        let axes: Result<Vec<_>, RunError> = angles
+            .iter()
+            .map(|&(column, axis)| Ok((axis, csv.number(column)? * DEGREE)))
+            .collect();
+        Ok(Some(tilts(axes?)))
+    }
 }
 
 /// What `run.toml` says of the file.
@@ -132,6 +144,7 @@ pub(super) struct TableLog<'a> {
     pub position_sigma: f64,
     /// rad
     pub reading_sigma: f64,
+    pub errors: TableErrors,
 }
 
 impl<'a> TableLog<'a> {
@@ -142,20 +155,17 @@ impl<'a> TableLog<'a> {
         directory: &Path,
         notes: &mut Vec<String>,
     ) -> Result<Option<Self>, RunError> {
-        let without_effect = [
-            "level_sigma_arcsec",
-            "north_sigma_arcsec",
-            "nonorthogonality_sigma_arcsec",
-            "time_sigma_ms",
-        ];
-        let mut known = vec![
+        let known = [
             "file",
             "columns",
             "axes",
             "position_sigma_arcsec",
             "reading_sigma_arcsec",
+            "level_sigma_arcsec",
+            "north_sigma_arcsec",
+            "nonorthogonality_sigma_arcsec",
+            "time_sigma_ms",
         ];
-        known.extend(without_effect);
         let Some(fields) = top.table("turntable", &known)? else {
             return Ok(None);
         };
@@ -165,21 +175,28 @@ impl<'a> TableLog<'a> {
             "the names of the columns",
         )?;
         let attitude = AttitudeColumns::of_fields(&fields, &columns)?;
-        for name in without_effect {
-            let Some(field) = fields.get(name) else {
-                continue;
-            };
+        if let Some(field) = fields.get("time_sigma_ms") {
             field.positive()?;
-            if name == "nonorthogonality_sigma_arcsec"
-                && matches!(attitude, AttitudeColumns::Quaternion(_))
-            {
-                return Err(field.error(
-                    "it with `angles` only, for a quaternion does not tell the axes apart",
-                    "Remove it, or give the angles of the table's axes.",
-                ));
-            }
-            notes.push(format!("turntable.{name} is read but has no effect yet."));
+            notes.push("turntable.time_sigma_ms is read but has no effect yet.".to_owned());
         }
+        let optional = |name| -> Result<f64, RunError> {
+            let field = fields.get(name).map(|field| field.positive()).transpose()?;
+            Ok(field.unwrap_or(0.0) * ARCSEC)
+        };
+        let nonorthogonality = "nonorthogonality_sigma_arcsec";
+        if let (Some(field), AttitudeColumns::Quaternion(_)) =
+            (fields.get(nonorthogonality), &attitude)
+        {
+            return Err(field.error(
+                "it with `angles` only, for a quaternion does not tell the axes apart",
+                "Remove it, or give the angles of the table's axes.",
+            ));
+        }
+        let level = optional("level_sigma_arcsec")?;
+        let errors = TableErrors {
+            base: Vector3::new(level, level, optional("north_sigma_arcsec")?),
+            axes: optional(nonorthogonality)?,
+        };
         let sigma = |name| -> Result<f64, RunError> {
             Ok(fields.need(name, "a 1σ in seconds of arc")?.positive()? * ARCSEC)
         };
@@ -189,6 +206,7 @@ impl<'a> TableLog<'a> {
             attitude,
             position_sigma: sigma("position_sigma_arcsec")?,
             reading_sigma: sigma("reading_sigma_arcsec")?,
+            errors,
         }))
     }
 
@@ -200,9 +218,11 @@ impl<'a> TableLog<'a> {
 
         let mut time: Vec<f64> = Vec::new();
         let mut attitude = Vec::new();
+        let mut tilts = Vec::new();
         while csv.advance()? {
             time.push(csv.time(time_column, time.last().copied())?);
             attitude.push(columns.reading(&csv)?);
+            tilts.extend(columns.tilts(&csv)?);
         }
         let (first, last) = match time.as_slice() {
             [first, .., last] => (*first, *last),
@@ -227,6 +247,8 @@ impl<'a> TableLog<'a> {
             attitude,
             position_sigma: self.position_sigma,
             reading_sigma: self.reading_sigma,
+            errors: self.errors,
+            tilts,
         })
     }
 }

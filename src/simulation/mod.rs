@@ -16,8 +16,8 @@ pub use scenario::{Given, Scenario};
 
 use crate::attitude::exp;
 use crate::imu::{FurtherVector, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
-use crate::run::{ImuRecord, Run, Standstill, TableRecord};
-use crate::turntable::{Imperfection, Motion, TableError};
+use crate::run::{ImuRecord, Run, Standstill, TableErrors, TableRecord, Tilts, tilts};
+use crate::turntable::{Imperfection, Motion, Moves, TableError};
 
 /// A run and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,6 +174,25 @@ impl Scenario {
             .collect()
     }
 
+    /// How the table's attitude turns with tilts of its axes in the position that it has or leaves at
+    /// each time.
+    fn tilts(&self, motion: &Motion, times: &[f64]) -> Vec<Tilts> {
+        let Moves::Axes { start, steps } = &self.path.moves else {
+            return Vec::new();
+        };
+        let axes = || self.table.axes.iter().map(|axis| axis.direction);
+        let mut angles = start.clone();
+        let mut of_positions = vec![tilts(axes().zip(angles.iter().copied()))];
+        for step in steps {
+            for (angle, by) in angles.iter_mut().zip(&step.angles) {
+                *angle += by;
+            }
+            of_positions.push(tilts(axes().zip(angles.iter().copied())));
+        }
+        let at = |&time: &f64| of_positions.get(motion.position(time)).copied();
+        times.iter().filter_map(at).collect()
+    }
+
     /// The table's log: `exp(−[τ×]) C_b_n`, τ the error of the position in force and white noise.
     fn readings(&self, motion: &Motion, seed: u64, stream: u64) -> TableRecord {
         let errors = &self.table.errors;
@@ -194,10 +213,18 @@ impl Scenario {
             })
             .unzip();
         TableRecord {
-            time,
-            attitude,
             position_sigma: errors.position,
             reading_sigma: errors.reading,
+            errors: TableErrors {
+                base: Vector3::new(errors.level, errors.level, errors.north),
+                axes: match self.path.moves {
+                    Moves::Axes { .. } => errors.nonorthogonality,
+                    Moves::Body { .. } => 0.0,
+                },
+            },
+            tilts: self.tilts(motion, &time),
+            time,
+            attitude,
         }
     }
 }

@@ -7,6 +7,7 @@ use turncal::calibration::{Outcome, estimate, mean_square_interval};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::models::{InstallationModel, Place};
 use turncal::simulation::Scenario;
+use turncal::units::ARCSEC;
 
 /// Fixed before the first run was made.
 const SEED: u64 = 2016;
@@ -40,6 +41,36 @@ pub fn trial(scenario: &Scenario, stream: u64) -> Trial {
         nees,
         outcome,
     }
+}
+
+#[test]
+fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
+    const RUNS: u64 = 24;
+    let mut scenario = Scenario::load("demo").unwrap();
+    scenario.table.errors.level = 5.0 * ARCSEC;
+    scenario.table.errors.north = 20.0 * ARCSEC;
+    scenario.table.errors.nonorthogonality = 3.0 * ARCSEC;
+    let trials: Vec<Trial> = (0..RUNS)
+        .into_par_iter()
+        .map(|stream| trial(&scenario, stream))
+        .collect();
+    assert!(trials.iter().all(|t| t.outcome.converged));
+    let anees = trials.iter().map(|t| t.nees).sum::<f64>() / (RUNS as f64 * PARAMETERS as f64);
+    let (low, high) = mean_square_interval(PARAMETERS * RUNS as usize, 0.002);
+    println!("ANEES/24 {anees:.4} of {RUNS} runs, 99.8 % interval {low:.4} to {high:.4}");
+    assert!((low..high).contains(&anees), "ANEES/24 {anees}");
+
+    // Not modelled, the same errors are several σ.
+    let mut run = scenario.simulate(SEED, 0).unwrap();
+    run.run.table.as_mut().unwrap().errors = Default::default();
+    let outcome = estimate(&run.run, InstallationForm::General, &|_| {}).unwrap();
+    let error = outcome.estimate.vector() - to_vector(&run.truth);
+    let worst = error.component_div(&outcome.estimate.sigma()).amax();
+    println!(
+        "not modelled: {worst:.1} σ, NIS of the table {:.2}",
+        outcome.consistency.table.mean
+    );
+    assert!(worst > 5.0, "{worst} σ");
 }
 
 /// A tactical instrument, whose biases wander by more than the filter's σ without states for them.

@@ -70,6 +70,8 @@ pub fn made_run(name: &str) -> Run {
                 .collect(),
             position_sigma: 5e-6,
             reading_sigma: 2e-6,
+            errors: Default::default(),
+            tilts: Vec::new(),
         }),
         segments: vec![Segment {
             start: 3.5,
