@@ -237,6 +237,16 @@ reading_sigma_arcsec = {reading:?}    # white, each reading
             position = short(table.position_sigma / ARCSEC),
             reading = short(table.reading_sigma / ARCSEC),
         ));
+        // The quaternion does not tell the axes apart, so their tilts cannot be had from the file.
+        let base = table.errors.base;
+        for (name, sigma) in [("level", base.x), ("north", base.z)] {
+            if sigma > 0.0 {
+                sections.push(format!(
+                    "{name}_sigma_arcsec = {:?}\n",
+                    short(sigma / ARCSEC)
+                ));
+            }
+        }
     }
     if !run.segments.is_empty() {
         sections.push(

@@ -166,19 +166,12 @@ fn what_has_no_effect_yet_is_noted() {
                 "time = \"t\", gyro",
                 "time = \"t\", temperature = \"temp\", gyro",
             )
-            .replace(
-                "[turntable]",
-                "[turntable]\nlevel_sigma_arcsec = 2\ntime_sigma_ms = 1",
-            )
+            .replace("[turntable]", "[turntable]\ntime_sigma_ms = 1")
         },
         plain,
     );
-    assert_eq!(run.notes.len(), 3);
-    for (note, word) in run
-        .notes
-        .iter()
-        .zip(["temperature", "level_sigma", "time_sigma"])
-    {
+    assert_eq!(run.notes.len(), 2);
+    for (note, word) in run.notes.iter().zip(["temperature", "time_sigma"]) {
         assert!(
             note.contains(word) && note.contains("no effect yet"),
             "{note}"
