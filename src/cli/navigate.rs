@@ -16,7 +16,7 @@ use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
 use turncal::units::DEGREE;
 
 use super::names::short_names;
-use super::output::{Overwrite, print};
+use super::output::Delivery;
 use super::progress::Activity;
 
 const HOUR: f64 = 3600.0;
@@ -29,6 +29,7 @@ const LARGEST_PITCH: f64 = 89.0;
 /// its height held to the true one: standing at a place, or along a trajectory. Shows errors of
 /// attitude, velocity and position, and the σ of them that the calibration's covariance predicts.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
   turncal navigate calibration.json --truth truth.json --latitude-deg 45
   turncal navigate calibration.json --truth truth.json --trajectory flight --hours 3 -o flight
@@ -71,14 +72,8 @@ pub struct Navigate {
     /// Move instead of standing: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
-    /// Write navigation.csv, figures and a page into this directory
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Print one JSON document, hour by hour, and nothing else
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
-    overwrite: Overwrite,
+    delivery: Delivery,
 }
 
 /// Pitch, roll and heading in degrees.
@@ -129,11 +124,7 @@ impl Navigate {
             .into_iter()
             .chain(self.trajectory.as_deref().map(Path::new))
             .collect();
-        let directory = self
-            .output
-            .as_deref()
-            .map(|target| self.overwrite.directory(target, &inputs))
-            .transpose()?;
+        let begun = self.delivery.begin(&inputs)?;
 
         let activity = Activity::new(format!("navigating {} h", self.hours));
         let moments = mission
@@ -150,19 +141,11 @@ impl Navigate {
             trajectory: trajectory.as_deref(),
             moments: &moments,
         };
-        if let Some(directory) = directory {
-            navigation.write(&directory.path())?;
-            directory.commit()?;
-        }
-        if self.json {
-            let document = serde_json::to_string_pretty(&navigation.document())?;
-            return print((document + "\n").as_bytes());
-        }
-        print(navigation.summary().as_bytes())?;
-        if let Some(target) = &self.output {
-            eprintln!("\nreport: {}", target.join("index.html").display());
-        }
-        Ok(())
+        begun.deliver(
+            |directory| navigation.write(directory),
+            || navigation.document(),
+            || navigation.summary(),
+        )
     }
 
     /// How the body moves, and the name of its trajectory.

@@ -1,8 +1,10 @@
 //! Where output goes, alike in every command.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+use turncal::report::ReportError;
 use turncal::run::{RunError, WholeDirectory};
 
 /// What every command that writes has in common.
@@ -17,6 +19,67 @@ impl Overwrite {
     /// Begins an output directory; none of `inputs` may lie in it.
     pub fn directory(self, target: &Path, inputs: &[&Path]) -> Result<WholeDirectory, RunError> {
         WholeDirectory::create(target, self.force, inputs)
+    }
+}
+
+/// Where the figures of a command go: as a report into a directory, and as JSON or text to standard
+/// output.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Delivery {
+    /// Directory for a report
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Print the figures as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Delivery {
+    /// Begins the directory, if one is asked for, so that long work is not done in vain; none of
+    /// `inputs` may lie in it.
+    pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, RunError> {
+        let target = self.output.as_deref();
+        let begun = target.map(|target| {
+            let whole = self.overwrite.directory(target, inputs)?;
+            Ok::<_, RunError>((target, whole))
+        });
+        Ok(Begun {
+            directory: begun.transpose()?,
+            json: self.json,
+        })
+    }
+}
+
+/// A delivery whose directory has been begun.
+pub struct Begun<'a> {
+    directory: Option<(&'a Path, WholeDirectory)>,
+    json: bool,
+}
+
+impl Begun<'_> {
+    /// Writes what is asked for, each from its own source.
+    pub fn deliver<D: Serialize>(
+        self,
+        write: impl FnOnce(&Path) -> Result<(), ReportError>,
+        document: impl FnOnce() -> D,
+        text: impl FnOnce() -> String,
+    ) -> anyhow::Result<()> {
+        let mut page = None;
+        if let Some((target, whole)) = self.directory {
+            write(&whole.path())?;
+            whole.commit()?;
+            page = Some(target.join("index.html"));
+        }
+        if self.json {
+            return print((serde_json::to_string_pretty(&document())? + "\n").as_bytes());
+        }
+        print(text().as_bytes())?;
+        if let Some(page) = page {
+            eprintln!("\nreport: {}", page.display());
+        }
+        Ok(())
     }
 }
 

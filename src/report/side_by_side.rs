@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::group::{Group, short_name};
 use super::number::{count, sigma, three_digits, value};
-use super::{ReportError, write_files};
+use super::{ReportError, terminal, write_files};
 use crate::calibration::states::ParameterVector;
 use crate::calibration::{ChiSquare, Comparison, Nees, Side};
 use crate::imu::{InstallationForm, Sensor};
@@ -29,6 +29,19 @@ pub struct Table {
     pub sections: Vec<Vec<Vec<String>>>,
     /// How to read it, a sentence each.
     pub notes: Vec<String>,
+}
+
+/// The comparison as text: what is compared, what must be known of it, and the tables.
+pub fn text(comparison: &Comparison) -> String {
+    let mut text = summary(comparison) + "\n";
+    for warning in warnings(comparison) {
+        text.push_str(&format!("Warning: {warning}\n"));
+    }
+    for table in tables(comparison) {
+        text.push('\n');
+        text.push_str(&terminal::columns(&table));
+    }
+    text
 }
 
 /// What is compared with what, in a sentence or two.

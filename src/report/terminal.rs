@@ -187,11 +187,19 @@ pub(super) fn columns(of: &side_by_side::Table) -> String {
     let headings: Vec<&str> = of.headings.iter().map(String::as_str).collect();
     let mut table = table(&headings);
     table.add_rows(of.sections.iter().flatten());
-    let rows = align(table).to_string();
-    let mut text: String = rows
-        .lines()
-        .map(|row| row.trim_end().to_owned() + "\n")
-        .collect();
+    let shown = align(table).to_string();
+    let lines: Vec<&str> = shown.lines().map(str::trim_end).collect();
+    let width = lines.iter().map(|line| line.chars().count()).max();
+    let rule = "─".repeat(width.unwrap_or(0));
+    // A heading may take several lines, a row takes one.
+    let count: usize = of.sections.iter().map(Vec::len).sum();
+    let (heading, mut rows) = lines.split_at(lines.len().saturating_sub(count));
+    let mut text = heading.join("\n") + "\n";
+    for section in &of.sections {
+        let (of_section, others) = rows.split_at(section.len().min(rows.len()));
+        let _ = writeln!(text, "{rule}\n{}", of_section.join("\n"));
+        rows = others;
+    }
     for note in &of.notes {
         let _ = writeln!(text, "{note}");
     }

@@ -1,6 +1,6 @@
 //! `turncal study accuracy`
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
@@ -9,7 +9,7 @@ use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
 use super::super::calibrate::{Aiding, Installation};
-use super::super::output::{Overwrite, print};
+use super::super::output::Delivery;
 use super::super::progress::Runs;
 
 /// How accurate the filter is, and whether its σ are true
@@ -47,14 +47,8 @@ pub struct Accuracy {
     /// Seed of all random numbers [default: the scenario's]
     #[arg(long)]
     seed: Option<u64>,
-    /// Directory for a report
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Print the figures as one JSON document and nothing else
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
-    overwrite: Overwrite,
+    delivery: Delivery,
 }
 
 impl Accuracy {
@@ -76,28 +70,14 @@ impl Accuracy {
             seed: self.seed.unwrap_or(scenario.seed),
             scenario,
         };
-        let target = self.output.as_deref();
-        let directory = target
-            .map(|target| {
-                self.overwrite
-                    .directory(target, &[Path::new(&self.scenario)])
-            })
-            .transpose()?;
+        let begun = self.delivery.begin(&[Path::new(&self.scenario)])?;
         let runs = Runs::new(self.runs);
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);
-        if let Some(directory) = directory {
-            report::accuracy::write(&accuracy, &directory.path())?;
-            directory.commit()?;
-        }
-        if self.json {
-            let document = report::accuracy::document(&accuracy);
-            return print((serde_json::to_string_pretty(&document)? + "\n").as_bytes());
-        }
-        print(report::accuracy::summary(&accuracy).as_bytes())?;
-        if let Some(target) = target {
-            eprintln!("\nreport: {}", target.join("index.html").display());
-        }
-        Ok(())
+        begun.deliver(
+            |directory| report::accuracy::write(&accuracy, directory),
+            || report::accuracy::document(&accuracy),
+            || report::accuracy::summary(&accuracy),
+        )
     }
 }

@@ -1,6 +1,6 @@
 //! `turncal study experiment`
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use turncal::models::{self, Place};
 use turncal::report;
@@ -9,7 +9,7 @@ use turncal::study::ExperimentStudy;
 use turncal::study::navigation::INTERVAL;
 
 use super::super::navigate::hours;
-use super::super::output::{Overwrite, print};
+use super::super::output::Delivery;
 use super::super::progress::Runs;
 
 const HOUR: f64 = 3600.0;
@@ -40,14 +40,8 @@ pub struct Experiment {
     /// How long each navigates, to the minute, up to 1000
     #[arg(long, default_value_t = 40.0, value_parser = hours)]
     hours: f64,
-    /// Directory for a report
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Print the figures as one JSON document and nothing else
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
-    overwrite: Overwrite,
+    delivery: Delivery,
 }
 
 impl Experiment {
@@ -63,28 +57,14 @@ impl Experiment {
             intervals: (self.hours * HOUR / INTERVAL).round() as u32,
             samples: self.samples,
         };
-        let target = self.output.as_deref();
-        let directory = target
-            .map(|target| {
-                self.overwrite
-                    .directory(target, &[Path::new(&self.trajectory)])
-            })
-            .transpose()?;
+        let begun = self.delivery.begin(&[Path::new(&self.trajectory)])?;
         let runs = Runs::new(self.samples);
         let experiment = study.run(&|| runs.one_done())?;
         drop(runs);
-        if let Some(directory) = directory {
-            report::experiment::write(&experiment, &directory.path())?;
-            directory.commit()?;
-        }
-        if self.json {
-            let document = report::experiment::document(&experiment);
-            return print((serde_json::to_string_pretty(&document)? + "\n").as_bytes());
-        }
-        print(report::experiment::summary(&experiment).as_bytes())?;
-        if let Some(target) = target {
-            eprintln!("\nreport: {}", target.join("index.html").display());
-        }
-        Ok(())
+        begun.deliver(
+            |directory| report::experiment::write(&experiment, directory),
+            || report::experiment::document(&experiment),
+            || report::experiment::summary(&experiment),
+        )
     }
 }

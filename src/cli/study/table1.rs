@@ -1,13 +1,12 @@
 //! `turncal study table1`
 
-use std::path::PathBuf;
-
 use turncal::report;
 use turncal::study::Table1Study;
 use turncal::study::table1::paper;
 use turncal::units::DEGREE;
 
-use super::super::output::{Overwrite, print};
+use super::super::navigate::hours;
+use super::super::output::Delivery;
 use super::super::progress::Activity;
 
 /// The paper's Table 1: what a simplified installation form costs in 40 h of navigation
@@ -17,6 +16,7 @@ use super::super::progress::Activity;
 /// errors. Shows the largest errors beside the paper's figures, under every reading of its text, and
 /// says which of them a correct program gives.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("output", |output| output.help("Directory for a report with the paper's Figures 2 to 9")))]
 #[command(after_help = "Examples:
   turncal study table1 -o table1
   turncal study table1 --samples 4000 --json
@@ -28,31 +28,14 @@ pub struct Table1 {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Length of a run in hours, 1000 at most
+    /// Length of a run in hours, a minute to 1000
     #[arg(long, default_value_t = paper::HOURS, value_parser = hours)]
     hours: f64,
     /// Geodetic latitude in degrees; the paper states none, its figures say 45.78
     #[arg(long, default_value_t = paper::LATITUDE_DEG, allow_negative_numbers = true)]
     latitude_deg: f64,
-    /// Directory for a report with the paper's Figures 2 to 9
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Print the figures as one JSON document and nothing else
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
-    overwrite: Overwrite,
-}
-
-fn hours(text: &str) -> Result<f64, String> {
-    let hours: f64 = text
-        .parse()
-        .map_err(|_| "expected a number of hours".to_owned())?;
-    if hours > 0.0 && hours <= 1000.0 {
-        Ok(hours)
-    } else {
-        Err("expected more than 0 and at most 1000 hours".to_owned())
-    }
+    delivery: Delivery,
 }
 
 impl Table1 {
@@ -63,25 +46,14 @@ impl Table1 {
             hours: self.hours,
             latitude: self.latitude_deg * DEGREE,
         };
-        let target = self.output.as_deref();
-        let directory = target
-            .map(|target| self.overwrite.directory(target, &[]))
-            .transpose()?;
+        let begun = self.delivery.begin(&[])?;
         let activity = Activity::new("calibrating and navigating");
         let table = study.run()?;
         drop(activity);
-        if let Some(directory) = directory {
-            report::table1::write(&table, &directory.path())?;
-            directory.commit()?;
-        }
-        if self.json {
-            let document = report::table1::document(&table);
-            return print((serde_json::to_string_pretty(&document)? + "\n").as_bytes());
-        }
-        print(report::table1::summary(&table).as_bytes())?;
-        if let Some(target) = target {
-            eprintln!("\nreport: {}", target.join("index.html").display());
-        }
-        Ok(())
+        begun.deliver(
+            |directory| report::table1::write(&table, directory),
+            || report::table1::document(&table),
+            || report::table1::summary(&table),
+        )
     }
 }
