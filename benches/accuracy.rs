@@ -17,6 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let study = AccuracyStudy {
         scenario: Scenario::load("demo")?,
         form: InstallationForm::General,
+        unmodelled: Vec::new(),
         runs: RUNS,
         seed: SEED,
     };

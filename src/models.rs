@@ -110,6 +110,7 @@ embed!(
     "experiment",
     "mems",
     "nineteen-position",
+    "real-table",
     "single-axis",
     "two-axis",
 );

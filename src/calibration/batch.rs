@@ -27,7 +27,7 @@ use super::states::{
 use crate::attitude::{exp, log};
 use crate::imu::Triad;
 use crate::navigation::{Block, BlockMatrix, Navigator, State};
-use crate::run::Run;
+use crate::run::{Run, StateBlock};
 
 /// The attitude error at the first sample is the initial one to within this, rad: a number so small
 /// that it is none, where a row needs a σ.
@@ -39,8 +39,13 @@ const NO_SOURCE: f64 = 1e-14;
 /// observations that it let in, by batch least squares.
 ///
 /// # Errors
-/// [`CalibrationError`] where the run is not the one of the outcome.
+/// [`CalibrationError`] where the run is not the one of the outcome, or has a block of states on that
+/// the batch does not know.
 pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
+    let on = StateBlock::ALL.into_iter().find(|&block| run.has(block));
+    if let Some(block) = on {
+        return Err(CalibrationError::NotInBatch { block });
+    }
     let form = outcome.estimate.form();
     let schedule = Schedule::new(run, &run.dwells())?;
     let problem = problem(

@@ -3,6 +3,7 @@
 use super::coarse::coarse_start;
 use super::error::CalibrationError;
 use super::estimator::problem;
+use super::further::Further;
 use super::outcome::{Estimate, Moment};
 use super::pass::{Gate, Linearisation, Mode, pass};
 use super::schedule::{Schedule, first_reading};
@@ -15,11 +16,13 @@ use crate::run::Run;
 pub struct Bound {
     /// The truth, with the covariance that is the bound.
     pub estimate: Estimate,
+    /// Covariance of the constants beside the parameters.
+    pub further: Further,
     /// σ against time.
     pub history: Vec<Moment>,
 }
 
-/// The covariance of a held pass linearised at the truth, in the truth's own installation form:
+/// The covariance of a held pass linearised at the truth, `terms` those of the instrument, in the truth's own installation form:
 /// the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
 /// Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the first
 /// reading or the coarse start: arc seconds of tilt and arc minutes of heading are nothing to the
@@ -27,7 +30,11 @@ pub struct Bound {
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
-pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationError> {
+pub fn bound(
+    run: &Run,
+    truth: &PerSensor<Triad>,
+    terms: &FurtherVector,
+) -> Result<Bound, CalibrationError> {
     let dwells = run.dwells();
     let schedule = Schedule::new(run, &dwells)?;
     let form = truth.gyro.form;
@@ -37,7 +44,7 @@ pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationEr
     };
     let at = Linearisation {
         triads: *truth,
-        further: FurtherVector::zeros(),
+        further: *terms,
         initial_attitude,
     };
     let sigma = velocity_sigma(run, &dwells);
@@ -48,6 +55,7 @@ pub fn bound(run: &Run, truth: &PerSensor<Triad>) -> Result<Bound, CalibrationEr
             triads: *truth,
             covariance: result.covariance,
         },
+        further: result.further,
         history: result.history,
     })
 }

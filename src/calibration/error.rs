@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::imu::Sensor;
+use crate::run::StateBlock;
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
 /// and what to do.
@@ -52,6 +53,15 @@ pub enum CalibrationError {
         sensor: Sensor,
         /// Dwells used.
         dwells: usize,
+    },
+    /// A block of states that batch least squares does not have.
+    #[error(
+        "the run switches {} on, which batch least squares does not know; switch it off in run and \
+         outcome", .block.name()
+    )]
+    NotInBatch {
+        /// The block.
+        block: StateBlock,
     },
     /// Samples that no error within the prior explains, or absurd noise figures.
     #[error(

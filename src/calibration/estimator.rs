@@ -6,15 +6,16 @@ use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::filter::Start;
 use super::form::{FormTest, form_test};
+use super::further::constant_name;
 use super::observability::Observability;
-use super::outcome::{Estimate, Further, Innovation, Outcome, Pass, to_vector};
+use super::outcome::{Estimate, Innovation, Outcome, Pass, to_vector};
 use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
 use super::states::ParameterVector;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor, Term};
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
 use crate::run::Run;
 use crate::run::record::BodyFrame;
 use crate::units::{ARCSEC, DEGREE};
@@ -97,12 +98,7 @@ pub fn estimate(
         prior_attitude: problem.initial_attitude,
         prior_attitude_sigma: problem.start.attitude,
         attitude_sigma: held.attitude_sigma,
-        table_errors: held.table_errors,
-        further: Further {
-            values: held.estimate.further,
-            sigma: held.further_sigma,
-            prior_sigma: problem.further_sigma,
-        },
+        further: held.further,
         linearised_at: held.at,
         converged,
         consistency: consistency(&held.innovations),
@@ -178,7 +174,7 @@ pub(super) fn problem<'a>(
     initial_attitude: Matrix3<f64>,
     velocity_sigma: f64,
 ) -> Problem<'a> {
-    let table_errors = run.table.as_ref().map(|t| t.errors).unwrap_or_default();
+    let table_geometry = run.table.as_ref().map(|t| t.geometry).unwrap_or_default();
     let (position_sigma, reading_sigma) = run.table.as_ref().map_or((0.0, 0.0), |table| {
         (table.position_sigma, table.reading_sigma)
     });
@@ -198,7 +194,7 @@ pub(super) fn problem<'a>(
         prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
         further_sigma: run.further_sigma,
-        table_errors,
+        table_geometry,
         start: Start {
             attitude: match run.table {
                 // The one reading that gave it has both errors.
@@ -206,7 +202,7 @@ pub(super) fn problem<'a>(
                     INITIAL_ATTITUDE.max(
                         10.0 * position_sigma
                             .hypot(reading_sigma)
-                            .hypot(table_errors.base.max()),
+                            .hypot(table_geometry.base.max()),
                     ),
                 ),
                 None => Vector3::from(COARSE_ATTITUDE),
@@ -271,7 +267,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     let hidden: Vec<String> = outcome
         .further
         .unobserved()
-        .filter_map(Term::parameter_name)
+        .filter_map(constant_name)
         .collect();
     if !hidden.is_empty() {
         warnings.push(format!(

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
+use super::further::{ConstantMatrix, ConstantVector, CrossMatrix, Further, constants};
 use super::observability::AttitudeCovariance;
 use super::states::{
     ATTITUDE, AXES, BASE, DRIFT, FURTHER_PARAMETER, INITIAL_ATTITUDE, NAVIGATION, PARAMETER,
@@ -11,7 +12,7 @@ use super::states::{
 use crate::attitude::{exp, log};
 use crate::imu::{FurtherVector, Instability, PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, State};
-use crate::run::{AXIS_TILTS, TABLE_ERRORS, TableErrors, Tilts};
+use crate::run::{AXIS_TILTS, TableGeometry, Tilts};
 
 const GYRO: usize = PARAMETER;
 const ACCEL: usize = PARAMETER + PER_TRIAD;
@@ -143,26 +144,16 @@ impl<const N: usize> Filter<N> {
 
     /// The same with errors of the table's own: σ of its base about East, North and Up, and of the tilt
     /// of its axes.
-    pub fn with_table(mut self, errors: &TableErrors) -> Self {
+    pub fn with_table(mut self, sigma: &TableGeometry) -> Self {
         if N >= STATES_WITH_TABLE {
             for axis in 0..3 {
-                self.p[(BASE + axis, BASE + axis)] = errors.base[axis].powi(2);
+                self.p[(BASE + axis, BASE + axis)] = sigma.base[axis].powi(2);
             }
-            for axis in AXES..AXES + AXIS_TILTS {
-                self.p[(axis, axis)] = errors.axes.powi(2);
+            for k in 0..AXIS_TILTS {
+                self.p[(AXES + k, AXES + k)] = sigma.axes[k].powi(2);
             }
         }
         self
-    }
-
-    /// Estimate and σ of the table's own errors: base, then tilts of axes; zero without them.
-    pub fn table_errors(&self) -> [SVector<f64, TABLE_ERRORS>; 2] {
-        let x = |k: usize| self.x.get(BASE + k).copied();
-        let variance = |k: usize| self.p.get((BASE + k, BASE + k)).copied();
-        [
-            SVector::from_fn(|k, _| x(k).unwrap_or(0.0)),
-            SVector::from_fn(|k, _| variance(k).unwrap_or(0.0).max(0.0).sqrt()),
-        ]
     }
 
     /// Each wandering bias: its state, how it wanders, and the parameter that is its constant part.
@@ -353,10 +344,20 @@ impl<const N: usize> Filter<N> {
         FurtherVector::from_fn(|k, _| of(k).unwrap_or(0.0))
     }
 
-    /// 1σ of the errors of further parameters; zero without them.
-    pub fn further_sigma(&self) -> FurtherVector {
-        let of = |state: usize| self.p.get((state, state)).copied();
-        FurtherVector::from_fn(|k, _| of(FURTHER_PARAMETER + k).unwrap_or(0.0).max(0.0).sqrt())
+    /// Estimates of the constants beside the parameters, those of terms off `at` where the pass
+    /// linearises; zero where they are no states.
+    pub fn constants(&self, at: &FurtherVector, prior_sigma: ConstantVector) -> Further {
+        let covariance = |row: usize, k: usize| self.p.get((row, BASE + k)).copied();
+        let mut values = constants(&SVector::zeros(), at);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value += self.x.get(BASE + k).copied().unwrap_or(0.0);
+        }
+        Further {
+            values,
+            covariance: ConstantMatrix::from_fn(|i, k| covariance(BASE + i, k).unwrap_or(0.0)),
+            cross: CrossMatrix::from_fn(|i, k| covariance(PARAMETER + i, k).unwrap_or(0.0)),
+            prior_sigma,
+        }
     }
 
     /// Covariance of the parameter errors with the initial attitude error in units of its σ.

@@ -107,17 +107,21 @@ impl Estimate {
     /// The same calibration in the general form; what the form held fixed gets the covariance that
     /// follows from its own parameters.
     pub fn in_general_form(&self) -> Self {
-        let triads = in_general_form(&self.triads);
-        let j = jacobian(
-            &self.triads,
-            &triads,
-            BodyFrame::Table,
-            &Matrix3::identity(),
-        );
+        let j = self.to_general_form();
         Self {
-            triads,
+            triads: in_general_form(&self.triads),
             covariance: j * self.covariance * j.transpose(),
         }
+    }
+
+    /// `∂general/∂own` parameters.
+    pub fn to_general_form(&self) -> ParameterMatrix {
+        jacobian(
+            &self.triads,
+            &in_general_form(&self.triads),
+            BodyFrame::Table,
+            &Matrix3::identity(),
+        )
     }
 }
 

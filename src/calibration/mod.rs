@@ -3,6 +3,7 @@
 //! Each takes a [`crate::run::Run`] and gives an [`Estimate`]; none prints, reads files or draws.
 
 mod batch;
+mod block_effect;
 mod bound;
 mod closed_form;
 mod coarse;
@@ -14,6 +15,7 @@ mod estimator;
 mod filter;
 mod form;
 mod frame;
+pub mod further;
 mod group;
 mod nees;
 mod observability;
@@ -26,6 +28,7 @@ mod standstill;
 pub mod states;
 
 pub use batch::batch_estimate;
+pub use block_effect::{BlockEffect, block_effects};
 pub use bound::{Bound, bound};
 pub use closed_form::{ClosedForm, Position, six_position, six_position_of, six_position_triad};
 pub use coarse::coarse_start;

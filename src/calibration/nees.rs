@@ -1,9 +1,8 @@
 //! An error measured by its covariance, correlations included.
 
-use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Dyn, SMatrix, SVector, SymmetricEigen};
 
 use super::consistency::mean_square_interval;
-use super::states::{ParameterMatrix, ParameterVector};
 
 /// A correlation matrix has no information in directions whose eigenvalue is below this: they are
 /// zero but for rounding, as where three angles stand for six.
@@ -21,9 +20,9 @@ pub struct Nees {
 }
 
 /// NEES of a difference over those of some parameters that have a σ; none if none has.
-pub fn nees(
-    difference: &ParameterVector,
-    covariance: &ParameterMatrix,
+pub fn nees<const N: usize>(
+    difference: &SVector<f64, N>,
+    covariance: &SMatrix<f64, N, N>,
     parameters: &[usize],
 ) -> Option<Nees> {
     let with_sigma = parameters.iter().copied();
@@ -48,7 +47,10 @@ pub(super) struct Directions {
 impl Directions {
     /// Of the covariance of some parameters, each of which has a σ; none if there are none, or if the
     /// matrix cannot be a covariance.
-    pub(super) fn new(covariance: &ParameterMatrix, indices: &[usize]) -> Option<Self> {
+    pub(super) fn new<const N: usize>(
+        covariance: &SMatrix<f64, N, N>,
+        indices: &[usize],
+    ) -> Option<Self> {
         let n = indices.len();
         let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
         let correlation = DMatrix::from_fn(n, n, |i, j| {
@@ -67,7 +69,7 @@ impl Directions {
     }
 
     /// Squares of a vector's components along the directions, each in units of its σ.
-    fn squares(&self, v: &ParameterVector) -> Vec<f64> {
+    fn squares<const N: usize>(&self, v: &SVector<f64, N>) -> Vec<f64> {
         let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
         let along = self.eigen.eigenvectors.tr_mul(&z);
         let squares = along.iter().zip(&self.eigen.eigenvalues);

@@ -1,15 +1,13 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::form::FormTest;
+use super::further::Further;
 use super::observability::Observability;
 use super::pass::Linearisation;
 use super::states::{ParameterMatrix, ParameterVector, parameter, sensor_and_parameter};
-use crate::imu::{
-    FURTHER, FurtherVector, InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
-};
-use crate::run::TABLE_ERRORS;
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
 /// Both triads with the covariance of their parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,30 +38,6 @@ impl Estimate {
     /// Indices of the estimated parameters.
     pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.covariance.nrows()).filter(|&i| self.covariance[(i, i)] > 0.0)
-    }
-}
-
-/// Parameters of further terms, in the order of [`crate::imu::Term::ALL`].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Further {
-    /// The estimates.
-    pub values: FurtherVector,
-    /// 1σ of each; zero where the term is off.
-    pub sigma: FurtherVector,
-    /// 1σ before the run, around zero.
-    pub prior_sigma: FurtherVector,
-}
-
-impl Further {
-    /// Indices of the parameters that the run did not observe.
-    pub fn unobserved(&self) -> impl Iterator<Item = usize> + '_ {
-        self.estimated()
-            .filter(|&k| self.sigma[k] > OBSERVED_BELOW * self.prior_sigma[k])
-    }
-
-    /// Indices of the parameters that were estimated.
-    pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..FURTHER).filter(|&k| self.prior_sigma[k] > 0.0)
     }
 }
 
@@ -112,11 +86,8 @@ pub struct Outcome {
     pub prior_attitude_sigma: Vector3<f64>,
     /// … and after it; the last is that of the heading.
     pub attitude_sigma: Vector3<f64>,
-    /// The instrument's further terms.
+    /// Constants beside the parameters: the table's geometry and the instrument's further terms.
     pub further: Further,
-    /// Estimate and 1σ of the table's own errors: base about East, North and Up, then tilts of its axes,
-    /// rad; zero where they are no states.
-    pub table_errors: [SVector<f64, TABLE_ERRORS>; 2],
     /// What the run showed of the parameters and what it left as it was.
     pub observability: Observability,
     /// Where the last pass linearised.

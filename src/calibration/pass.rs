@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
 use super::filter::{Filter, Sight, Start};
+use super::further::{Further, constants};
 use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
 use super::schedule::{Schedule, Standing};
@@ -16,7 +17,7 @@ use super::states::{
 use crate::attitude::{exp, log};
 use crate::imu::{FURTHER, FurtherVector, InstallationForm, PerSensor, Sensor, Triad};
 use crate::navigation::{FurtherTerms, Navigator, State};
-use crate::run::{Run, TABLE_ERRORS, TableErrors};
+use crate::run::{Run, TableGeometry};
 
 /// What all passes over a run share.
 #[derive(Debug, Clone)]
@@ -30,7 +31,7 @@ pub(super) struct Problem<'a> {
     pub prior_sigma: ParameterVector,
     /// 1σ of each further parameter before the run, whose mean is zero; zero where its term is off.
     pub further_sigma: FurtherVector,
-    pub table_errors: TableErrors,
+    pub table_geometry: TableGeometry,
     pub start: Start,
     pub variance: Variance,
     /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
@@ -106,9 +107,8 @@ pub(super) struct PassResult {
     /// The estimate: where the next pass linearises.
     pub estimate: Linearisation,
     pub covariance: ParameterMatrix,
-    pub further_sigma: FurtherVector,
-    /// Estimate and 1σ of the table's own errors.
-    pub table_errors: [SVector<f64, TABLE_ERRORS>; 2],
+    /// Constants beside the parameters.
+    pub further: Further,
     pub attitude_covariance: AttitudeCovariance,
     /// 1σ of the initial attitude, East, North and Up.
     pub attitude_sigma: Vector3<f64>,
@@ -146,7 +146,7 @@ pub(super) fn pass(
     let drifts = |sensor| noise.get(sensor).instability.is_some();
     if problem.further_sigma != FurtherVector::zeros() {
         Pass::<ALL_STATES>::new(problem, at, mode)?.run()
-    } else if problem.table_errors.any() {
+    } else if problem.table_geometry.any() {
         Pass::<STATES_WITH_TABLE>::new(problem, at, mode)?.run()
     } else if Sensor::ALL.into_iter().any(drifts) {
         Pass::<STATES_WITH_DRIFT>::new(problem, at, mode)?.run()
@@ -217,7 +217,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             .with_drift(PerSensor::from_fn(|sensor| {
                 run.noise.get(sensor).instability
             }))
-            .with_table(&problem.table_errors)
+            .with_table(&problem.table_geometry)
             .with_further(&further, &problem.further_sigma);
         Ok(Self {
             problem,
@@ -270,8 +270,13 @@ impl<'a, const N: usize> Pass<'a, N> {
             at: self.at,
             estimate: self.estimate(),
             covariance: self.filter.parameter_covariance(),
-            further_sigma: self.filter.further_sigma(),
-            table_errors: self.filter.table_errors(),
+            further: self.filter.constants(
+                &self.at.further,
+                constants(
+                    &self.problem.table_geometry.vector(),
+                    &self.problem.further_sigma,
+                ),
+            ),
             attitude_covariance: self.filter.attitude_covariance(),
             attitude_sigma: self.filter.initial_attitude_sigma(),
             merit: self.merit,

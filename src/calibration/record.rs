@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::block_effect::BlockEffect;
+use super::further::{Further, constant_name};
 use super::observability::Direction;
-use super::outcome::{Consistency, Estimate, Further, Nis, Outcome, parameter_name};
+use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
 use super::states::{PARAMETERS, sensor_and_parameter};
-use crate::imu::{
-    InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, Triad,
-};
+use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::Run;
 use crate::run::record::{
-    Aiding, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord, EQUATION, Method,
-    NisRecord, TermRecord, TestVector, TriadRecord,
+    Aiding, BlockRecord, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord,
+    EQUATION, Method, NisRecord, TermRecord, TestVector, TriadRecord,
 };
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -24,10 +24,11 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// The record of this calibration of a run.
-    pub fn record(&self, run: &Run) -> CalibrationRecord {
+    /// The record of this calibration of a run, with what blocks of states did to it.
+    pub fn record(&self, run: &Run, effects: &[BlockEffect]) -> CalibrationRecord {
         CalibrationRecord {
             method: Some(Method::Ekf),
+            blocks: effects.iter().map(BlockRecord::from).collect(),
             aiding: Some(match run.body_frame() {
                 BodyFrame::Table => Aiding::Table,
                 BodyFrame::Accelerometer => Aiding::Velocity,
@@ -44,14 +45,15 @@ impl Outcome {
 }
 
 impl Further {
-    /// Its estimated parameters by name.
+    /// Its estimated constants by name.
     pub fn records(&self) -> BTreeMap<String, TermRecord> {
+        let sigma = self.sigma();
         let record = |k: usize| {
             let record = TermRecord {
                 value: self.values[k],
-                sigma: Some(self.sigma[k]),
+                sigma: Some(sigma[k]),
             };
-            Some((Term::parameter_name(k)?, record))
+            Some((constant_name(k)?, record))
         };
         self.estimated().filter_map(record).collect()
     }
@@ -204,6 +206,20 @@ fn direction_records(outcome: &Outcome) -> Vec<DirectionRecord> {
         .iter()
         .map(record)
         .collect()
+}
+
+impl From<&BlockEffect> for BlockRecord {
+    fn from(effect: &BlockEffect) -> Self {
+        Self {
+            block: effect.block.name().to_owned(),
+            on: effect.on,
+            sigma_factors: effect.cost,
+            merit_gain: effect.gain,
+            merit_gain_limit: effect.limit,
+            without: consistency_record(&effect.without),
+            with: consistency_record(&effect.with),
+        }
+    }
 }
 
 fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {

@@ -71,7 +71,7 @@ impl Schedule {
                 unread.start += 1;
             }
             let accel = dwell.mean(Sensor::Accel, run).output;
-            let tilts = run.table.as_ref().filter(|table| table.errors.any());
+            let tilts = run.table.as_ref().filter(|table| table.geometry.any());
             let tilts = tilts.zip(dwell.position.as_ref()).map(|(table, position)| {
                 let of_reading = table.tilts.get(position.readings.start);
                 of_reading.copied().unwrap_or_default()

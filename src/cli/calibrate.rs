@@ -8,12 +8,15 @@ use clap::ValueEnum;
 use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
-use turncal::calibration::{self, CalibrationError, ClosedForm, Outcome, in_body_frame, triads_of};
-use turncal::imu::{InstallationForm, PerSensor, Term, Triad};
+use turncal::calibration::{
+    self, CalibrationError, ClosedForm, Outcome, block_effects, in_body_frame, triads_of,
+};
+use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};
 use turncal::run::{CalibrationRecord, Run};
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
+use super::block::Block;
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 
@@ -41,9 +44,9 @@ pub struct Calibrate {
     /// What the filter observes [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Further error terms to estimate, beside those that the run switches on
-    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
-    with: Vec<FurtherTerm>,
+    /// Blocks of states to estimate, beside those that the run switches on
+    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
+    with: Vec<Block>,
     /// True calibration; the estimator never sees it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -82,33 +85,6 @@ pub enum Aiding {
     Velocity,
 }
 
-/// A further error term.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum FurtherTerm {
-    /// Accelerometers: square of specific force
-    AccelSecondOrder,
-    /// Accelerometers: size of specific force, whatever its sign
-    AccelAsymmetry,
-    /// Accelerometers that do not stand in one point
-    SizeEffect,
-    /// Accelerometer samples later than the gyros'
-    TimeOffset,
-    /// Gyros that sense specific force
-    GSensitivity,
-}
-
-impl From<FurtherTerm> for Term {
-    fn from(term: FurtherTerm) -> Self {
-        match term {
-            FurtherTerm::AccelSecondOrder => Self::AccelSecondOrder,
-            FurtherTerm::AccelAsymmetry => Self::AccelAsymmetry,
-            FurtherTerm::SizeEffect => Self::SizeEffect,
-            FurtherTerm::TimeOffset => Self::TimeOffset,
-            FurtherTerm::GSensitivity => Self::GSensitivity,
-        }
-    }
-}
-
 impl From<Installation> for InstallationForm {
     fn from(form: Installation) -> Self {
         match form {
@@ -143,8 +119,8 @@ impl Calibrate {
             Some(Aiding::Velocity) => run.table = None,
             Some(Aiding::Table) | None => {}
         }
-        for &term in &self.with {
-            run.switch_on(term.into());
+        for block in &self.with {
+            block.switch_on(&mut run)?;
         }
         let form = self.installation.into();
         let truth = self
@@ -180,8 +156,12 @@ impl Calibrate {
                 Result::ClosedForm(Box::new(closed_form))
             }
         };
+        let effects = match &result {
+            Result::Filter(outcome) => block_effects(&run, outcome)?,
+            Result::ClosedForm(_) => Vec::new(),
+        };
         let record = match &result {
-            Result::Filter(outcome) => outcome.record(&run),
+            Result::Filter(outcome) => outcome.record(&run, &effects),
             Result::ClosedForm(closed_form) => closed_form.estimate.record(&run),
         };
         let note = match &result {
@@ -201,6 +181,7 @@ impl Calibrate {
                 Result::Filter(outcome) => Some(outcome),
                 Result::ClosedForm(_) => None,
             },
+            effects: &effects,
             closed_form: match &result {
                 Result::Filter(_) => None,
                 Result::ClosedForm(closed_form) => Some(report::ClosedForm {

@@ -48,6 +48,7 @@ impl Demo {
         let (turning, (standing, closed_form)) = (turning?, standing?);
         let run = &turning.run;
         let outcome = filter(run, FORM, &activity)?;
+        let effects = calibration::block_effects(run, &outcome)?;
 
         let note = note(&closed_form);
         let dwells = dwell_times(run);
@@ -61,6 +62,7 @@ impl Demo {
             title: "turncal demo",
             run,
             outcome: Some(&outcome),
+            effects: &effects,
             closed_form: Some(report::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
@@ -80,7 +82,7 @@ impl Demo {
         };
         let (filtered, closed) = (method("ekf")?, method("six-position")?);
         write(&standing, &closed)?;
-        let record = outcome.record(run);
+        let record = outcome.record(run, &effects);
         record.write(&filtered.join("calibration.json"), false)?;
         let record = closed_form.estimate.record(&standing.run);
         record.write(&closed.join("calibration.json"), false)?;

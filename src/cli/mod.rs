@@ -1,5 +1,6 @@
 //! Commands: each parses its arguments, calls the library and says what came of it.
 
+mod block;
 mod calibrate;
 mod compare;
 mod demo;

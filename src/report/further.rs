@@ -1,14 +1,16 @@
-//! How the parameters of further terms are spoken of.
+//! How constants beside the parameters of the triads are spoken of.
 
 use super::number::{sigma, three_digits, value};
-use crate::calibration::outcome::Further;
+use crate::calibration::further::{Constant, Further, constant_name};
 use crate::imu::Term;
+use crate::run::StateBlock;
+use crate::units::ARCSEC;
 
-/// One parameter, each number as it is shown.
+/// One constant, each number as it is shown.
 pub(super) struct Row {
-    /// The term in words.
+    /// Its block in words.
     pub title: &'static str,
-    /// Whether it is the term's first.
+    /// Whether it is the block's first.
     pub first: bool,
     /// The name that files use, such as `accel.second_order.x`.
     pub name: String,
@@ -22,34 +24,48 @@ pub(super) struct Row {
     pub remaining: f64,
 }
 
-fn title(term: Term) -> &'static str {
-    match term {
-        Term::AccelSecondOrder => "accel second order",
-        Term::AccelAsymmetry => "accel asymmetry",
-        Term::SizeEffect => "accel lever arm",
-        Term::TimeOffset => "accel time offset",
-        Term::GSensitivity => "gyro g-sensitivity",
+/// A block in words.
+pub(super) fn title(block: StateBlock) -> &'static str {
+    match block {
+        StateBlock::WanderingBias => "wandering biases",
+        StateBlock::TableBase => "table level and north",
+        StateBlock::TableAxes => "table axes",
+        StateBlock::Term(Term::AccelSecondOrder) => "accel second order",
+        StateBlock::Term(Term::AccelAsymmetry) => "accel asymmetry",
+        StateBlock::Term(Term::SizeEffect) => "accel lever arm",
+        StateBlock::Term(Term::TimeOffset) => "accel time offset",
+        StateBlock::Term(Term::GSensitivity) => "gyro g-sensitivity",
     }
 }
 
-/// Every parameter that was estimated.
+/// Name and value in SI of the unit that a block's constants are shown in.
+pub(super) fn unit(block: StateBlock) -> (&'static str, f64) {
+    match block {
+        StateBlock::Term(term) => term.unit(),
+        StateBlock::TableBase | StateBlock::TableAxes | StateBlock::WanderingBias => ("″", ARCSEC),
+    }
+}
+
+/// Every constant that was estimated.
 pub(super) fn rows(further: &Further) -> Vec<Row> {
-    let row = |k: usize| {
-        let (term, name) = (Term::of(k)?, Term::parameter_name(k)?);
-        let (unit, in_si) = term.unit();
-        let (posterior, prior) = (further.sigma[k], further.prior_sigma[k]);
-        let axis = name.rsplit('.').next().filter(|end| end.len() <= 2);
+    let posterior = further.sigma();
+    let mut last = None;
+    let mut row = |k: usize| {
+        let (block, name) = (Constant::of(k)?.block(), constant_name(k)?);
+        let (unit, in_si) = unit(block);
+        let prior = further.prior_sigma[k];
+        let axis = name.rsplit('.').next().filter(|end| *end != "time_offset");
         Some(Row {
-            title: title(term),
-            first: k == term.parameters().start,
-            axis: axis.unwrap_or_default().to_owned(),
-            value: value(further.values[k] / in_si, posterior / in_si),
-            sigma: sigma(posterior / in_si),
+            title: title(block),
+            first: last.replace(block) != Some(block),
+            axis: axis.unwrap_or_default().replace('_', " "),
+            value: value(further.values[k] / in_si, posterior[k] / in_si),
+            sigma: sigma(posterior[k] / in_si),
             unit,
             prior: three_digits(prior / in_si),
-            remaining: posterior / prior,
+            remaining: posterior[k] / prior,
             name,
         })
     };
-    further.estimated().filter_map(row).collect()
+    further.estimated().filter_map(&mut row).collect()
 }

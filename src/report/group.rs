@@ -18,6 +18,16 @@ impl Group {
         format!("{} {kind}", self.sensor().name())
     }
 
+    /// Such as `gyro K`.
+    pub fn short(self) -> String {
+        let letter = match self.kind() {
+            ParameterKind::Scale => 'K',
+            ParameterKind::Installation => 'E',
+            ParameterKind::Bias => 'D',
+        };
+        format!("{} {letter}", self.sensor().name())
+    }
+
     /// Its key in documents, such as `gyro.scale_ppm`.
     pub fn key(self) -> String {
         let quantity = match (self.kind(), self.sensor()) {
@@ -77,17 +87,7 @@ pub fn axis_name(form: InstallationForm, index: usize) -> String {
 
 /// A short name for a figure's margin, such as `gyro E xy`.
 pub fn short_name(form: InstallationForm, index: usize) -> String {
-    let group = Group::of(index);
-    let letter = match group.kind() {
-        ParameterKind::Scale => 'K',
-        ParameterKind::Installation => 'E',
-        ParameterKind::Bias => 'D',
-    };
-    format!(
-        "{} {letter} {}",
-        group.sensor().name(),
-        axis_name(form, index)
-    )
+    format!("{} {}", Group::of(index).short(), axis_name(form, index))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 pub mod accuracy;
 mod axis;
+mod blocks;
 mod canvas;
 mod comparison;
 mod correlation;
@@ -33,6 +34,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use crate::calibration::BlockEffect;
 use crate::calibration::outcome::{Estimate, Outcome, to_vector};
 use crate::calibration::states::ParameterVector;
 use crate::imu::{PerSensor, Triad};
@@ -49,6 +51,8 @@ pub struct Report<'a> {
     pub run: &'a Run,
     /// The filter's result, if it ran.
     pub outcome: Option<&'a Outcome>,
+    /// What blocks of states did to it, or would do.
+    pub effects: &'a [BlockEffect],
     /// The closed form's result, if there is one.
     pub closed_form: Option<ClosedForm<'a>>,
     /// The true triads, where they are known.

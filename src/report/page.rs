@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::{Figure, Report, facts, navigation, number, tables};
+use super::{Figure, Report, blocks, facts, navigation, number, tables};
 
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
@@ -32,6 +32,13 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
                 }
             }
             section { h2 { "Passes" } (tables::passes(outcome)) }
+            @for of_blocks in blocks::tables(report.effects) {
+                section {
+                    h2 { (of_blocks.title) }
+                    (tables::table(&of_blocks.headings, of_blocks.sections))
+                    p.note { (of_blocks.notes.join(" ")) }
+                }
+            }
         }
         (navigation::outlook::section(report.navigation))
         @for figure in figures { (drawn(figure)) }
@@ -96,7 +103,7 @@ fn summary(report: &Report) -> String {
 
 /// Warnings and what was not observed, before any figure.
 fn notices(report: &Report) -> Markup {
-    let notices = report.outcome.map_or(&[][..], |outcome| &outcome.warnings);
+    let notices = report.warnings();
     html! {
         @if notices.is_empty() {
             @if report.outcome.is_some() { p.quiet { "No warnings." } }

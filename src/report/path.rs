@@ -177,7 +177,7 @@ mod tests {
             attitude,
             position_sigma: 0.0,
             reading_sigma: 0.0,
-            errors: Default::default(),
+            geometry: Default::default(),
             tilts: Vec::new(),
         }
     }

@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
-use super::{Report, further, navigation, side_by_side};
+use super::{Report, blocks, further, navigation, side_by_side};
 use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
@@ -22,10 +22,21 @@ impl Report<'_> {
         if let Some(line) = navigation::outlook::line(self.navigation.unwrap_or_default()) {
             let _ = writeln!(text, "\n{line}");
         }
-        for warning in self.outcome.map_or(&[][..], |outcome| &outcome.warnings) {
+        for of_blocks in blocks::tables(self.effects) {
+            let _ = write!(text, "\n{}\n{}", of_blocks.title, columns(&of_blocks));
+        }
+        for warning in self.warnings() {
             let _ = writeln!(text, "\nWarning: {warning}");
         }
         text
+    }
+
+    /// What a calibration engineer must know before using the figures.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.warnings);
+        let mut warnings = of_outcome.to_vec();
+        warnings.extend(blocks::advice(self.effects));
+        warnings
     }
 
     fn heading(&self) -> String {

@@ -247,7 +247,7 @@ mod tests {
             time,
             position_sigma: ARCSEC,
             reading_sigma: 0.5 * ARCSEC,
-            errors: Default::default(),
+            geometry: Default::default(),
             tilts: Vec::new(),
         });
         let dwells = run.dwells();

@@ -14,7 +14,8 @@ mod quantity;
 mod read;
 pub mod record;
 mod segments;
-mod table_errors;
+pub(crate) mod state_block;
+mod table_geometry;
 mod table_log;
 mod whole;
 mod write;
@@ -22,7 +23,10 @@ mod write;
 pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
 pub use record::CalibrationRecord;
-pub use table_errors::{AXIS_TILTS, TABLE_ERRORS, TableErrors, Tilts, tilts};
+pub use state_block::StateBlock;
+pub use table_geometry::{
+    AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,
+};
 pub use whole::{WholeDirectory, write_whole};
 pub use write::write_run;
 
@@ -32,7 +36,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::earth::Site;
 use crate::imu::{
-    FurtherVector, InstallationForm, Noise, Nominal, PerSensor, Prior, Term, Triad, TriadVector,
+    FurtherVector, InstallationForm, Noise, Nominal, PerSensor, Prior, Triad, TriadVector,
 };
 use record::BodyFrame;
 
@@ -73,15 +77,6 @@ impl Run {
         match self.table {
             Some(_) => BodyFrame::Table,
             None => BodyFrame::Accelerometer,
-        }
-    }
-
-    /// Switches a further term on, with its usual σ unless the run states one.
-    pub fn switch_on(&mut self, term: Term) {
-        for parameter in term.parameters() {
-            if self.further_sigma[parameter] == 0.0 {
-                self.further_sigma[parameter] = term.usual_sigma();
-            }
         }
     }
 
@@ -155,7 +150,7 @@ pub struct TableRecord {
     /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
     /// 1σ of what it does not read.
-    pub errors: TableErrors,
+    pub geometry: TableGeometry,
     /// How the attitude turns with tilts of the axes at each reading; empty where it does not tell the
     /// axes apart.
     pub tilts: Vec<Tilts>,

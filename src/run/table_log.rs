@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use super::csv_file::CsvFile;
 use super::error::RunError;
 use super::fields::Fields;
-use super::{ImuRecord, TableErrors, TableRecord, Tilts, tilts};
+use super::{ImuRecord, TableGeometry, TableRecord, Tilts, tilts};
 use crate::attitude;
 use crate::units::{ARCSEC, DEGREE};
 
@@ -144,7 +144,7 @@ pub(super) struct TableLog<'a> {
     pub position_sigma: f64,
     /// rad
     pub reading_sigma: f64,
-    pub errors: TableErrors,
+    pub geometry: TableGeometry,
 }
 
 impl<'a> TableLog<'a> {
@@ -193,9 +193,14 @@ impl<'a> TableLog<'a> {
             ));
         }
         let level = optional("level_sigma_arcsec")?;
-        let errors = TableErrors {
+        let geometry = TableGeometry {
             base: Vector3::new(level, level, optional("north_sigma_arcsec")?),
-            axes: optional(nonorthogonality)?,
+            axes: match &attitude {
+                AttitudeColumns::Angles(angles) => {
+                    TableGeometry::tilts_of(angles.len(), optional(nonorthogonality)?)
+                }
+                AttitudeColumns::Quaternion(_) => TableGeometry::default().axes,
+            },
         };
         let sigma = |name| -> Result<f64, RunError> {
             Ok(fields.need(name, "a 1σ in seconds of arc")?.positive()? * ARCSEC)
@@ -206,7 +211,7 @@ impl<'a> TableLog<'a> {
             attitude,
             position_sigma: sigma("position_sigma_arcsec")?,
             reading_sigma: sigma("reading_sigma_arcsec")?,
-            errors,
+            geometry,
         }))
     }
 
@@ -247,7 +252,7 @@ impl<'a> TableLog<'a> {
             attitude,
             position_sigma: self.position_sigma,
             reading_sigma: self.reading_sigma,
-            errors: self.errors,
+            geometry: self.geometry,
             tilts,
         })
     }

@@ -238,7 +238,7 @@ reading_sigma_arcsec = {reading:?}    # white, each reading
             reading = short(table.reading_sigma / ARCSEC),
         ));
         // The quaternion does not tell the axes apart, so their tilts cannot be had from the file.
-        let base = table.errors.base;
+        let base = table.geometry.base;
         for (name, sigma) in [("level", base.x), ("north", base.z)] {
             if sigma > 0.0 {
                 sections.push(format!(

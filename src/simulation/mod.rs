@@ -6,7 +6,7 @@
 mod increments;
 mod scenario;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -16,7 +16,9 @@ pub use scenario::{Given, Scenario};
 
 use crate::attitude::exp;
 use crate::imu::{FurtherVector, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
-use crate::run::{ImuRecord, Run, Standstill, TableErrors, TableRecord, Tilts, tilts};
+use crate::run::{
+    ImuRecord, Run, Standstill, TABLE_GEOMETRY, TableGeometry, TableRecord, Tilts, across, tilts,
+};
 use crate::turntable::{Imperfection, Motion, Moves, TableError};
 
 /// A run and what it was made from.
@@ -28,6 +30,8 @@ pub struct Simulated {
     pub truth: PerSensor<Triad>,
     /// Those of its further terms.
     pub further: FurtherVector,
+    /// The table's true geometry, in the order of [`crate::run::TableGeometry::vector`], rad.
+    pub geometry: SVector<f64, TABLE_GEOMETRY>,
     /// What a sample holds when the run is written to a file.
     pub output: Output,
 }
@@ -145,8 +149,16 @@ impl Scenario {
             run,
             truth,
             further,
+            geometry: self.geometry(&imperfection),
             output: self.output,
         })
+    }
+
+    fn geometry(&self, imperfection: &Imperfection) -> SVector<f64, TABLE_GEOMETRY> {
+        let axes = self.table.axes.iter().zip(&imperfection.tilt).skip(1);
+        let tilts = axes.flat_map(|(axis, tilt)| across(&axis.direction).map(|a| a.dot(tilt)));
+        let mut all = imperfection.base.iter().copied().chain(tilts);
+        SVector::from_fn(|_, _| all.next().unwrap_or(0.0))
     }
 
     fn sensed(
@@ -215,11 +227,13 @@ impl Scenario {
         TableRecord {
             position_sigma: errors.position,
             reading_sigma: errors.reading,
-            errors: TableErrors {
+            geometry: TableGeometry {
                 base: Vector3::new(errors.level, errors.level, errors.north),
                 axes: match self.path.moves {
-                    Moves::Axes { .. } => errors.nonorthogonality,
-                    Moves::Body { .. } => 0.0,
+                    Moves::Axes { .. } => {
+                        TableGeometry::tilts_of(self.table.axes.len(), errors.nonorthogonality)
+                    }
+                    Moves::Body { .. } => SVector::zeros(),
                 },
             },
             tilts: self.tilts(motion, &time),

@@ -12,6 +12,7 @@ use crate::models::{
     self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
 use crate::run::record::BodyFrame;
+use crate::run::state_block::{StateBlock, USUAL_LEVEL, USUAL_NORTH, USUAL_TILT};
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
@@ -118,6 +119,55 @@ impl Scenario {
             message,
         })?;
         Ok(self)
+    }
+
+    /// The same scenario with the errors of a block, of usual size unless its models state one.
+    pub fn with_block(mut self, block: StateBlock) -> Self {
+        match block {
+            StateBlock::WanderingBias => {
+                let noise = &mut self.instrument.noise;
+                for noise in [&mut noise.gyro, &mut noise.accel] {
+                    noise.instability.get_or_insert(noise.usual_instability());
+                }
+            }
+            StateBlock::TableBase | StateBlock::TableAxes => {
+                let errors = &mut self.table.errors;
+                let base = errors.level == 0.0 && errors.north == 0.0;
+                if block == StateBlock::TableBase && base {
+                    (errors.level, errors.north) = (USUAL_LEVEL, USUAL_NORTH);
+                }
+                if block == StateBlock::TableAxes && errors.nonorthogonality == 0.0 {
+                    errors.nonorthogonality = USUAL_TILT;
+                }
+            }
+            StateBlock::Term(term) => {
+                for parameter in term.parameters() {
+                    let sigma = &mut self.instrument.further_sigma[parameter];
+                    if *sigma == 0.0 {
+                        *sigma = term.usual_sigma();
+                    }
+                }
+            }
+        }
+        self
+    }
+
+    /// Whether its runs have the states of a block.
+    pub fn has(&self, block: StateBlock) -> bool {
+        let sees_table = self.body_frame == BodyFrame::Table;
+        let errors = &self.table.errors;
+        match block {
+            StateBlock::WanderingBias => {
+                let wanders = |sensor| self.instrument.noise.get(sensor).instability.is_some();
+                Sensor::ALL.into_iter().any(wanders)
+            }
+            StateBlock::TableBase => sees_table && errors.level.max(errors.north) > 0.0,
+            StateBlock::TableAxes => sees_table && errors.nonorthogonality > 0.0,
+            StateBlock::Term(term) => {
+                let sigma = &self.instrument.further_sigma;
+                term.parameters().any(|k| sigma[k] > 0.0)
+            }
+        }
     }
 
     /// How long a run takes, s.

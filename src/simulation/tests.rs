@@ -112,7 +112,7 @@ fn level_and_north_errors_move_the_truth_but_not_the_reading() {
     let [plain, crooked] = [demo(), crooked].map(|scenario| scenario.simulate(1, 0).unwrap());
     let [read, of_crooked] = [&plain, &crooked].map(|made| made.run.table.as_ref().unwrap());
     assert_eq!(read.attitude, of_crooked.attitude);
-    assert!(!read.errors.any() && of_crooked.errors.any());
+    assert!(!read.geometry.any() && of_crooked.geometry.any());
     assert_ne!(plain.run.imu.accel, crooked.run.imu.accel);
 }
 

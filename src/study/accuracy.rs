@@ -5,6 +5,7 @@
 
 mod baseline;
 mod figures;
+mod further;
 mod navigation;
 mod trial;
 
@@ -13,9 +14,10 @@ use rayon::prelude::*;
 use super::navigation::NavigationStudyError;
 use crate::calibration::outcome::Nis;
 use crate::calibration::states::{PARAMETERS, ParameterVector};
-use crate::calibration::{CalibrationError, Group, mean_square_interval};
+use crate::calibration::{BlockEffect, CalibrationError, Group, mean_square_interval};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
+use crate::run::StateBlock;
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
@@ -24,6 +26,7 @@ use navigation::Way;
 
 pub use baseline::Baseline;
 pub use figures::Figures;
+pub use further::FurtherAccuracy;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
@@ -34,6 +37,8 @@ pub struct AccuracyStudy {
     pub scenario: Scenario,
     /// The filter's installation form; the truth has that of the scenario.
     pub form: InstallationForm,
+    /// Blocks of states whose errors are there and that the filter does not have.
+    pub unmodelled: Vec<StateBlock>,
     /// Number of runs.
     pub runs: u64,
     /// Seed; each run has its own streams of it.
@@ -78,6 +83,10 @@ pub struct Accuracy {
     pub not_navigated: Vec<(Journey, NavigationStudyError)>,
     /// NEES/n over all runs; `None` if no run gave an estimate.
     pub anees: Option<Anees>,
+    /// Figures of each block of constants beside the parameters that was estimated.
+    pub further: Vec<FurtherAccuracy>,
+    /// What each block of states did to the filter in the first run: see [`block_effects`].
+    pub effects: Vec<BlockEffect>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
     /// NIS of table attitude over all runs.
@@ -153,6 +162,10 @@ impl AccuracyStudy {
                 .collect(),
             navigation,
             not_navigated,
+            further: further::figures(&trials),
+            effects: trials
+                .first()
+                .map_or_else(Vec::new, |trial| trial.effects.clone()),
             anees: anees(&trials),
             velocity: pooled(&trials, |filtered| &filtered.velocity),
             table: pooled(&trials, |filtered| &filtered.table),

@@ -62,7 +62,7 @@ fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
 
     // Not modelled, the same errors are several σ.
     let mut run = scenario.simulate(SEED, 0).unwrap();
-    run.run.table.as_mut().unwrap().errors = Default::default();
+    run.run.table.as_mut().unwrap().geometry = Default::default();
     let outcome = estimate(&run.run, InstallationForm::General, &|_| {}).unwrap();
     let error = outcome.estimate.vector() - to_vector(&run.truth);
     let worst = error.component_div(&outcome.estimate.sigma()).amax();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use turncal::calibration::outcome::to_vector;
 use turncal::calibration::{Outcome, estimate, mean_square_interval};
 use turncal::imu::{FURTHER, FurtherVector, InstallationForm, Term};
-use turncal::run::CalibrationRecord;
+use turncal::run::{CalibrationRecord, StateBlock, TABLE_GEOMETRY};
 use turncal::simulation::{Scenario, Simulated};
 
 use crate::shared::{read, shared};
@@ -23,6 +23,15 @@ fn scenario(term: Term) -> Scenario {
     scenario
 }
 
+/// 1σ of the parameters of terms.
+fn sigma(outcome: &Outcome) -> FurtherVector {
+    outcome
+        .further
+        .sigma()
+        .fixed_rows::<FURTHER>(TABLE_GEOMETRY)
+        .into()
+}
+
 /// Squares of the errors of a term's parameters over their σ, of several runs.
 fn squares(term: Term, runs: u64) -> Vec<f64> {
     let scenario = scenario(term);
@@ -30,8 +39,8 @@ fn squares(term: Term, runs: u64) -> Vec<f64> {
         let Simulated { run, further, .. } = scenario.simulate(SEED, stream).unwrap();
         let outcome = estimate(&run, FORM, &|_| {}).unwrap();
         assert!(outcome.converged, "{}: {stream}", term.name());
-        let error = outcome.further.values - further;
-        let normalised = error.component_div(&outcome.further.sigma);
+        let error = outcome.further.terms() - further;
+        let normalised = error.component_div(&sigma(&outcome));
         assert!(outcome.further.unobserved().next().is_none());
         term.parameters()
             .map(|k| normalised[k].powi(2))
@@ -91,7 +100,7 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
     };
     let mut run = read(&directory);
     for term in [Term::AccelSecondOrder, Term::SizeEffect, Term::TimeOffset] {
-        run.switch_on(term);
+        run.switch_on(StateBlock::Term(term));
     }
     let outcome = estimate(&run, FORM, &|_| {}).unwrap();
     let truth = CalibrationRecord::read(&directory.join("truth.json")).unwrap();
@@ -113,8 +122,8 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
     }
     expected[Term::TimeOffset.parameters().start] = 0.005;
     for k in 0..FURTHER {
-        let sigma = outcome.further.sigma[k];
-        let off = (outcome.further.values[k] - expected[k]).abs();
+        let sigma = sigma(&outcome)[k];
+        let off = (outcome.further.terms()[k] - expected[k]).abs();
         assert!(
             off <= 4.0 * sigma,
             "{:?}: {off} of σ {sigma}",

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use clap::error::ErrorKind;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
 use turncal::run::record::BodyFrame;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
+use super::super::block::Block;
 use super::super::calibrate::{Aiding, Installation};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
@@ -23,7 +25,9 @@ use super::super::progress::Runs;
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
   turncal study accuracy nineteen-position --runs 200 -o nineteen
-  turncal study accuracy --truth-installation three-angle --installation three-angle")]
+  turncal study accuracy --truth-installation three-angle --installation three-angle
+  turncal study accuracy real-table --unmodelled table-base,table-axes
+  turncal study accuracy --with accel-second-order,size-effect")]
 pub struct Accuracy {
     /// Scenario: a TOML file or an embedded name
     #[arg(default_value = "demo")]
@@ -41,6 +45,12 @@ pub struct Accuracy {
     /// scenario's]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
+    /// Blocks of states: their errors are simulated and estimated, beside those of the scenario
+    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
+    with: Vec<Block>,
+    /// Blocks whose errors are simulated and that the filter does not have
+    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
+    unmodelled: Vec<Block>,
     /// Number of runs
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
     runs: u64,
@@ -64,7 +74,18 @@ impl Accuracy {
         if let Some(model) = &self.truth_installation {
             scenario.installation = InstallationModel::load(model, &Place::CommandLine)?;
         }
+        for block in self.with.iter().chain(&self.unmodelled) {
+            if self.aiding == Aiding::Velocity && block.of_table() {
+                let message = format!(
+                    "--aiding velocity does not see the table, so {} makes no difference; leave it out\n",
+                    block.0.name()
+                );
+                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+            }
+            scenario = scenario.with_block(block.0);
+        }
         let study = AccuracyStudy {
+            unmodelled: self.unmodelled.iter().map(|block| block.0).collect(),
             form: self.installation.into(),
             runs: self.runs,
             seed: self.seed.unwrap_or(scenario.seed),

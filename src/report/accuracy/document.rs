@@ -9,6 +9,7 @@ use super::merit::journey_name;
 use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
 use crate::imu::InstallationForm;
+use crate::run::record::BlockRecord;
 use crate::study::accuracy::{self, Region};
 use crate::study::navigation::{FORTY_HOURS, INTERVAL};
 use crate::study::{Accuracy, Figures, Ratio};
@@ -37,8 +38,21 @@ struct Document<'a> {
     form_rejections: Option<FormRejections>,
     #[serde(flatten)]
     groups: BTreeMap<String, Merit>,
+    /// Each block of states beside K, E and D that was estimated, in SI.
+    blocks: BTreeMap<&'static str, Block>,
+    /// What blocks of states did to the filter in the first run, or would have done.
+    block_effects: Vec<BlockRecord>,
     /// One for each mission.
     navigation: Vec<Navigation>,
+}
+
+#[derive(Serialize)]
+struct Block {
+    ekf_rms: f64,
+    claimed_rms: f64,
+    bound_rms: f64,
+    ratio: Option<f64>,
+    ratio_interval: Option<(f64, f64)>,
 }
 
 #[derive(Serialize)]
@@ -159,6 +173,21 @@ pub fn document(accuracy: &Accuracy) -> impl Serialize {
                 (of.group.key(), merit(accuracy, &of.figures, unit))
             })
             .collect(),
+        blocks: accuracy
+            .further
+            .iter()
+            .map(|of| {
+                let block = Block {
+                    ekf_rms: of.filter,
+                    claimed_rms: of.claimed,
+                    bound_rms: of.bound,
+                    ratio: of.ratio.map(|r| r.value),
+                    ratio_interval: of.ratio.map(|r| r.interval),
+                };
+                (of.block.name(), block)
+            })
+            .collect(),
+        block_effects: accuracy.effects.iter().map(BlockRecord::from).collect(),
         navigation: navigation(accuracy),
     }
 }

@@ -1,6 +1,8 @@
 //! What was studied, as pairs of a name and a value.
 
+use super::super::further::title;
 use super::super::number::{count, three_digits, value};
+use crate::run::StateBlock;
 use crate::study::Accuracy;
 use crate::units::DEGREE;
 
@@ -40,6 +42,7 @@ pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
             ),
         ),
         ("aiding", aiding.to_owned()),
+        ("blocks of states", blocks(accuracy)),
         ("table time", table_time(accuracy)),
         ("failures", failures(accuracy)),
     ];
@@ -69,6 +72,28 @@ pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
     rows.into_iter()
         .map(|(name, value)| (name.to_owned(), value))
         .collect()
+}
+
+/// Which blocks of states the filter had, and which it should have had.
+fn blocks(accuracy: &Accuracy) -> String {
+    let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
+    let there = StateBlock::ALL.into_iter().filter(|&b| scenario.has(b));
+    let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
+    let named = |blocks: &[StateBlock]| {
+        let titles: Vec<&str> = blocks.iter().map(|&block| title(block)).collect();
+        match titles[..] {
+            [] => "none".to_owned(),
+            _ => titles.join(", "),
+        }
+    };
+    let mut text = format!("beside K, E and D: {}", named(&on));
+    if !left_out.is_empty() {
+        text.push_str(&format!(
+            "; simulated but not modelled: {}",
+            named(&left_out)
+        ));
+    }
+    text
 }
 
 /// A time in minutes with its unit.

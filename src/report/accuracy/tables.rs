@@ -1,17 +1,22 @@
 //! The tables, for terminal and page alike.
 
+use super::super::blocks;
+use super::super::further::{title, unit};
 use super::super::number::{count, three_digits, value};
 use super::super::side_by_side::Table;
 use super::facts::minutes;
 use super::merit::{Merit, journey_name, merits, region_name};
 use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
+use crate::study::accuracy::FurtherAccuracy;
 use crate::study::{Accuracy, Ratio};
 
 const NONE: &str = "–";
 
 pub(super) fn tables(accuracy: &Accuracy) -> Vec<Table> {
     let mut tables = vec![bound(accuracy), gain(accuracy), consistency(accuracy)];
+    tables.extend(further(accuracy));
+    tables.extend(blocks::tables(&accuracy.effects));
     tables.extend(containment(accuracy));
     tables
 }
@@ -89,6 +94,33 @@ fn bound(accuracy: &Accuracy) -> Table {
         .map(str::to_owned)
         .to_vec(),
     }
+}
+
+/// Constants beside the parameters; none if no block of them was on.
+fn further(accuracy: &Accuracy) -> Option<Table> {
+    let headings = [
+        "",
+        "unit",
+        "RMS error",
+        "RMS σ",
+        "RMS bound",
+        "error/bound",
+        "99 % interval",
+    ];
+    let row = |of: &FurtherAccuracy| {
+        let (unit, in_si) = unit(of.block);
+        [title(of.block).to_owned(), unit.to_owned()]
+            .into_iter()
+            .chain([of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / in_si)))
+            .chain(ratio_cells(of.ratio.as_ref()))
+            .collect()
+    };
+    (!accuracy.further.is_empty()).then(|| Table {
+        title: "Blocks of states beside K, E and D",
+        headings: headings.map(str::to_owned).to_vec(),
+        sections: vec![accuracy.further.iter().map(row).collect()],
+        notes: vec!["RMS over all runs and the constants of a block.".to_owned()],
+    })
 }
 
 fn gain(accuracy: &Accuracy) -> Table {

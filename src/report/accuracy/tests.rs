@@ -21,6 +21,7 @@ fn small() -> Accuracy {
         let study = AccuracyStudy {
             scenario,
             form,
+            unmodelled: Vec::new(),
             runs,
             seed,
         };

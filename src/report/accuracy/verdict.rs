@@ -1,5 +1,6 @@
 //! What the figures say, in sentences.
 
+use super::super::blocks;
 use super::super::number::{count, value};
 use super::facts::minutes;
 use super::merit::{journey_name, merits, region_name};
@@ -34,6 +35,10 @@ pub(super) fn verdict(accuracy: &Accuracy) -> Vec<Sentence> {
     sentences.extend(accuracy.navigation.iter().filter_map(containment));
     sentences.extend(not_navigated(accuracy));
     sentences.extend(form(accuracy));
+    sentences.extend(blocks::advice(&accuracy.effects).map(|advice| Sentence {
+        good: false,
+        text: format!("In the first run: {advice}"),
+    }));
     sentences.extend(gain(accuracy));
     if accuracy.trials.len() < FEW {
         sentences.push(Sentence {

@@ -35,12 +35,16 @@ impl Baseline {
     pub(super) const EQUAL_TIME: usize = PARTS;
 
     /// For a scenario: its instrument and table on the paper's positions, and where the table has too
-    /// few axes for them, a table with three axes and the same errors.
+    /// few axes for them, a table with three axes and the same errors. Its axes are square: the
+    /// positions are given as turns about body axes.
     pub(super) fn new(scenario: &Scenario) -> Result<Self, StudyError> {
         let filter_time = scenario.duration()?;
-        let scenario = match scenario.clone().with_path(PATH) {
+        let mut square = scenario.clone();
+        square.table.errors.nonorthogonality = 0.0;
+        square.table.errors.wobble = 0.0;
+        let scenario = match square.clone().with_path(PATH) {
             Ok(on_its_table) => on_its_table,
-            Err(_) => on_three_axes(scenario)?,
+            Err(_) => on_three_axes(&square)?,
         };
         let (table_time, standing) = (scenario.duration()?, scenario.standing_time()?);
         let part = (filter_time - (table_time - standing)) / standing;

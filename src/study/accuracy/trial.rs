@@ -1,14 +1,17 @@
 //! One run of the study.
 
+use nalgebra::{SMatrix, SVector};
+
 use super::{AccuracyStudy, Baseline, StudyError};
+use crate::calibration::further::{CONSTANTS, ConstantVector, constants};
 use crate::calibration::outcome::{Moment, Nis, from_vector, to_vector};
 use crate::calibration::states::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::calibration::{
-    Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
+    BlockEffect, Estimate, FormTest, Nees, Outcome, block_effects, bound, estimate,
+    in_general_form, nees,
 };
 use crate::imu::{InstallationForm, PerSensor, Triad};
 use crate::run::record::BodyFrame;
-use crate::simulation::Simulated;
 
 /// One run. Errors are estimate less truth; everything is in the general form.
 #[derive(Debug, Clone)]
@@ -25,6 +28,10 @@ pub struct Trial {
     pub(super) bound_covariance: ParameterMatrix,
     /// σ of the bound at each of the [`moments`].
     pub(super) bound_track: Vec<ParameterVector>,
+    /// σ of the bound of constants beside the parameters, zero where they are none.
+    pub further_bound: ConstantVector,
+    /// What the blocks of states did to the filter; of the first run only.
+    pub effects: Vec<BlockEffect>,
     /// Error of the closed form for each part of its dwells; none where it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,
 }
@@ -38,7 +45,11 @@ pub struct Filtered {
     pub sigma: ParameterVector,
     /// Covariance that it claims.
     pub(super) covariance: ParameterMatrix,
-    /// NEES/n.
+    /// Error of each constant beside the parameters that was estimated, zero for others.
+    pub further_error: ConstantVector,
+    /// σ that it claims of them.
+    pub further_sigma: ConstantVector,
+    /// NEES/n of the parameters and the constants beside them.
     pub nees: Option<Nees>,
     /// Number of passes.
     pub passes: usize,
@@ -64,20 +75,25 @@ pub(super) fn moments(duration: f64) -> impl Iterator<Item = f64> {
 
 impl AccuracyStudy {
     pub(super) fn trial(&self, baseline: &Baseline, run: u64) -> Result<Trial, StudyError> {
-        let Simulated {
-            run: mut record,
-            truth,
-            ..
-        } = self.scenario.simulate(self.seed, run)?;
+        let simulated = self.scenario.simulate(self.seed, run)?;
+        let (mut record, truth) = (simulated.run, simulated.truth);
         if self.scenario.body_frame == BodyFrame::Accelerometer {
             record.table = None;
         }
         let duration = record.imu.duration();
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
-        let bound =
-            bound(&record, &attainable).map_err(|source| StudyError::Bound { run, source })?;
+        let bound = bound(&record, &attainable, &simulated.further)
+            .map_err(|source| StudyError::Bound { run, source })?;
+        for &block in &self.unmodelled {
+            record.switch_off(block);
+        }
         let outcome = estimate(&record, self.form, &|_| {});
+        let effects = match &outcome {
+            Ok(outcome) if run == 0 => block_effects(&record, outcome).unwrap_or_default(),
+            _ => Vec::new(),
+        };
+        let further = constants(&simulated.geometry, &simulated.further);
         let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,
@@ -87,7 +103,9 @@ impl AccuracyStudy {
             },
             filtered: outcome
                 .ok()
-                .map(|outcome| Filtered::new(&outcome, &truth, duration)),
+                .map(|outcome| Filtered::new(&outcome, &truth, &further, duration)),
+            effects,
+            further_bound: bound.further.sigma(),
             bound: attained.sigma(),
             bound_covariance: attained.covariance,
             bound_track: track(&bound.history, form, duration)
@@ -108,17 +126,28 @@ impl AccuracyStudy {
 }
 
 impl Filtered {
-    fn new(outcome: &Outcome, truth: &PerSensor<Triad>, duration: f64) -> Self {
+    fn new(
+        outcome: &Outcome,
+        truth: &PerSensor<Triad>,
+        further: &ConstantVector,
+        duration: f64,
+    ) -> Self {
         let truth = to_vector(&in_general_form(truth));
         let form = outcome.estimate.form();
         let estimate = outcome.estimate.in_general_form();
         let error = estimate.vector() - truth;
-        let all: Vec<usize> = (0..PARAMETERS).collect();
+        let further_sigma = outcome.further.sigma();
+        let further_error =
+            (outcome.further.values - further).zip_map(&further_sigma, |error, sigma| {
+                if sigma > 0.0 { error } else { 0.0 }
+            });
         Self {
             error,
             sigma: estimate.sigma(),
             covariance: estimate.covariance,
-            nees: nees(&error, &estimate.covariance, &all),
+            nees: whole_nees(outcome, &estimate, &error, &further_error),
+            further_error,
+            further_sigma,
             passes: outcome.passes.len(),
             velocity: outcome.consistency.velocity,
             table: outcome.consistency.table,
@@ -129,6 +158,38 @@ impl Filtered {
                 .collect(),
         }
     }
+}
+
+/// NEES of the parameters, in the general form, and the constants beside them together.
+fn whole_nees(
+    outcome: &Outcome,
+    estimate: &Estimate,
+    error: &ParameterVector,
+    further_error: &ConstantVector,
+) -> Option<Nees> {
+    const ALL: usize = PARAMETERS + CONSTANTS;
+    let further = &outcome.further;
+    let cross = outcome.estimate.to_general_form() * further.cross;
+    let mut covariance = SMatrix::<f64, ALL, ALL>::zeros();
+    covariance
+        .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
+        .copy_from(&estimate.covariance);
+    covariance
+        .fixed_view_mut::<CONSTANTS, CONSTANTS>(PARAMETERS, PARAMETERS)
+        .copy_from(&further.covariance);
+    covariance
+        .fixed_view_mut::<PARAMETERS, CONSTANTS>(0, PARAMETERS)
+        .copy_from(&cross);
+    covariance
+        .fixed_view_mut::<CONSTANTS, PARAMETERS>(PARAMETERS, 0)
+        .copy_from(&cross.transpose());
+    let mut difference = SVector::<f64, ALL>::zeros();
+    difference.fixed_rows_mut::<PARAMETERS>(0).copy_from(error);
+    difference
+        .fixed_rows_mut::<CONSTANTS>(PARAMETERS)
+        .copy_from(further_error);
+    let all: Vec<usize> = (0..ALL).collect();
+    nees(&difference, &covariance, &all)
 }
 
 /// What a history says at each of the moments, in the general form. It holds no correlations, which

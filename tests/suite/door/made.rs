@@ -70,7 +70,7 @@ pub fn made_run(name: &str) -> Run {
                 .collect(),
             position_sigma: 5e-6,
             reading_sigma: 2e-6,
-            errors: Default::default(),
+            geometry: Default::default(),
             tilts: Vec::new(),
         }),
         segments: vec![Segment {
