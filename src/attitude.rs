@@ -86,6 +86,20 @@ pub fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
     across.try_normalize(0.0).unwrap_or(Vector3::x()) * angle
 }
 
+/// The rotation by a tilt about East and North and then by a heading about Up, the components of an
+/// attitude error φ in rad. While both are small it is `exp([φ×])`; but a heading is no error of what
+/// gravity shows, and here however large a heading leaves the tilt what it is.
+pub fn from_tilt_and_heading(error: &Vector3<f64>) -> Matrix3<f64> {
+    exp(Vector3::z() * error.z) * exp(Vector3::new(error.x, error.y, 0.0))
+}
+
+/// Tilt about East and North and heading of a rotation, the inverse of [`from_tilt_and_heading`].
+pub fn to_tilt_and_heading(c: &Matrix3<f64>) -> Vector3<f64> {
+    let tilt = tilt(&c.row(2).transpose());
+    let heading = c * exp(-tilt);
+    Vector3::new(tilt.x, tilt.y, heading[(1, 0)].atan2(heading[(0, 0)]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,5 +146,16 @@ mod tests {
         let c = exp(Vector3::new(0.3, 0.2, -0.1));
         let drifted = c * (1.0 + 1e-7);
         assert_relative_eq!(orthonormalised(&drifted), c, epsilon = 1e-13);
+    }
+
+    #[test]
+    fn a_heading_of_any_size_leaves_the_tilt_what_it_is() {
+        for heading in [-3.0, -0.5, 0.0, 2.0] {
+            let error = Vector3::new(3e-3, -2e-3, heading);
+            let c = from_tilt_and_heading(&error);
+            assert_relative_eq!(to_tilt_and_heading(&c), error, epsilon = 1e-14);
+        }
+        let small = Vector3::new(1e-6, 2e-6, -3e-6);
+        assert_relative_eq!(from_tilt_and_heading(&small), exp(small), epsilon = 1e-11);
     }
 }

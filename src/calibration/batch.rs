@@ -24,7 +24,7 @@ use super::states::{
     ATTITUDE, NAVIGATION, POSITION, ParameterMatrix, ParameterVector, VELOCITY,
     sensor_and_parameter,
 };
-use crate::attitude::{exp, log};
+use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
 use crate::imu::Triad;
 use crate::navigation::{Block, BlockMatrix, Navigator, State};
 use crate::run::{Run, StateBlock};
@@ -103,7 +103,7 @@ impl<'a> Batch<'a> {
             information: Information::new(
                 problem,
                 &(problem.prior_mean - to_vector(&at.triads)),
-                &log(&(problem.initial_attitude * at.initial_attitude.transpose())),
+                &to_tilt_and_heading(&(problem.attitude.mean * at.initial_attitude.transpose())),
             ),
         })
     }
@@ -124,6 +124,9 @@ impl<'a> Batch<'a> {
     ) -> Result<(), CalibrationError> {
         let variance = self.problem.variance;
         let tied = standing.tied(&self.navigator.state, &self.accel);
+        if standing.first {
+            self.information.come_to_rest(&self.navigator.state);
+        }
         self.information.refer(&self.navigator.state, &tied);
         self.navigator.state = tied;
 
@@ -274,15 +277,27 @@ impl Information {
         self.rows = stack.qr().thin_R().get(..n, ..).to_owned();
     }
 
+    /// The body has come to rest, see [`super::filter::Filter::come_to_rest`].
+    fn come_to_rest(&mut self, computed: &State) {
+        for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
+            let turn = skew(computed);
+            let turn = Mat::from_fn(3, 3, |i, j| turn[(i, j)]);
+            let of_attitude = self.rows.get(.., self.at(first)) * turn;
+            let attitude = self.at(ATTITUDE);
+            let mut rows = self.rows.get_mut(.., attitude);
+            rows += of_attitude;
+        }
+    }
+
     /// Refers the navigation errors to another computed state of the same moment. Attitudes add up
     /// to more than the sum of their rotation vectors, so the sum is taken at the estimate so far.
     fn refer(&mut self, from: &State, to: &State) {
         let estimate = self.solution();
         let error = Vector3::from_fn(|axis, _| estimate[(self.table + ATTITUDE + axis, 0)]);
-        let turned = exp(error) * from.attitude * to.attitude.transpose();
+        let turned = from_tilt_and_heading(&error) * from.attitude * to.attitude.transpose();
         let mut shift = Mat::zeros(NAVIGATION, 1);
         for (first, by) in [
-            (ATTITUDE, log(&turned) - error),
+            (ATTITUDE, to_tilt_and_heading(&turned) - error),
             (VELOCITY, to.velocity - from.velocity),
             (POSITION, to.position - from.position),
         ] {
@@ -294,6 +309,11 @@ impl Information {
         let n = self.unknowns();
         let mut z = self.rows.get_mut(.., n..);
         z += moved;
+    }
+
+    /// Columns of three navigation errors.
+    fn at(&self, first: usize) -> Range<usize> {
+        self.table + first..self.table + first + 3
     }
 
     fn navigation(&self) -> Range<usize> {

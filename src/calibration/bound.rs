@@ -1,6 +1,6 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
-use super::coarse::coarse_start;
+use super::coarse::{AttitudePrior, coarse_start};
 use super::error::CalibrationError;
 use super::estimator::problem;
 use super::further::Further;
@@ -38,17 +38,17 @@ pub fn bound(
     let dwells = run.dwells();
     let schedule = Schedule::new(run, &dwells)?;
     let form = truth.gyro.form;
-    let initial_attitude = match first_reading(run, &dwells) {
-        Some(reading) => reading,
-        None => coarse_start(run, &dwells, form)?.initial_attitude,
+    let attitude = match (&run.table, first_reading(run, &dwells)) {
+        (Some(table), Some(reading)) => AttitudePrior::of_reading(table, reading),
+        _ => coarse_start(run, &dwells, form)?.attitude,
     };
     let at = Linearisation {
         triads: *truth,
         further: *terms,
-        initial_attitude,
+        initial_attitude: attitude.mean,
     };
     let sigma = velocity_sigma(run, &dwells);
-    let problem = problem(run, schedule, form, initial_attitude, sigma);
+    let problem = problem(run, schedule, form, attitude, sigma);
     let result = pass(&problem, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {

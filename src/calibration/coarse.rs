@@ -6,18 +6,75 @@ mod heading;
 mod table;
 mod turns;
 
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, Vector3};
+
 use super::error::CalibrationError;
 use super::outcome::{from_vector, to_vector};
 use super::pass::{Linearisation, singular};
 use super::schedule::first_reading;
 use crate::imu::{FurtherVector, InstallationForm, PerSensor, Triad};
-use crate::run::{Dwell, Run};
+use crate::run::{Dwell, Run, TableRecord};
+use crate::units::{ARCSEC, DEGREE};
 use equations::Equations;
 
 /// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
 const STEPS: usize = 6;
 /// A step below this (1 ppm, 0.2″, and as much of rad/s or m/s²) is no step.
 const SMALL: f64 = 1e-6;
+
+/// Where the filter begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoarseStart {
+    /// The first point of linearisation.
+    pub at: Linearisation,
+    /// What is known of the initial attitude.
+    pub attitude: AttitudePrior,
+}
+
+/// What is known of the attitude at the first sample before the filter runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudePrior {
+    /// `C_b_n`: a reading of the table or, without, the coarse alignment.
+    pub mean: Matrix3<f64>,
+    /// 1σ about East, North and Up, rad; the last is that of the heading.
+    pub sigma: Vector3<f64>,
+}
+
+/// 1σ of the initial attitude before anything is known of it but one reading, rad.
+const READ_ATTITUDE: f64 = 60.0 * ARCSEC;
+/// 1σ of the initial level without a table, rad. What gave it is in the observations, too, so this is
+/// far wider than it is wrong.
+const LEVEL: f64 = 0.2 * DEGREE;
+/// 1σ of the initial heading without a table, rad, if Earth rate shows it well; else …
+const HEADING: f64 = 15.0 * DEGREE;
+/// … so many times what Earth rate leaves of it …
+const HEADING_SIGMAS: f64 = 3.0;
+/// … and at most that of a heading of which nothing is known.
+const ANY_HEADING: f64 = PI / 1.732_050_807_568_877_2;
+
+impl AttitudePrior {
+    /// From a reading of a table.
+    pub(super) fn of_reading(table: &TableRecord, mean: Matrix3<f64>) -> Self {
+        // The one reading that gave it has all errors.
+        let known = table.position_sigma.hypot(table.reading_sigma);
+        let known = known.hypot(table.geometry.base.max());
+        Self {
+            mean,
+            sigma: Vector3::repeat(READ_ATTITUDE.max(10.0 * known)),
+        }
+    }
+
+    /// From a coarse alignment that knows its heading to this 1σ.
+    fn of_alignment(mean: Matrix3<f64>, heading_sigma: f64) -> Self {
+        let heading = (HEADING_SIGMAS * heading_sigma).clamp(HEADING, ANY_HEADING);
+        Self {
+            mean,
+            sigma: Vector3::new(LEVEL, LEVEL, heading),
+        }
+    }
+}
 
 /// Both triads and the initial attitude by least squares over whole dwells and turns.
 ///
@@ -31,7 +88,7 @@ pub fn coarse_start(
     run: &Run,
     dwells: &[Dwell],
     form: InstallationForm,
-) -> Result<Linearisation, CalibrationError> {
+) -> Result<CoarseStart, CalibrationError> {
     if let [] | [_] = dwells {
         return Err(CalibrationError::TooFewDwells {
             found: dwells.len(),
@@ -39,14 +96,21 @@ pub fn coarse_start(
         });
     }
     match (&run.table, first_reading(run, dwells)) {
-        (Some(table), Some(initial_attitude)) => Ok(Linearisation {
-            triads: table::from_table(run, table, dwells, form)?,
-            further: FurtherVector::zeros(),
-            initial_attitude,
+        (Some(table), Some(initial_attitude)) => Ok(CoarseStart {
+            at: Linearisation {
+                triads: table::from_table(run, table, dwells, form)?,
+                further: FurtherVector::zeros(),
+                initial_attitude,
+            },
+            attitude: AttitudePrior::of_reading(table, initial_attitude),
         }),
         _ => {
             let triads = gravity::accelerometers(run, dwells, &run.prior_mean(form))?;
-            turns::gyros_and_attitude(run, dwells, &triads)
+            let (at, heading_sigma) = turns::gyros_and_attitude(run, dwells, &triads)?;
+            Ok(CoarseStart {
+                at,
+                attitude: AttitudePrior::of_alignment(at.initial_attitude, heading_sigma),
+            })
         }
     }
 }

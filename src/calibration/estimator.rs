@@ -1,6 +1,6 @@
 //! The estimator: coarse start, with a table a live pass, and held passes until nothing moves.
 
-use super::coarse::coarse_start;
+use super::coarse::{AttitudePrior, coarse_start};
 use super::consistency::consistency;
 use super::curvature::curvature;
 use super::error::CalibrationError;
@@ -13,12 +13,11 @@ use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, Variance, gate
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
 use super::states::ParameterVector;
-use nalgebra::{Matrix3, Vector3};
 
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
 use crate::run::Run;
 use crate::run::record::BodyFrame;
-use crate::units::{ARCSEC, DEGREE};
+use crate::units::DEGREE;
 
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
@@ -30,11 +29,8 @@ const PASSES: usize = 10;
 /// A merit that rises by more than this part means that the step was too long. Each pass knows the
 /// merit of its own linearised problem only, so a small rise means nothing.
 const MERIT_RISE: f64 = 0.1;
-/// 1σ of the initial attitude before anything is known of it but one reading, rad.
-const INITIAL_ATTITUDE: f64 = 60.0 * ARCSEC;
-/// 1σ of the initial attitude without a table, East, North and Up, rad. What gave it is in the
-/// observations, too, so this is far wider than it is wrong.
-const COARSE_ATTITUDE: [f64; 3] = [0.2 * DEGREE, 0.2 * DEGREE, 15.0 * DEGREE];
+/// A step of more than this part of the one before goes half its way.
+const SHRINKS: f64 = 0.8;
 /// 1σ of the initial velocity: a table at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
 /// More than this part of all observations beyond the gate are no outliers.
@@ -62,7 +58,8 @@ pub fn estimate(
     let schedule = Schedule::new(run, &dwells)?;
     let start = coarse_start(run, &dwells, form)?;
     let velocity_sigma = velocity_sigma(run, &dwells);
-    let problem = problem(run, schedule, form, start.initial_attitude, velocity_sigma);
+    let problem = problem(run, schedule, form, start.attitude, velocity_sigma);
+    let start = start.at;
 
     let mut passes = Vec::new();
     // What a live pass feeds back while heading is known to degrees only leads it astray; the coarse
@@ -95,8 +92,7 @@ pub fn estimate(
         estimate,
         prior_sigma: problem.prior_sigma,
         prior_mean: problem.prior_mean,
-        prior_attitude: problem.initial_attitude,
-        prior_attitude_sigma: problem.start.attitude,
+        prior_attitude: problem.attitude,
         attitude_sigma: held.attitude_sigma,
         further: held.further,
         linearised_at: held.at,
@@ -124,6 +120,7 @@ fn iterate(
     let mut at = from;
     let mut gate = Gate::Innovations;
     let mut before: Option<PassResult> = None;
+    let mut last_step = f64::INFINITY;
     loop {
         let result = pass(problem, &at, Mode::Held(gate))?;
         let summary = summary(&result, &at, false);
@@ -145,9 +142,13 @@ fn iterate(
         }
         let too_far =
             before.filter(|before| same_data && result.merit > before.merit * (1.0 + MERIT_RISE));
+        // A step as large as the one before may be the way back of it.
+        let shrinks = summary.largest_step < SHRINKS * last_step;
+        last_step = summary.largest_step;
         at = match &too_far {
             Some(before) => before.at.towards(&at, 0.5),
-            None => result.estimate,
+            None if shrinks => result.estimate,
+            None => at.towards(&result.estimate, 0.5),
         };
         before = Some(too_far.unwrap_or(result));
     }
@@ -171,7 +172,7 @@ pub(super) fn problem<'a>(
     run: &'a Run,
     schedule: Schedule,
     form: InstallationForm,
-    initial_attitude: Matrix3<f64>,
+    attitude: AttitudePrior,
     velocity_sigma: f64,
 ) -> Problem<'a> {
     let table_geometry = run.table.as_ref().map(|t| t.geometry).unwrap_or_default();
@@ -190,23 +191,13 @@ pub(super) fn problem<'a>(
         run,
         schedule,
         form,
-        initial_attitude,
+        attitude,
         prior_mean: to_vector(&run.prior_mean(form)),
         prior_sigma,
         further_sigma: run.further_sigma,
         table_geometry,
         start: Start {
-            attitude: match run.table {
-                // The one reading that gave it has both errors.
-                Some(_) => Vector3::repeat(
-                    INITIAL_ATTITUDE.max(
-                        10.0 * position_sigma
-                            .hypot(reading_sigma)
-                            .hypot(table_geometry.base.max()),
-                    ),
-                ),
-                None => Vector3::from(COARSE_ATTITUDE),
-            },
+            attitude: attitude.sigma,
             velocity: INITIAL_VELOCITY,
             position: run.standstill.position_sigma,
             table: position_sigma,
@@ -317,7 +308,8 @@ mod tests {
     use crate::attitude::exp;
     use crate::imu::FurtherVector;
     use crate::simulation::Scenario;
-    use crate::units::PPM;
+    use crate::units::{ARCSEC, PPM};
+    use nalgebra::Vector3;
 
     #[test]
     fn the_estimate_does_not_depend_on_where_a_held_pass_linearises() {
@@ -326,7 +318,9 @@ mod tests {
         let dwells = simulated.run.dwells();
         let schedule = Schedule::new(&simulated.run, &dwells).unwrap();
         let reading = first_reading(&simulated.run, &dwells).unwrap();
-        let mut problem = problem(&simulated.run, schedule, form, reading, 1e-6);
+        let table = simulated.run.table.as_ref().unwrap();
+        let prior = AttitudePrior::of_reading(table, reading);
+        let mut problem = problem(&simulated.run, schedule, form, prior, 1e-6);
         // As tight a prior of attitude and scale as a run gives, so that it counts.
         problem.start.attitude = Vector3::repeat(ARCSEC);
         problem.prior_mean = to_vector(&simulated.truth);

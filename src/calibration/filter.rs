@@ -9,7 +9,7 @@ use super::states::{
     PARAMETERS, POSITION, ParameterMatrix, ParameterVector, STATES_WITH_DRIFT, STATES_WITH_TABLE,
     TABLE, VELOCITY,
 };
-use crate::attitude::{exp, log};
+use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
 use crate::imu::{FurtherVector, Instability, PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, State};
 use crate::run::{AXIS_TILTS, TableGeometry, Tilts};
@@ -292,13 +292,37 @@ impl<const N: usize> Filter<N> {
         }
     }
 
+    /// The body has come to rest: errors of velocity and position become those in the computed frame,
+    /// `δV + φ × V`, of the computed state.
+    ///
+    /// A heading that is wrong turns computed velocity and position with it, and `computed − true`
+    /// takes that for something seen of the heading; in the computed frame a heading is invisible
+    /// (Barrau and Bonnabel 2017, "The invariant extended Kalman filter as a stable observer", IEEE
+    /// Trans. Automatic Control 62(4)). Without it the σ of a heading that nothing shows shrinks with
+    /// every turn.
+    pub fn come_to_rest(&mut self, computed: &State) {
+        for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
+            let turn = skew(-computed);
+            let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
+            let mut error = self.x.fixed_rows_mut::<3>(first);
+            error += x;
+            let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
+            let mut of_error = self.p.fixed_rows_mut::<3>(first);
+            of_error += rows;
+            let columns = self.p.fixed_columns::<3>(ATTITUDE) * turn.transpose();
+            let mut of_error = self.p.fixed_columns_mut::<3>(first);
+            of_error += columns;
+        }
+    }
+
     /// Refers the navigation errors to another computed state of the same moment. What is estimated
     /// of the truth stays as it is, and so does the covariance.
     pub fn refer(&mut self, from: &State, to: &State) {
-        let estimated = exp(self.x.fixed_rows::<3>(ATTITUDE).into_owned()) * from.attitude;
+        let error = self.x.fixed_rows::<3>(ATTITUDE).into_owned();
+        let estimated = from_tilt_and_heading(&error) * from.attitude;
         self.x
             .fixed_rows_mut::<3>(ATTITUDE)
-            .copy_from(&log(&(estimated * to.attitude.transpose())));
+            .copy_from(&to_tilt_and_heading(&(estimated * to.attitude.transpose())));
         let mut velocity = self.x.fixed_rows_mut::<3>(VELOCITY);
         velocity += to.velocity - from.velocity;
         let mut position = self.x.fixed_rows_mut::<3>(POSITION);

@@ -46,7 +46,7 @@ pub(super) fn form_test(
         restricted.run,
         restricted.schedule.clone(),
         general,
-        restricted.initial_attitude,
+        restricted.attitude,
         restricted.velocity_sigma,
     );
     let at = Linearisation {

@@ -1,7 +1,8 @@
 //! What a calibration says: an estimate with its covariance, and how it was reached.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
+use super::coarse::AttitudePrior;
 use super::form::FormTest;
 use super::further::Further;
 use super::observability::Observability;
@@ -70,6 +71,9 @@ pub fn parameter_name(form: InstallationForm, index: usize) -> Option<String> {
 /// A run has observed a parameter if it leaves less than this part of its prior σ.
 pub const OBSERVED_BELOW: f64 = 0.5;
 
+/// χ² by which opposite headings differ where a run observes the heading.
+const HEADING_SEEN: f64 = 6.0;
+
 /// The result of the filter on one run.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -79,12 +83,10 @@ pub struct Outcome {
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
     pub prior_mean: ParameterVector,
-    /// Mean of the initial attitude before the run, `C_b_n`: a reading of the table or, without, the
-    /// coarse alignment.
-    pub prior_attitude: Matrix3<f64>,
-    /// 1σ of the initial attitude before the run, rad about East, North and Up …
-    pub prior_attitude_sigma: Vector3<f64>,
-    /// … and after it; the last is that of the heading.
+    /// What was known of the initial attitude before the run.
+    pub prior_attitude: AttitudePrior,
+    /// 1σ of the initial attitude after it, rad about East, North and Up; the last is that of the
+    /// heading.
     pub attitude_sigma: Vector3<f64>,
     /// Constants beside the parameters: the table's geometry and the instrument's further terms.
     pub further: Further,
@@ -113,9 +115,13 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether the run observed the heading.
+    /// Whether the run observed the heading: two that are opposite differ by more than 6 in χ² by what
+    /// the run alone says.
     pub fn heading_observed(&self) -> bool {
-        self.attitude_sigma.z < OBSERVED_BELOW * self.prior_attitude_sigma.z
+        let information = |sigma: &Vector3<f64>| sigma.z.powi(-2);
+        let of_run = information(&self.attitude_sigma) - information(&self.prior_attitude.sigma);
+        // Opposite directions of Earth rate differ by twice its level part.
+        4.0 * of_run > HEADING_SEEN
     }
 
     /// Indices of the parameters that the run did not observe.

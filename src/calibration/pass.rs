@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::coarse::AttitudePrior;
 use super::error::CalibrationError;
 use super::filter::{Filter, Sight, Start};
 use super::further::{Further, constants};
@@ -14,7 +15,7 @@ use super::schedule::{Schedule, Standing};
 use super::states::{
     ALL_STATES, ParameterMatrix, ParameterVector, STATES, STATES_WITH_DRIFT, STATES_WITH_TABLE,
 };
-use crate::attitude::{exp, log};
+use crate::attitude::{exp, from_tilt_and_heading, log, to_tilt_and_heading};
 use crate::imu::{FURTHER, FurtherVector, InstallationForm, PerSensor, Sensor, Triad};
 use crate::navigation::{FurtherTerms, Navigator, State};
 use crate::run::{Run, TableGeometry};
@@ -25,8 +26,8 @@ pub(super) struct Problem<'a> {
     pub run: &'a Run,
     pub schedule: Schedule,
     pub form: InstallationForm,
-    /// Mean of the initial attitude's prior, `C_b_n`.
-    pub initial_attitude: Matrix3<f64>,
+    /// What is known of the initial attitude before the run.
+    pub attitude: AttitudePrior,
     pub prior_mean: ParameterVector,
     pub prior_sigma: ParameterVector,
     /// 1σ of each further parameter before the run, whose mean is zero; zero where its term is off.
@@ -210,7 +211,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             Mode::Held(_) => (
                 problem.prior_mean - to_vector(&at.triads),
                 -at.further,
-                log(&(problem.initial_attitude * at.initial_attitude.transpose())),
+                to_tilt_and_heading(&(problem.attitude.mean * at.initial_attitude.transpose())),
             ),
         };
         let filter = Filter::new(problem.start, &parameters, &problem.prior_sigma, attitude)
@@ -335,6 +336,9 @@ impl<'a, const N: usize> Pass<'a, N> {
         let variance = self.problem.variance;
         if matches!(self.mode, Mode::Held(_)) {
             let tied = standing.tied(&self.navigator.state, &self.at.triads.accel);
+            if standing.first {
+                self.filter.come_to_rest(&self.navigator.state);
+            }
             self.filter.refer(&self.navigator.state, &tied);
             self.navigator.state = tied;
         }
@@ -431,7 +435,8 @@ impl<'a, const N: usize> Pass<'a, N> {
                 &(to_vector(&self.at.triads) + self.filter.parameters()),
             ),
             further: self.at.further + self.filter.further(),
-            initial_attitude: exp(self.filter.initial_attitude()) * self.at.initial_attitude,
+            initial_attitude: from_tilt_and_heading(&self.filter.initial_attitude())
+                * self.at.initial_attitude,
         }
     }
 

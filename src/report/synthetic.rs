@@ -10,6 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{ClosedForm, Navigated, Report};
 use crate::attitude;
+use crate::calibration::AttitudePrior;
 use crate::calibration::outcome::*;
 use crate::calibration::states::{
     PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
@@ -271,8 +272,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         prior_sigma,
         prior_mean,
         further: Default::default(),
-        prior_attitude: nalgebra::Matrix3::identity(),
-        prior_attitude_sigma: nalgebra::Vector3::repeat(60.0 * crate::units::ARCSEC),
+        prior_attitude: AttitudePrior {
+            mean: nalgebra::Matrix3::identity(),
+            sigma: nalgebra::Vector3::repeat(60.0 * crate::units::ARCSEC),
+        },
         attitude_sigma: nalgebra::Vector3::repeat(crate::units::ARCSEC),
         observability: Observability {
             directions: vec![Direction {

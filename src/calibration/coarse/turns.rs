@@ -17,7 +17,7 @@ use crate::run::{Dwell, MeanOutput, Run};
 /// percents need four rounds.
 const ROUNDS: usize = 6;
 
-/// The gyros, and the attitude at the first sample of the first dwell.
+/// The gyros, and the attitude at the first sample of the first dwell; and the 1σ of its heading, rad.
 ///
 /// Over a turn between two dwells the gyros must carry the direction of gravity from where the
 /// accelerometers saw it before to where they see it after; at rest they must sense Earth rate.
@@ -28,7 +28,7 @@ pub(super) fn gyros_and_attitude(
     run: &Run,
     dwells: &[Dwell],
     triads: &PerSensor<Triad>,
-) -> Result<Linearisation, CalibrationError> {
+) -> Result<(Linearisation, f64), CalibrationError> {
     let up = gravity_directions(run, dwells, triads)?;
     let rests: Vec<MeanOutput> = dwells
         .iter()
@@ -42,10 +42,12 @@ pub(super) fn gyros_and_attitude(
     // Within Earth rate the output at rest is the bias.
     let outputs: Vector3<f64> = rests.iter().map(|rest| rest.output).sum();
     at.triads.gyro.bias = outputs / rests.len() as f64;
+    let mut heading_sigma = f64::INFINITY;
     for _ in 0..ROUNDS {
         let mut chain = Chain::new(run, dwells, &at, &up)?;
         let compass = chain.gyrocompass(run, &at.triads, &rests)?;
         chain.turn(&compass.turn);
+        heading_sigma = compass.sigma;
         at.initial_attitude = chain.attitudes[0];
         at.triads.gyro.bias += at.triads.gyro.sensitivity() * compass.bias;
         let step = chain.equations(run, &at.triads, &rests, &compass)?.solve();
@@ -54,7 +56,7 @@ pub(super) fn gyros_and_attitude(
         }
         at.triads = from_vector(at.triads.gyro.form, &(to_vector(&at.triads) + step));
     }
-    Ok(at)
+    Ok((at, heading_sigma))
 }
 
 /// Direction of specific force along body axes in each dwell, and with it Up.
