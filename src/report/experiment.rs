@@ -10,15 +10,12 @@ mod tests;
 mod time;
 mod verdict;
 
-use std::fmt::Write;
 use std::path::Path;
 
-use maud::html;
-
+use super::canvas::{Area, DrawError};
 use super::number::{count, three_digits};
-use super::page::{document as html_document, drawn};
-use super::side_by_side::Table;
-use super::{Figure, ReportError, facts as pairs, terminal, write_files};
+use super::study::StudyReport;
+use super::{Figure, ReportError, write_files};
 use crate::imu::InstallationForm;
 use crate::study::experiment::{ALIGNMENT_TIME, Estimator, Method, Navigated, Situation};
 use crate::study::navigation::INTERVAL;
@@ -34,23 +31,7 @@ const PAPER_HOURS: f64 = 40.0;
 
 /// The experiment as text: what was done, the tables, and a verdict in sentences.
 pub fn summary(experiment: &Experiment) -> String {
-    let mut text = title(experiment) + "\n";
-    let facts = facts(experiment);
-    let width = facts.iter().map(|(name, _)| name.chars().count()).max();
-    let width = width.unwrap_or(0);
-    for (name, value) in facts {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "  {name:<width$}  {value}");
-    }
-    for table in tables::tables(experiment) {
-        let _ = write!(text, "\n{}\n{}", table.title, terminal::columns(&table));
-    }
-    text.push_str("\nVerdict\n");
-    for sentence in verdict::verdict(experiment) {
-        let mark = if sentence.good { ' ' } else { '!' };
-        let _ = writeln!(text, "{mark} {}", sentence.text);
-    }
-    text
+    report(experiment).summary()
 }
 
 /// Writes `index.html`, which needs nothing else, and every figure as an SVG file of its own into an
@@ -64,38 +45,20 @@ pub fn write(experiment: &Experiment, directory: &Path) -> Result<(), ReportErro
         time::figure(experiment)?,
         budget::figure(experiment)?,
     ];
-    write_files(directory, &page(experiment, &figures), &figures)
+    write_files(directory, &report(experiment).page(&figures), &figures)
 }
 
-fn page(experiment: &Experiment, figures: &[Figure]) -> String {
-    let title = title(experiment);
-    let (good, bad): (Vec<_>, Vec<_>) = verdict::verdict(experiment)
-        .into_iter()
-        .partition(|sentence| sentence.good);
-    let body = html! {
-        header { h1 { (title) } }
-        @if !bad.is_empty() {
-            section.warnings { h2 { "To be noted" } ul { @for s in bad { li { (s.text) } } } }
-        }
-        section { h2 { "What holds" } ul { @for s in good { li { (s.text) } } } }
-        section { h2 { "The experiment" } (pairs::facts(facts(experiment))) }
-        @for figure in figures { (drawn(figure)) }
-        @for Table { title, headings, sections, notes } in tables::tables(experiment) {
-            section {
-                h2 { (title) }
-                (super::tables::table(&headings, sections))
-                p.note { (notes.join(" ")) }
-            }
-        }
-    };
-    html_document(&title, &body)
-}
-
-fn title(experiment: &Experiment) -> String {
-    format!(
-        "The turntable experiment with {} simulated instruments",
-        count(experiment.trials.len())
-    )
+fn report(experiment: &Experiment) -> StudyReport {
+    StudyReport {
+        title: format!(
+            "The turntable experiment with {} simulated instruments",
+            count(experiment.trials.len())
+        ),
+        subject: "The experiment",
+        facts: facts(experiment),
+        tables: tables::tables(experiment),
+        verdict: verdict::verdict(experiment),
+    }
 }
 
 fn facts(experiment: &Experiment) -> Vec<(String, String)> {
@@ -195,6 +158,25 @@ fn situation_name(situation: Situation) -> &'static str {
         Situation::Aligned => "standing, alignment given",
         Situation::Moving => "moving, alignment given",
     }
+}
+
+/// A figure with a panel for each navigation, one below the other.
+fn by_navigation<'a>(
+    (file, title): (&'static str, &'static str),
+    caption: String,
+    navigations: impl IntoIterator<Item = &'a Navigated>,
+    height: u32,
+    panel: impl Fn(&Area, &Navigated) -> Result<(), DrawError>,
+) -> Result<Figure, ReportError> {
+    let navigations: Vec<&Navigated> = navigations.into_iter().collect();
+    let rows = navigations.len().max(1);
+    let size = (1200, height * rows as u32);
+    Figure::draw(file, title, caption, size, |area| {
+        for (navigated, area) in navigations.iter().zip(area.split_evenly((rows, 1))) {
+            panel(&area, navigated)?;
+        }
+        Ok(())
+    })
 }
 
 fn miles(metres: f64) -> f64 {

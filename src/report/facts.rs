@@ -11,7 +11,7 @@ use crate::units::{
 };
 
 /// Pairs of a name and a value.
-pub(super) fn facts(rows: impl IntoIterator<Item = (String, String)>) -> Markup {
+pub(super) fn facts(rows: &[(String, String)]) -> Markup {
     html! {
         dl { @for (name, value) in rows { div { dt { (name) } dd { (value) } } } }
     }
@@ -85,7 +85,7 @@ pub(super) fn run(run: &Run) -> Markup {
         ),
         None => text("turntable", "its log was not used".to_owned()),
     });
-    facts(rows)
+    facts(&rows)
 }
 
 fn noise(sensor: Sensor, noise: &Noise) -> String {
@@ -153,10 +153,9 @@ pub(super) fn model(report: &Report) -> Markup {
     }
     let dwells = count(report.dwells.len());
     rows.push(("dwells", format!("{dwells}, found in {found_in}")));
-    facts(
-        rows.into_iter()
-            .map(|(name, value)| (name.to_owned(), value)),
-    )
+    let rows = rows.into_iter();
+    let rows: Vec<_> = rows.map(|(name, value)| (name.to_owned(), value)).collect();
+    facts(&rows)
 }
 
 #[cfg(test)]

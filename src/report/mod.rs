@@ -22,6 +22,7 @@ mod panel;
 mod path;
 pub mod side_by_side;
 mod sigma;
+mod study;
 #[cfg(test)]
 mod synthetic;
 pub mod table1;

@@ -53,12 +53,9 @@ pub struct Navigation<'a> {
 impl Navigation<'_> {
     /// The navigation as text.
     pub fn summary(&self) -> String {
-        let mut text = self.title() + "\n";
-        for (name, value) in self.facts() {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "  {name:<9}  {value}");
-        }
+        let mut text = format!("{}\n{}", self.title(), terminal::facts(&self.facts()));
         for warning in self.warnings() {
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "\nWarning: {warning}");
         }
         let _ = write!(text, "\n{}", terminal::columns(&self.table()));
@@ -83,16 +80,12 @@ impl Navigation<'_> {
         let path = directory.join("navigation.csv");
         std::fs::write(&path, self.csv()).map_err(|source| ReportError::Write { path, source })?;
         let title = self.title();
-        let table = self.table();
         let body = html! {
             header { h1 { (title) } }
             @for warning in self.warnings() { p.warnings { (warning) } }
-            section { h2 { (table.title) }
-                (super::tables::table(&table.headings, table.sections))
-                p.note { (table.notes.join(" ")) }
-            }
+            (super::tables::section(&self.table()))
             @for figure in &figures { (drawn(figure)) }
-            section { h2 { "The navigation" } (facts::facts(self.facts())) }
+            section { h2 { "The navigation" } (facts::facts(&self.facts())) }
         };
         write_files(directory, &html_document(&title, &body), &figures)
     }

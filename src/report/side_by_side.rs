@@ -11,7 +11,6 @@ use super::{ReportError, terminal, write_files};
 use crate::calibration::states::ParameterVector;
 use crate::calibration::{ChiSquare, Comparison, Nees, Side};
 use crate::imu::{InstallationForm, Sensor};
-use crate::run::record::BodyFrame;
 
 /// Beyond this many σ a difference is flagged.
 pub const FLAGGED: f64 = 3.0;
@@ -46,19 +45,14 @@ pub fn text(comparison: &Comparison) -> String {
 
 /// What is compared with what, in a sentence or two.
 pub fn summary(comparison: &Comparison) -> String {
-    let frame = match comparison.body_frame {
-        BodyFrame::Table => "the turntable's mounting face",
-        BodyFrame::Accelerometer => {
-            "the accelerometers (x along accelerometer x, y in the plane of x and y)"
-        }
-    };
+    let frame = comparison.body_frame.words();
     let reference = &comparison.reference.name;
     let reference = if comparison.against_truth {
         format!("{reference}, the truth")
     } else {
         format!("{reference}, the first calibration")
     };
-    format!("General form, body frame of {frame}. Reference: {reference}.")
+    format!("General form, body frame: {frame}. Reference: {reference}.")
 }
 
 /// What forbids to trust a calibration's σ, a sentence each.

@@ -15,7 +15,6 @@ use maud::html;
 
 use super::number::{count, three_digits};
 use super::page::{document as html_document, drawn};
-use super::side_by_side::Table;
 use super::{ReportError, facts as pairs, terminal, write_files};
 use crate::study::Table1;
 use crate::study::table1::{AGREEMENT, paper};
@@ -28,12 +27,9 @@ const TITLE: &str = "What a simplified installation form costs: the paper's Tabl
 /// The study as text: what was done, a table for each column of the paper's, and what can be said of
 /// each in a sentence.
 pub fn summary(table: &Table1) -> String {
-    let mut text = format!("{TITLE}\n");
-    for (name, value) in facts(table) {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "  {name:<10}  {value}");
-    }
+    let mut text = format!("{TITLE}\n{}", terminal::facts(&facts(table)));
     for shown in tables::tables(table) {
+        // Writing to a string cannot fail.
         let _ = write!(text, "\n{}\n{}", shown.title, terminal::columns(&shown));
     }
     text.push_str("\nVerdict\n");
@@ -56,10 +52,8 @@ pub fn write(table: &Table1, directory: &Path) -> Result<(), ReportError> {
     let body = html! {
         header { h1 { (TITLE) } }
         section { h2 { "Verdict" } ul { @for s in verdict::sentences(table) { li { (s) } } } }
-        section { h2 { "The study" } (pairs::facts(facts(table))) }
-        @for Table { title, headings, sections, .. } in tables::tables(table) {
-            section { h2 { (title) } (super::tables::table(&headings, sections)) }
-        }
+        section { h2 { "The study" } (pairs::facts(&facts(table))) }
+        @for shown in tables::tables(table) { (super::tables::section(&shown)) }
         @for note in notes(table) { p.note { (note) } }
         @for figure in &figures { (drawn(figure)) }
     };

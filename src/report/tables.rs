@@ -6,6 +6,7 @@ use super::Report;
 use super::further;
 use super::group::Group;
 use super::number::{self, count, sigma, three_digits, value};
+use super::side_by_side::Table;
 use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, Outcome, parameter_name};
 use crate::imu::ParameterKind;
 
@@ -34,6 +35,17 @@ pub(super) fn table<H: AsRef<str>>(
                     }
                 }
             }
+        }
+    }
+}
+
+/// A table with its title and notes.
+pub(super) fn section(of: &Table) -> Markup {
+    html! {
+        section {
+            h2 { (of.title) }
+            (table(&of.headings, of.sections.iter().cloned()))
+            @if !of.notes.is_empty() { p.note { (of.notes.join(" ")) } }
         }
     }
 }

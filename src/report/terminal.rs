@@ -193,6 +193,18 @@ fn passes(outcome: &Outcome) -> String {
     )
 }
 
+/// Pairs of a name and a value, the values below each other.
+pub(super) fn facts(rows: &[(String, String)]) -> String {
+    let width = rows.iter().map(|(name, _)| name.chars().count()).max();
+    let width = width.unwrap_or(0);
+    let mut text = String::new();
+    for (name, value) in rows {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "  {name:<width$}  {value}");
+    }
+    text
+}
+
 /// A table in columns, its sections apart, with its notes.
 pub(super) fn columns(of: &side_by_side::Table) -> String {
     let headings: Vec<&str> = of.headings.iter().map(String::as_str).collect();

@@ -1,25 +1,12 @@
 //! `turncal compare` as a user meets it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use assert_cmd::Command;
 use turncal::imu::PerSensor;
 use turncal::run::CalibrationRecord;
-use turncal::run::record::TriadRecord;
 
-const ALIGNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-fn record() -> CalibrationRecord {
-    let triad = |scale| TriadRecord {
-        scale: [scale; 3],
-        installation: ALIGNED,
-        bias: [1.0, 2.0, 3.0],
-    };
-    CalibrationRecord {
-        unit: Some(PerSensor::from_fn(|_| "count".to_owned())),
-        ..CalibrationRecord::new(triad(2e6), triad(1e5))
-    }
-}
+use crate::calibration_file::{record, written};
 
 /// A calibration of it whose gyro scale factor x is `ppm` too large, with σ 1 ppm.
 fn calibration(ppm: f64) -> CalibrationRecord {
@@ -28,12 +15,6 @@ fn calibration(ppm: f64) -> CalibrationRecord {
     record.parameters = vec!["gyro.scale.x".to_owned()];
     record.covariance = vec![vec![4.0]];
     record
-}
-
-fn written(directory: &Path, name: &str, record: &CalibrationRecord) -> PathBuf {
-    let path = directory.join(name);
-    record.write(&path, false).unwrap();
-    path
 }
 
 fn compare(arguments: &[&Path]) -> assert_cmd::assert::Assert {
@@ -57,7 +38,8 @@ fn a_scale_factor_that_is_too_large_by_four_sigma_is_flagged_and_has_its_sign() 
     let bad = written(root.path(), "bad.json", &calibration(4.0));
     let option = Path::new("--truth");
     let text = stdout(&compare(&[&good, &bad, option, &truth]).success());
-    let row = text.lines().find(|l| l.starts_with("gyro K x")).unwrap();
+    let mut rows = text.lines().map(str::trim_start);
+    let row = rows.find(|l| l.starts_with("gyro K x")).unwrap();
     assert!(row.contains("−1.0 ± 1.0  −1.0"), "{row}");
     assert!(row.contains("4.0 ± 1.0  ! 4.0"), "{row}");
 }

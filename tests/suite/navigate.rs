@@ -1,13 +1,14 @@
 //! `turncal navigate` as a user meets it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use assert_cmd::Command;
 use serde_json::Value;
-use turncal::imu::{InstallationForm, PerSensor};
+use turncal::imu::InstallationForm;
 use turncal::run::CalibrationRecord;
 use turncal::run::record::TriadRecord;
 
+use crate::calibration_file::{record, written};
 use crate::shared::shared;
 
 fn navigate(calibration: &Path, truth: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
@@ -18,12 +19,6 @@ fn navigate(calibration: &Path, truth: &Path, more: &[&str]) -> assert_cmd::asse
 
 fn json(assert: &assert_cmd::assert::Assert) -> Value {
     serde_json::from_slice(&assert.get_output().stdout).unwrap()
-}
-
-fn written(directory: &Path, name: &str, record: &CalibrationRecord) -> PathBuf {
-    let path = directory.join(name);
-    record.write(&path, false).unwrap();
-    path
 }
 
 fn numbers<const N: usize>(value: &Value) -> [f64; N] {
@@ -95,24 +90,10 @@ fn the_cases_of_an_independent_program_agree_hour_by_hour() {
     }
 }
 
-const ALIGNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-fn truth() -> CalibrationRecord {
-    let triad = |scale| TriadRecord {
-        scale: [scale; 3],
-        installation: ALIGNED,
-        bias: [1.0, 2.0, 3.0],
-    };
-    CalibrationRecord {
-        unit: Some(PerSensor::from_fn(|_| "count".to_owned())),
-        ..CalibrationRecord::new(triad(2e6), triad(1e5))
-    }
-}
-
 /// A calibration whose east gyro's bias is wrong by 0.01 °/h, with σ 0.02 °/h.
 fn calibration() -> CalibrationRecord {
     let count = 2e6 * std::f64::consts::PI / 180.0 / 3600.0;
-    let mut record = truth();
+    let mut record = record();
     record.gyro.bias[0] += 0.01 * count;
     record.parameters = vec!["gyro.bias.x".to_owned()];
     record.covariance = vec![vec![(0.02 * count).powi(2)]];
@@ -122,7 +103,7 @@ fn calibration() -> CalibrationRecord {
 #[test]
 fn sigma_is_to_the_error_as_the_sigma_of_its_only_cause_to_the_cause() {
     let root = tempfile::tempdir().unwrap();
-    let truth = written(root.path(), "truth.json", &truth());
+    let truth = written(root.path(), "truth.json", &record());
     let calibration = written(root.path(), "calibration.json", &calibration());
     for options in [
         &["--latitude-deg", "-34", "--attitude-deg", "-1,2,30"][..],
@@ -165,7 +146,7 @@ fn sigma_is_to_the_error_as_the_sigma_of_its_only_cause_to_the_cause() {
 #[test]
 fn a_report_has_a_page_figures_and_a_table_by_the_minute() {
     let root = tempfile::tempdir().unwrap();
-    let truth = written(root.path(), "truth.json", &truth());
+    let truth = written(root.path(), "truth.json", &record());
     let calibration = written(root.path(), "calibration.json", &calibration());
     let report = root.path().join("report");
     let options = ["--latitude-deg", "45", "-o", report.to_str().unwrap()];
@@ -188,7 +169,7 @@ fn a_report_has_a_page_figures_and_a_table_by_the_minute() {
 #[test]
 fn what_cannot_be_navigated_is_refused_and_says_why() {
     let root = tempfile::tempdir().unwrap();
-    let truth = written(root.path(), "truth.json", &truth());
+    let truth = written(root.path(), "truth.json", &record());
     let calibration = written(root.path(), "calibration.json", &calibration());
     let steep = root.path().join("steep.toml");
     std::fs::write(

@@ -2,6 +2,7 @@
 
 use super::super::blocks;
 use super::super::number::{count, value};
+use super::super::study::Sentence;
 use super::facts::minutes;
 use super::merit::{journey_name, merits, region_name};
 use super::tables::{self, interval, percent, ratio};
@@ -9,15 +10,6 @@ use crate::calibration::outcome::Nis;
 use crate::imu::Output;
 use crate::study::accuracy::Containment;
 use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
-
-/// One thing that the study says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Sentence {
-    /// Whether it is as one would wish.
-    pub(super) good: bool,
-    /// The sentence.
-    pub(super) text: String,
-}
 
 /// Fewer runs than this make a rough interval.
 const FEW: usize = 30;

@@ -8,7 +8,7 @@ use super::super::number::{sigma, three_digits};
 use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
 use super::distribution::pen;
-use super::{estimator_name, in_general, miles, situation_name};
+use super::{by_navigation, estimator_name, in_general, miles, situation_name};
 use crate::calibration::Group;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
@@ -47,19 +47,10 @@ pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
         });
     // What is a thousandth of the whole is nothing.
     let y = Axis::log_between(low.max(1e-3 * high) * 0.7, 1.8 * high);
-    let rows = shown.len().max(1);
-    Figure::draw(
-        "budget.svg",
-        "Error budget",
-        caption,
-        (1200, 360 * rows as u32),
-        |area| {
-            for (navigated, area) in shown.iter().zip(area.split_evenly((rows, 1))) {
-                panel(&area, experiment, navigated, y.clone())?;
-            }
-            Ok(())
-        },
-    )
+    let names = ("budget.svg", "Error budget");
+    by_navigation(names, caption, shown, 360, |area, navigated| {
+        panel(area, experiment, navigated, y.clone())
+    })
 }
 
 /// Of each group alone, of all as claimed and as they were, nmile.

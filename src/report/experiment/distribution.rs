@@ -7,7 +7,7 @@ use super::super::canvas::{Area, DrawError, INK, Pen, QUIET};
 use super::super::panel::{Margins, Mark, Panel};
 use super::super::{Figure, ReportError};
 use super::tables::nmile;
-use super::{method_name, miles, situation_name};
+use super::{by_navigation, method_name, miles, situation_name};
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Worth};
 
@@ -30,22 +30,13 @@ pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let low = all.iter().copied().fold(f64::INFINITY, f64::min);
     let high = all.iter().copied().fold(0.0, f64::max);
     let x = Axis::log_between(0.8 * low, 1.25 * high);
-    let rows = experiment.navigations.len().max(1);
-    Figure::draw(
-        "distribution.svg",
-        "Position error at the end",
+    let names = ("distribution.svg", "Position error at the end");
+    by_navigation(
+        names,
         caption,
-        (1200, 330 * rows as u32),
-        |area| {
-            for (navigated, area) in experiment
-                .navigations
-                .iter()
-                .zip(area.split_evenly((rows, 1)))
-            {
-                panel(&area, experiment, navigated, x.clone())?;
-            }
-            Ok(())
-        },
+        &experiment.navigations,
+        330,
+        |area, navigated| panel(area, experiment, navigated, x.clone()),
     )
 }
 

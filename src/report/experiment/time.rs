@@ -5,7 +5,7 @@ use super::super::canvas::{Area, DrawError, Pen};
 use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
 use super::distribution::pen;
-use super::{HOUR, hours, method_name, miles, situation_name};
+use super::{HOUR, by_navigation, hours, method_name, miles, situation_name};
 use crate::imu::InstallationForm;
 use crate::study::Experiment;
 use crate::study::experiment::{Navigated, Worth};
@@ -22,22 +22,13 @@ pub(super) fn figure(experiment: &Experiment) -> Result<Figure, ReportError> {
     let ends = experiment.navigations.iter().flat_map(|n| &n.methods);
     let points = ends.flat_map(line).map(|p| p.1).filter(|y| *y > LEAST);
     let y = Axis::log(points);
-    let rows = experiment.navigations.len().max(1);
-    Figure::draw(
-        "time.svg",
-        "Median position error against time",
+    let names = ("time.svg", "Median position error against time");
+    by_navigation(
+        names,
         caption,
-        (1200, 330 * rows as u32),
-        |area| {
-            for (navigated, area) in experiment
-                .navigations
-                .iter()
-                .zip(area.split_evenly((rows, 1)))
-            {
-                panel(&area, experiment, navigated, y.clone())?;
-            }
-            Ok(())
-        },
+        &experiment.navigations,
+        330,
+        |area, navigated| panel(area, experiment, navigated, y.clone()),
     )
 }
 

@@ -1,16 +1,11 @@
 //! What the experiment says, in sentences.
 
 use super::super::number::{count, three_digits, value};
+use super::super::study::Sentence;
 use super::tables::{nmile, ratio};
 use super::{estimator_name, hours, in_general, method_name, navigated, situation_name};
 use crate::study::Experiment;
 use crate::study::experiment::{Budget, Estimator, Method, Situation};
-
-/// A sentence, and whether a reader may pass it over.
-pub(super) struct Sentence {
-    pub(super) good: bool,
-    pub(super) text: String,
-}
 
 /// What is compared with the closed form: in equal time standing, in a sixth of it moving.
 pub(super) const COMPARED: [(Situation, Estimator); 4] = [

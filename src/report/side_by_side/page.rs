@@ -4,8 +4,8 @@ use maud::html;
 
 use super::super::Figure;
 use super::super::page::{document, drawn};
-use super::super::tables::table;
-use super::{Table, summary, tables, warnings};
+use super::super::tables::section;
+use super::{summary, tables, warnings};
 use crate::calibration::Comparison;
 
 const TITLE: &str = "Comparison of calibrations";
@@ -15,9 +15,7 @@ pub(super) fn page(comparison: &Comparison, figure: &Figure) -> String {
         header { h1 { (TITLE) } p { (summary(comparison)) } }
         @for warning in warnings(comparison) { p.warnings { (warning) } }
         (drawn(figure))
-        @for Table { title, headings, sections, notes } in tables(comparison) {
-            section { h2 { (title) } (table(&headings, sections)) p.note { (notes.join(" ")) } }
-        }
+        @for table in tables(comparison) { (section(&table)) }
     };
     document(TITLE, &body)
 }

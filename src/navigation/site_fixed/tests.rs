@@ -1,0 +1,233 @@
+use super::*;
+use crate::attitude::log;
+use crate::imu::{FURTHER, InstallationForm, PARAMETERS, TriadVector};
+use approx::assert_relative_eq;
+use nalgebra::SVector;
+
+const PERIOD: f64 = 0.01;
+/// As many as the filter takes into a block.
+const SAMPLES: usize = 10;
+
+/// Turning about a wandering axis at about 30°/s while gravity is sensed.
+fn record() -> ImuRecord {
+    let t = |k: usize| k as f64 * PERIOD;
+    ImuRecord {
+        start: 0.0,
+        period: PERIOD,
+        continuous: true,
+        gyro: (0..SAMPLES)
+            .map(|k| Vector3::new(0.5, 0.3 * t(k), -0.2) * PERIOD)
+            .collect(),
+        accel: (0..SAMPLES)
+            .map(|k| Vector3::new(1.0, -2.0 * t(k), 9.6) * PERIOD)
+            .collect(),
+        pulse: PerSensor::default(),
+    }
+}
+
+fn site() -> Site {
+    Site::with_normal_gravity(0.6, 0.0, 0.0)
+}
+
+fn triads() -> PerSensor<Triad> {
+    let v = TriadVector::from_fn(|i, _| f64::from(i < 3) + 0.002 * (i as f64 - 5.0));
+    PerSensor::from_fn(|_| Triad::from_vector(InstallationForm::General, &v))
+}
+
+fn start() -> State {
+    State {
+        attitude: exp(Vector3::new(0.4, -0.3, 1.0)),
+        velocity: Vector3::new(0.1, -0.2, 0.05),
+        position: Vector3::zeros(),
+    }
+}
+
+fn navigate(triads: &PerSensor<Triad>, state: State) -> Block {
+    let walk = PerSensor {
+        gyro: 3e-7,
+        accel: 5e-5,
+    };
+    Navigator::new(&record(), &site(), walk, triads, state)
+        .unwrap()
+        .advance(0..SAMPLES)
+}
+
+/// φ, δV, δp of one computed state against another taken as the truth.
+fn error(computed: &State, truth: &State) -> SVector<f64, 9> {
+    let mut e = SVector::<f64, 9>::zeros();
+    e.fixed_rows_mut::<3>(0)
+        .copy_from(&-log(&(computed.attitude * truth.attitude.transpose())));
+    e.fixed_rows_mut::<3>(3)
+        .copy_from(&(computed.velocity - truth.velocity));
+    e.fixed_rows_mut::<3>(6)
+        .copy_from(&(computed.position - truth.position));
+    e
+}
+
+#[test]
+fn transition_of_navigation_errors_is_the_derivative_of_navigation() {
+    let nominal = navigate(&triads(), start());
+    let step = 1e-6;
+    for column in 0..9 {
+        let mut e = Vector3::zeros();
+        e[column % 3] = step;
+        let shifted = |sign: f64| {
+            let mut state = start();
+            match column / 3 {
+                0 => state.attitude = exp(-e * sign) * state.attitude,
+                1 => state.velocity += e * sign,
+                _ => state.position += e * sign,
+            }
+            error(&navigate(&triads(), state).state, &nominal.state)
+        };
+        let difference = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+        // What the Earth turns during half a block is left out of the couplings: 4e-6 of each.
+        assert_relative_eq!(
+            nominal.navigation.column(column).rows(0, 6).into_owned(),
+            difference.rows(0, 6).into_owned(),
+            epsilon = 1e-5
+        );
+        assert_relative_eq!(
+            nominal.navigation.column(column).rows(6, 3).into_owned(),
+            difference.rows(6, 3).into_owned(),
+            epsilon = 5e-3
+        );
+    }
+}
+
+#[test]
+fn transition_of_parameter_errors_is_the_derivative_of_navigation() {
+    let nominal = navigate(&triads(), start());
+    let step = 1e-6;
+    for sensor in crate::imu::Sensor::ALL {
+        for parameter in 0..PARAMETERS {
+            // δθ is true − estimated, so the computed triad goes the other way.
+            let shifted = |sign: f64| {
+                let mut changed = triads();
+                let mut v = changed.get(sensor).to_vector();
+                v[parameter] -= sign * step;
+                *changed.get_mut(sensor) = Triad::from_vector(InstallationForm::General, &v);
+                error(&navigate(&changed, start()).state, &nominal.state)
+            };
+            let difference = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            // Within a sample the tilt's own share of velocity is kept to first order.
+            let column = nominal.parameters.get(sensor).column(parameter);
+            assert_relative_eq!(
+                column.rows(0, 6).into_owned(),
+                difference.rows(0, 6).into_owned(),
+                epsilon = 3e-5
+            );
+            assert_relative_eq!(
+                column.rows(6, 3).into_owned(),
+                difference.rows(6, 3).into_owned(),
+                epsilon = 5e-3
+            );
+        }
+    }
+}
+
+#[test]
+fn transition_of_further_parameters_is_the_derivative_of_navigation() {
+    let walk = PerSensor::default();
+    let with = |values: FurtherVector| {
+        Navigator::new(&record(), &site(), walk, &triads(), start())
+            .unwrap()
+            .with_further(FurtherTerms {
+                on: (0..FURTHER).collect(),
+                values,
+            })
+            .advance(0..SAMPLES)
+    };
+    let nominal = with(FurtherVector::zeros());
+    assert_eq!(nominal.further.len(), FURTHER);
+    for further in &nominal.further {
+        let mut step = FurtherVector::zeros();
+        step[further.parameter] = 1e-6;
+        // δq is true − estimated, so the computed parameter goes the other way.
+        let shifted = |sign: f64| error(&with(-step * sign).state, &nominal.state);
+        let difference = (shifted(1.0) - shifted(-1.0)) / 2e-6;
+        let scale = difference.norm().max(1e-3);
+        assert_relative_eq!(
+            further.column.rows(0, 6).into_owned(),
+            difference.rows(0, 6).into_owned(),
+            epsilon = 1e-3 * scale
+        );
+        assert_relative_eq!(
+            further.column.rows(6, 3).into_owned(),
+            difference.rows(6, 3).into_owned(),
+            epsilon = 0.05 * scale
+        );
+    }
+}
+
+#[test]
+fn an_ideal_instrument_at_rest_stays_at_rest() {
+    let site = site();
+    let attitude = exp(Vector3::new(0.4, -0.3, 1.0));
+    let samples = 6000;
+    let record = ImuRecord {
+        gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; samples],
+        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; samples],
+        ..record()
+    };
+    let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+    let mut navigator = Navigator::new(
+        &record,
+        &site,
+        PerSensor::default(),
+        &ideal,
+        State::at_rest(attitude),
+    )
+    .unwrap();
+    let end = navigator.advance(0..samples).state;
+    assert_relative_eq!(end.attitude, attitude, epsilon = 1e-12);
+    assert!(end.velocity.norm() < 1e-9 && end.position.norm() < 1e-7);
+}
+
+#[test]
+fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
+    let site = site();
+    let attitude = start().attitude;
+    let record = ImuRecord {
+        gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; SAMPLES],
+        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES],
+        ..record()
+    };
+    let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+    let walk = PerSensor {
+        gyro: 3e-7,
+        accel: 5e-5,
+    };
+    let at_rest = State::at_rest(attitude);
+    let navigator = Navigator::new(&record, &site, walk, &ideal, at_rest).unwrap();
+    let moving = navigator.clone().advance(0..SAMPLES);
+    let standing = navigator.clone().advance_standing(0..SAMPLES);
+    assert_relative_eq!(moving.navigation, standing.navigation, epsilon = 1e-6);
+    for sensor in crate::imu::Sensor::ALL {
+        let of = |block: &Block| *block.parameters.get(sensor);
+        assert_relative_eq!(of(&moving), of(&standing), epsilon = 1e-6);
+    }
+}
+
+#[test]
+fn noise_of_a_long_block_equals_that_of_its_parts() {
+    // At rest the mean force is exact, so but for the Earth's turn noise must compose: Q(0,2) = Φ Q(0,1) Φᵀ + Q(1,2).
+    let site = site();
+    let record = ImuRecord {
+        gyro: vec![Vector3::zeros(); SAMPLES],
+        accel: vec![-site.gravity_n() * PERIOD; SAMPLES],
+        ..record()
+    };
+    let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+    let walk = PerSensor {
+        gyro: 0.1,
+        accel: 1.0,
+    };
+    let start = State::at_rest(Matrix3::identity());
+    let mut navigator = Navigator::new(&record, &site, walk, &ideal, start).unwrap();
+    let whole = navigator.clone().advance(0..SAMPLES).noise;
+    let first = navigator.advance(0..SAMPLES / 2);
+    let second = navigator.advance(SAMPLES / 2..SAMPLES);
+    let composed = second.navigation * first.noise * second.navigation.transpose() + second.noise;
+    assert_relative_eq!(whole, composed, epsilon = 1e-7);
+}
