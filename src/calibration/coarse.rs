@@ -6,7 +6,7 @@ mod heading;
 mod table;
 mod turns;
 
-use std::f64::consts::PI;
+use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,6 +14,7 @@ use super::error::CalibrationError;
 use super::outcome::{from_vector, to_vector};
 use super::pass::{Linearisation, singular};
 use super::schedule::first_reading;
+use crate::attitude::exp;
 use crate::imu::{FurtherVector, InstallationForm, PerSensor, Triad};
 use crate::run::{Dwell, Run, TableRecord};
 use crate::units::{ARCSEC, DEGREE};
@@ -31,6 +32,22 @@ pub struct CoarseStart {
     pub at: Linearisation,
     /// What is known of the initial attitude.
     pub attitude: AttitudePrior,
+    /// Whether the noise of the gyros hides Earth rate, so that the heading may be any.
+    pub hidden: bool,
+}
+
+impl CoarseStart {
+    /// The same in the other three quadrants where the heading is hidden.
+    pub(super) fn other_headings(self) -> impl Iterator<Item = Self> {
+        let quadrants = if self.hidden { 1..4 } else { 0..0 };
+        quadrants.map(move |quadrant| {
+            let turn = exp(Vector3::z() * (FRAC_PI_2 * f64::from(quadrant)));
+            let mut turned = self;
+            turned.at.initial_attitude = turn * self.at.initial_attitude;
+            turned.attitude.mean = turn * self.attitude.mean;
+            turned
+        })
+    }
 }
 
 /// What is known of the attitude at the first sample before the filter runs.
@@ -49,10 +66,12 @@ const READ_ATTITUDE: f64 = 60.0 * ARCSEC;
 const LEVEL: f64 = 0.2 * DEGREE;
 /// 1σ of the initial heading without a table, rad, if Earth rate shows it well; else …
 const HEADING: f64 = 15.0 * DEGREE;
-/// … so many times what Earth rate leaves of it …
+/// … so many times what Earth rate leaves of it.
 const HEADING_SIGMAS: f64 = 3.0;
-/// … and at most that of a heading of which nothing is known.
-const ANY_HEADING: f64 = PI / 1.732_050_807_568_877_2;
+/// A heading less known than this, rad, is hidden: it may be in any quadrant, and …
+const HIDDEN: f64 = 45.0 * DEGREE;
+/// … within one, has the standard deviation of a uniform distribution, rad.
+const IN_QUADRANT: f64 = 90.0 * DEGREE / 3.464_101_615_137_754_6;
 
 impl AttitudePrior {
     /// From a reading of a table.
@@ -68,7 +87,12 @@ impl AttitudePrior {
 
     /// From a coarse alignment that knows its heading to this 1σ.
     fn of_alignment(mean: Matrix3<f64>, heading_sigma: f64) -> Self {
-        let heading = (HEADING_SIGMAS * heading_sigma).clamp(HEADING, ANY_HEADING);
+        let heading = (HEADING_SIGMAS * heading_sigma).max(HEADING);
+        let heading = if heading > HIDDEN {
+            IN_QUADRANT
+        } else {
+            heading
+        };
         Self {
             mean,
             sigma: Vector3::new(LEVEL, LEVEL, heading),
@@ -103,6 +127,7 @@ pub fn coarse_start(
                 initial_attitude,
             },
             attitude: AttitudePrior::of_reading(table, initial_attitude),
+            hidden: false,
         }),
         _ => {
             let triads = gravity::accelerometers(run, dwells, &run.prior_mean(form))?;
@@ -110,6 +135,7 @@ pub fn coarse_start(
             Ok(CoarseStart {
                 at,
                 attitude: AttitudePrior::of_alignment(at.initial_attitude, heading_sigma),
+                hidden: HEADING_SIGMAS * heading_sigma > HIDDEN,
             })
         }
     }

@@ -1,6 +1,6 @@
 //! The estimator: coarse start, with a table a live pass, and held passes until nothing moves.
 
-use super::coarse::{AttitudePrior, coarse_start};
+use super::coarse::{AttitudePrior, CoarseStart, coarse_start};
 use super::consistency::consistency;
 use super::curvature::curvature;
 use super::error::CalibrationError;
@@ -29,7 +29,7 @@ const PASSES: usize = 10;
 /// A merit that rises by more than this part means that the step was too long. Each pass knows the
 /// merit of its own linearised problem only, so a small rise means nothing.
 const MERIT_RISE: f64 = 0.1;
-/// A step of more than this part of the one before goes half its way.
+/// After a step of more than this part of the one before, all go half as far.
 const SHRINKS: f64 = 0.8;
 /// 1σ of the initial velocity: a table at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
@@ -58,22 +58,19 @@ pub fn estimate(
     let schedule = Schedule::new(run, &dwells)?;
     let start = coarse_start(run, &dwells, form)?;
     let velocity_sigma = velocity_sigma(run, &dwells);
-    let problem = problem(run, schedule, form, start.attitude, velocity_sigma);
-    let start = start.at;
-
-    let mut passes = Vec::new();
-    // What a live pass feeds back while heading is known to degrees only leads it astray; the coarse
-    // start without a table is good enough for the held passes to begin from.
-    let live = match run.body_frame() {
-        BodyFrame::Table => Some(pass(&problem, &start, Mode::Live)?),
-        BodyFrame::Accelerometer => None,
+    let attempt = |start: CoarseStart| {
+        let problem = problem(run, schedule.clone(), form, start.attitude, velocity_sigma);
+        attempt(problem, start.at, progress)
     };
-    if let Some(live) = &live {
-        passes.push(summary(live, &start, true));
-        passes.iter().for_each(progress);
-    }
-    let from = live.as_ref().map_or(start, |live| live.estimate);
-    let (held, converged) = iterate(&problem, from, &mut passes, progress)?;
+    let of_start = attempt(start);
+    let others = start.other_headings().map(attempt);
+    let Attempt {
+        problem,
+        passes,
+        live,
+        held,
+        converged,
+    } = others.fold(of_start, better)?;
     let estimate = Estimate {
         triads: held.estimate.triads,
         covariance: held.covariance + curvature(&held.estimate.triads, &held.covariance),
@@ -97,6 +94,7 @@ pub fn estimate(
         further: held.further,
         linearised_at: held.at,
         converged,
+        log_determinant: held.log_determinant,
         consistency: consistency(&held.innovations),
         history: held.history,
         live_history: live.map(|live| live.history).unwrap_or_default(),
@@ -107,6 +105,55 @@ pub fn estimate(
     };
     outcome.warnings.extend(warnings(&outcome));
     Ok(outcome)
+}
+
+/// A calibration from one start.
+struct Attempt<'a> {
+    problem: Problem<'a>,
+    passes: Vec<Pass>,
+    live: Option<PassResult>,
+    held: PassResult,
+    converged: bool,
+}
+
+fn attempt<'a>(
+    problem: Problem<'a>,
+    start: Linearisation,
+    progress: Progress,
+) -> Result<Attempt<'a>, CalibrationError> {
+    let mut passes = Vec::new();
+    // What a live pass feeds back while heading is known to degrees only leads it astray; the coarse
+    // start without a table is good enough for the held passes to begin from.
+    let live = match problem.run.body_frame() {
+        BodyFrame::Table => Some(pass(&problem, &start, Mode::Live)?),
+        BodyFrame::Accelerometer => None,
+    };
+    if let Some(live) = &live {
+        passes.push(summary(live, &start, true));
+        passes.iter().for_each(progress);
+    }
+    let from = live.as_ref().map_or(start, |live| live.estimate);
+    let (held, converged) = iterate(&problem, from, &mut passes, progress)?;
+    Ok(Attempt {
+        problem,
+        passes,
+        live,
+        held,
+        converged,
+    })
+}
+
+/// The attempt that converged, and if both did, that of the lower merit.
+fn better<'a>(
+    one: Result<Attempt<'a>, CalibrationError>,
+    other: Result<Attempt<'a>, CalibrationError>,
+) -> Result<Attempt<'a>, CalibrationError> {
+    let rank = |attempt: &Attempt| (!attempt.converged, attempt.held.merit);
+    match (one, other) {
+        (Ok(one), Ok(other)) if rank(&other) < rank(&one) => Ok(other),
+        (Err(_), Ok(other)) => Ok(other),
+        (one, _) => one,
+    }
 }
 
 /// Held passes from a first point on, each linearised at the estimate of the one before; and whether
@@ -120,7 +167,7 @@ fn iterate(
     let mut at = from;
     let mut gate = Gate::Innovations;
     let mut before: Option<PassResult> = None;
-    let mut last_step = f64::INFINITY;
+    let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
     loop {
         let result = pass(problem, &at, Mode::Held(gate))?;
         let summary = summary(&result, &at, false);
@@ -143,12 +190,14 @@ fn iterate(
         let too_far =
             before.filter(|before| same_data && result.merit > before.merit * (1.0 + MERIT_RISE));
         // A step as large as the one before may be the way back of it.
-        let shrinks = summary.largest_step < SHRINKS * last_step;
+        if summary.largest_step > SHRINKS * last_step {
+            fraction *= 0.5;
+        }
         last_step = summary.largest_step;
         at = match &too_far {
             Some(before) => before.at.towards(&at, 0.5),
-            None if shrinks => result.estimate,
-            None => at.towards(&result.estimate, 0.5),
+            None if fraction < 1.0 => at.towards(&result.estimate, fraction),
+            None => result.estimate,
         };
         before = Some(too_far.unwrap_or(result));
     }
@@ -265,6 +314,14 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
             "Not observed by this path, σ not even halved: {}.",
             hidden.join(", ")
         ));
+    }
+    if outcome.further.even_terms_inseparable() {
+        warnings.push(
+            "Second order and asymmetry of the accelerometers are one and the same in dwells with an \
+             axis up or down. Add dwells between them, at 45° and the like, or leave one of the two \
+             off."
+                .to_owned(),
+        );
     }
     if let Some(test) = outcome.form_test.filter(FormTest::rejects) {
         warnings.push(format!(

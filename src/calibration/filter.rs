@@ -190,9 +190,14 @@ impl<const N: usize> Filter<N> {
     }
 
     /// The innovation of an observed difference in units of its own σ, its components independent:
-    /// `L⁻¹ (z − H x)` with `L Lᵀ = H P Hᵀ + R`, `R` the same variance on all axes.
-    /// `None` if that is not positive definite.
-    pub fn whitened(&self, sight: Sight, z: &Vector3<f64>, variance: f64) -> Option<Vector3<f64>> {
+    /// `L⁻¹ (z − H x)` with `L Lᵀ = H P Hᵀ + R`, `R` the same variance on all axes; and the logarithm
+    /// of the determinant of that. `None` if it is not positive definite.
+    pub fn whitened(
+        &self,
+        sight: Sight,
+        z: &Vector3<f64>,
+        variance: f64,
+    ) -> Option<(Vector3<f64>, f64)> {
         let mut s = Matrix3::identity() * variance;
         for column in 0..3 {
             let ph = sight.across(column, &self.p);
@@ -201,7 +206,9 @@ impl<const N: usize> Filter<N> {
             }
         }
         let seen = Vector3::from_fn(|component, _| sight.along(component, &self.x));
-        s.cholesky()?.l().solve_lower_triangular(&(z - seen))
+        let l = s.cholesky()?.l();
+        let log_determinant = 2.0 * l.diagonal().map(f64::ln).sum();
+        Some((l.solve_lower_triangular(&(z - seen))?, log_determinant))
     }
 
     /// Takes in an observed difference, one scalar after the other, in Joseph's form, which keeps

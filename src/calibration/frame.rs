@@ -7,6 +7,8 @@
 //! *Matrix Computations*, 4th ed., §5.2). Row norms of `K C`, so the general form's scale factors,
 //! and biases are the same in every frame.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::ComparisonError;
@@ -16,7 +18,7 @@ use super::states::{PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_par
 use crate::attitude::skew;
 use crate::imu::{AXES, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector};
 use crate::run::CalibrationRecord;
-use crate::run::record::{BodyFrame, TriadRecord};
+use crate::run::record::{BodyFrame, TermRecord, TriadRecord};
 
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +34,8 @@ pub struct Canonical {
     pub covariance: Option<ParameterMatrix>,
     /// Whether the record gives correlations; if not, the covariance takes its σ for independent.
     pub correlated: bool,
+    /// Constants beside the parameters by name, which no body frame changes to first order.
+    pub constants: BTreeMap<String, TermRecord>,
     /// False only if the record says that its method did not converge.
     pub converged: bool,
 }
@@ -87,6 +91,7 @@ impl Canonical {
             triads,
             covariance,
             correlated: !record.covariance.is_empty(),
+            constants: record.terms.clone(),
             converged: record.converged != Some(false),
         })
     }

@@ -64,6 +64,9 @@ pub fn constants(table: &SVector<f64, TABLE_GEOMETRY>, terms: &FurtherVector) ->
     all
 }
 
+/// Correlation beyond which two terms are not told apart.
+const INSEPARABLE: f64 = 0.99;
+
 /// Estimates of the constants. What is off is zero in all of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Further {
@@ -97,6 +100,19 @@ impl Further {
     /// The estimated parameters of terms.
     pub fn terms(&self) -> FurtherVector {
         self.values.fixed_rows::<FURTHER>(TABLE_GEOMETRY).into()
+    }
+
+    /// Whether second order and asymmetry of an accelerometer are both estimated and hardly more than
+    /// their sum is seen.
+    pub fn even_terms_inseparable(&self) -> bool {
+        let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
+        let (second, asymmetry) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));
+        let sigma = self.sigma();
+        (0..3).any(|axis| {
+            let (i, j) = (second + axis, asymmetry + axis);
+            let both = sigma[i] * sigma[j];
+            both > 0.0 && (self.covariance[(i, j)] / both).abs() > INSEPARABLE
+        })
     }
 
     /// Indices of those that were estimated.

@@ -104,6 +104,8 @@ pub struct Outcome {
     pub live_history: Vec<Moment>,
     /// Innovations of the last pass.
     pub innovations: Vec<Innovation>,
+    /// Logarithm of the determinant of the covariance of all innovations let in.
+    pub log_determinant: f64,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
     /// Whether the data reject the installation form; none where they cannot.

@@ -116,6 +116,9 @@ pub(super) struct PassResult {
     /// Whitened innovations squared, summed; the prior is in it, since the filter starts from it.
     /// A rejected observation counts as much as the gate lets pass.
     pub merit: f64,
+    /// Logarithm of the determinant of the covariance of all innovations let in: with the merit, −2 ln
+    /// of the likelihood.
+    pub log_determinant: f64,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Moment>,
 }
@@ -165,6 +168,7 @@ struct Pass<'a, const N: usize> {
     innovations: Vec<Innovation>,
     history: Vec<Moment>,
     merit: f64,
+    log_determinant: f64,
     /// Rejections in a row of velocity and of table observations.
     row: [usize; 2],
     /// Observations of this dwell that are left out because they shut the gate on those after them.
@@ -181,6 +185,7 @@ struct Begin<'a, const N: usize> {
     innovations: usize,
     history: usize,
     merit: f64,
+    log_determinant: f64,
 }
 
 impl<'a, const N: usize> Pass<'a, N> {
@@ -229,6 +234,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             innovations: Vec::new(),
             history: Vec::new(),
             merit: 0.0,
+            log_determinant: 0.0,
             row: [0; 2],
             shutting: Vec::new(),
         })
@@ -281,6 +287,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             attitude_covariance: self.filter.attitude_covariance(),
             attitude_sigma: self.filter.initial_attitude_sigma(),
             merit: self.merit,
+            log_determinant: self.log_determinant,
             innovations: self.innovations,
             history: self.history,
         })
@@ -297,6 +304,7 @@ impl<'a, const N: usize> Pass<'a, N> {
             innovations: self.innovations.len(),
             history: self.history.len(),
             merit: self.merit,
+            log_determinant: self.log_determinant,
         }
     }
 
@@ -321,6 +329,7 @@ impl<'a, const N: usize> Pass<'a, N> {
         self.innovations.truncate(begin.innovations);
         self.history.truncate(begin.history);
         self.merit = begin.merit;
+        self.log_determinant = begin.log_determinant;
         self.row = [0; 2];
         self.shutting.push(shutting);
     }
@@ -378,7 +387,7 @@ impl<'a, const N: usize> Pass<'a, N> {
         difference: Vector3<f64>,
         variance: f64,
     ) -> Result<(), CalibrationError> {
-        let whitened = self
+        let (whitened, log_determinant) = self
             .filter
             .whitened(sight, &difference, variance)
             .ok_or(CalibrationError::Diverged { time })?;
@@ -396,6 +405,7 @@ impl<'a, const N: usize> Pass<'a, N> {
         if accepted {
             *row = 0;
             self.merit += distance;
+            self.log_determinant += log_determinant;
             self.filter.observe(sight, &difference, variance);
         } else {
             *row += 1;

@@ -216,8 +216,9 @@ impl From<&BlockEffect> for BlockRecord {
             sigma_factors: effect.cost,
             merit_gain: effect.gain,
             merit_gain_limit: effect.limit,
-            without: consistency_record(&effect.without),
-            with: consistency_record(&effect.with),
+            asked_for: effect.asked_for(),
+            nis_without: effect.without,
+            nis_with: effect.with,
         }
     }
 }

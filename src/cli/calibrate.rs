@@ -1,5 +1,6 @@
 //! `turncal calibrate`
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,7 @@ use turncal::calibration::{
 };
 use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};
+use turncal::run::record::TermRecord;
 use turncal::run::{CalibrationRecord, Run};
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
@@ -128,6 +130,8 @@ impl Calibrate {
             .as_deref()
             .map(|path| read_truth(path, &run))
             .transpose()?;
+        let (truth, true_terms) = truth.unzip();
+        let true_terms = true_terms.unwrap_or_default();
         let truth_in_form = truth
             .as_ref()
             .map(|truth| PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form)));
@@ -156,10 +160,18 @@ impl Calibrate {
                 Result::ClosedForm(Box::new(closed_form))
             }
         };
-        let effects = match &result {
-            Result::Filter(outcome) => block_effects(&run, outcome)?,
-            Result::ClosedForm(_) => Vec::new(),
+        let method = match &result {
+            Result::Filter(outcome) => ("EKF", &outcome.estimate),
+            Result::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
         };
+        let (effects, navigation) = rayon::join(
+            || match &result {
+                Result::Filter(outcome) => block_effects(&run, outcome),
+                Result::ClosedForm(_) => Ok(Vec::new()),
+            },
+            || navigate(&run, &[method], truth.as_ref()),
+        );
+        let effects = effects?;
         let record = match &result {
             Result::Filter(outcome) => outcome.record(&run, &effects),
             Result::ClosedForm(closed_form) => closed_form.estimate.record(&run),
@@ -169,11 +181,6 @@ impl Calibrate {
             Result::ClosedForm(closed_form) => note(closed_form),
         };
         let dwells = dwell_times(&run);
-        let method = match &result {
-            Result::Filter(outcome) => ("EKF", &outcome.estimate),
-            Result::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
-        };
-        let navigation = navigate(&run, &[method], truth.as_ref());
         let report = Report {
             title: &run.name,
             run: &run,
@@ -182,6 +189,7 @@ impl Calibrate {
                 Result::ClosedForm(_) => None,
             },
             effects: &effects,
+            true_terms: &true_terms,
             closed_form: match &result {
                 Result::Filter(_) => None,
                 Result::ClosedForm(closed_form) => Some(report::ClosedForm {
@@ -262,8 +270,11 @@ pub fn write_report(report: &Report, directory: &Path) -> anyhow::Result<()> {
     Ok(report.write(directory)?)
 }
 
-/// In the general form, which can hold any truth.
-fn read_truth(path: &Path, run: &Run) -> anyhow::Result<PerSensor<Triad>> {
+/// In the general form, which can hold any truth, with the constants beside it that it states.
+fn read_truth(
+    path: &Path,
+    run: &Run,
+) -> anyhow::Result<(PerSensor<Triad>, BTreeMap<String, TermRecord>)> {
     let record = CalibrationRecord::read(path)?;
     if let Some(unit) = &record.unit
         && *unit != run.unit
@@ -278,5 +289,5 @@ fn read_truth(path: &Path, run: &Run) -> anyhow::Result<PerSensor<Triad>> {
         );
     }
     let triads = triads_of(&record, &run.nominal, InstallationForm::General);
-    Ok(in_body_frame(&triads, run.body_frame()))
+    Ok((in_body_frame(&triads, run.body_frame()), record.terms))
 }

@@ -1,5 +1,6 @@
 //! `turncal demo`
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -48,7 +49,6 @@ impl Demo {
         let (turning, (standing, closed_form)) = (turning?, standing?);
         let run = &turning.run;
         let outcome = filter(run, FORM, &activity)?;
-        let effects = calibration::block_effects(run, &outcome)?;
 
         let note = note(&closed_form);
         let dwells = dwell_times(run);
@@ -57,12 +57,17 @@ impl Demo {
             ("closed form", &closed_form.estimate),
             ("EKF", &outcome.estimate),
         ];
-        let navigation = navigate(run, &methods, Some(&turning.truth));
+        let (effects, navigation) = rayon::join(
+            || calibration::block_effects(run, &outcome),
+            || navigate(run, &methods, Some(&turning.truth)),
+        );
+        let effects = effects?;
         let report = Report {
             title: "turncal demo",
             run,
             outcome: Some(&outcome),
             effects: &effects,
+            true_terms: &BTreeMap::new(),
             closed_form: Some(report::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,

@@ -135,6 +135,7 @@ impl Navigate {
             calibration: &names[0],
             truth: &names[1],
             converged: calibration.converged != Some(false),
+            terms: !calibration.terms.is_empty() || !truth.terms.is_empty(),
             body_frame,
             only,
             mission: &mission,

@@ -1,10 +1,13 @@
 //! `turncal simulate`
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use turncal::calibration::truth_record;
-use turncal::run::write_run;
+use turncal::imu::{FURTHER, Term};
+use turncal::run::record::TermRecord;
+use turncal::run::{CalibrationRecord, write_run};
 use turncal::simulation::{Scenario, Simulated};
 
 use super::output::Overwrite;
@@ -41,6 +44,13 @@ impl Simulate {
         write(&simulated, &directory.path())?;
         directory.commit()?;
         drop(activity);
+        if simulated.geometry.rows_range(3..).amax() > 0.0 {
+            eprintln!(
+                "note: the axes of the simulated table are not square, which the quaternions of its log \
+                 cannot tell: a calibration from these files will claim too small σ of installation. \
+                 turncal study accuracy estimates their tilts."
+            );
+        }
         eprintln!(
             "{}: {:.0} s written to {}",
             scenario.name,
@@ -58,9 +68,22 @@ pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simul
         .with_context(|| format!("scenario {} cannot be simulated", scenario.name))
 }
 
+/// The true parameters of the terms that are on.
+fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
+    let on = (0..FURTHER).filter(|&k| simulated.run.further_sigma[k] > 0.0);
+    let term = |k: usize| {
+        let (value, sigma) = (simulated.further[k], None);
+        Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
+    };
+    on.filter_map(term).collect()
+}
+
 /// Writes a simulated run with its truth into a directory that is there.
 pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
-    let truth = truth_record(&simulated.truth, &simulated.run);
+    let truth = CalibrationRecord {
+        terms: true_terms(simulated),
+        ..truth_record(&simulated.truth, &simulated.run)
+    };
     write_run(directory, &simulated.run, simulated.output, Some(&truth))?;
     Ok(())
 }

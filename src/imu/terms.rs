@@ -1,9 +1,10 @@
 //! Further error terms of an instrument, beside `K`, `E` and `D`: each changes what a triad takes for
-//! its input, `N = K C (u + t(q)) + D`, and is linear in parameters `q` of its own.
+//! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::{AXES, Sensor};
+use crate::attitude::exp;
 use crate::units::{DEG_PER_H, MICRO_G, PPM, STANDARD_GRAVITY};
 
 /// Number of parameters of all terms.
@@ -27,8 +28,9 @@ pub enum Term {
     /// Accelerometers x and y stand away from z by r_x and r_y, in m along body axes: they add row i
     /// of `([ω̇×] + [ω×]²) r_i`. One lever arm common to all three cannot be told from rest.
     SizeEffect,
-    /// Accelerometer samples are those of a time this much later than the gyros', in s: where the body
-    /// stays at its place they add `q ḟ = −q (ω − ω_ie) × f`.
+    /// Accelerometer samples are those of a time q later than the gyros', in s: where the body stays
+    /// at its place and turns by θ in that time, they are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to
+    /// first order.
     TimeOffset,
     /// Gyros add `Q f`, Q row by row, in rad/s per m/s².
     GSensitivity,
@@ -135,8 +137,37 @@ impl Term {
 }
 
 impl Sensed {
-    /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter.
-    pub fn response(&self, sensor: Sensor) -> FurtherResponse {
+    /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².
+    pub fn added(&self, sensor: Sensor, q: &FurtherVector) -> Vector3<f64> {
+        let of = |term: Term| q.rows_range(term.parameters());
+        let f = &self.force;
+        match sensor {
+            Sensor::Gyro => {
+                let q = of(Term::GSensitivity);
+                Vector3::from_fn(|row, _| {
+                    (0..3).map(|column| q[3 * row + column] * f[column]).sum()
+                })
+            }
+            Sensor::Accel => {
+                let (second, asymmetry) = (of(Term::AccelSecondOrder), of(Term::AccelAsymmetry));
+                let (arms, turning) = (of(Term::SizeEffect), self.of_lever_arm());
+                let later = exp(-self.turn(of(Term::TimeOffset)[0])) * f - f;
+                Vector3::from_fn(|axis, _| {
+                    let arm = |component: usize| arms[3 * axis + component];
+                    let of_arm = if axis < 2 {
+                        (0..3).map(|c| turning[(axis, c)] * arm(c)).sum()
+                    } else {
+                        0.0
+                    };
+                    second[axis] * f[axis].powi(2) + asymmetry[axis] * f[axis].abs() + of_arm
+                }) + later
+            }
+        }
+    }
+
+    /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter, where the parameters are
+    /// these. Only that of the time offset depends on them.
+    pub fn response(&self, sensor: Sensor, q: &FurtherVector) -> FurtherResponse {
         let mut response = FurtherResponse::zeros();
         let f = &self.force;
         match sensor {
@@ -161,12 +192,17 @@ impl Sensed {
                         }
                     }
                 }
-                response
-                    .column_mut(Term::TimeOffset.parameters().start)
-                    .copy_from(&-self.rate_over_earth.cross(f));
+                let offset = Term::TimeOffset.parameters().start;
+                let rate = self.rate_over_earth + self.angular_acceleration * q[offset];
+                response.column_mut(offset).copy_from(&-rate.cross(f));
             }
         }
         response
+    }
+
+    /// The rotation vector of the body's turn over the Earth in a time from now, rad.
+    fn turn(&self, time: f64) -> Vector3<f64> {
+        self.rate_over_earth * time + self.angular_acceleration * (0.5 * time * time)
     }
 
     /// `[ω̇×] + [ω×]²`.
@@ -193,10 +229,11 @@ mod tests {
         names.dedup();
         assert_eq!(names.len(), FURTHER);
         assert_eq!(Term::parameter_name(FURTHER), None);
+        let q = FurtherVector::zeros();
         for parameter in 0..FURTHER {
             let sensor = Term::of(parameter).unwrap().sensor();
             for of in Sensor::ALL {
-                let responds = sensed.response(of).column(parameter).norm() > 0.0;
+                let responds = sensed.response(of, &q).column(parameter).norm() > 0.0;
                 assert_eq!(responds, of == sensor, "{parameter}");
             }
         }
@@ -214,7 +251,7 @@ mod tests {
         let mut q = FurtherVector::zeros();
         q[Term::SizeEffect.parameters().start] = 0.1;
         q[Term::SizeEffect.parameters().start + 1] = 0.2;
-        let added = sensed.response(Sensor::Accel) * q;
+        let added = sensed.added(Sensor::Accel, &q);
         // −ω² x − ω̇ y along x, nothing along y for the accelerometer x.
         assert!((added - Vector3::new(-4.0 * 0.1 - 3.0 * 0.2, 0.0, 0.0)).norm() < 1e-15);
     }
@@ -229,10 +266,33 @@ mod tests {
             angular_acceleration: Vector3::zeros(),
             force: up(1.0),
         };
-        let offset = 1e-3;
+        let offset = 0.02;
         let mut q = FurtherVector::zeros();
         q[Term::TimeOffset.parameters().start] = offset;
-        let added = sensed.response(Sensor::Accel) * q;
-        assert!((up(1.0 + offset) - up(1.0) - added).norm() < 1e-6);
+        let added = sensed.added(Sensor::Accel, &q);
+        assert!((up(1.0 + offset) - up(1.0) - added).norm() < 1e-13);
+    }
+
+    #[test]
+    fn the_response_is_the_derivative_of_what_is_added() {
+        let sensed = Sensed {
+            rate: Vector3::new(0.1, -0.2, 0.3),
+            rate_over_earth: Vector3::new(0.3, -0.2, 0.1),
+            angular_acceleration: Vector3::new(1.0, 2.0, 3.0),
+            force: Vector3::new(4.0, -5.0, 6.0),
+        };
+        let q = FurtherVector::from_fn(|k, _| 1e-3 * (k as f64 - 7.0));
+        for sensor in Sensor::ALL {
+            let response = sensed.response(sensor, &q);
+            for k in 0..FURTHER {
+                let mut step = FurtherVector::zeros();
+                step[k] = 1e-5;
+                let difference =
+                    sensed.added(sensor, &(q + step)) - sensed.added(sensor, &(q - step));
+                // The offset turns its own response by q ω, which is left out.
+                let off = (response.column(k) - difference / 2e-5).norm();
+                assert!(off < 1e-2, "{k}: {off}");
+            }
+        }
     }
 }

@@ -84,20 +84,27 @@ impl<'a> Navigator<'a> {
         Some(())
     }
 
-    /// Increments along body axes of sample `k`, corrected by the triads (Eq. 11).
+    /// Increments along body axes of sample `k`, corrected by the triads (Eq. 11) and, at about this
+    /// attitude, by further terms; and where these are on, what the body then senses.
     #[inline]
-    fn increments(&self, k: usize, attitude: &Matrix3<f64>) -> Increments {
-        let increments = self.of_triads(k);
+    fn increments(&self, k: usize, attitude: &Matrix3<f64>) -> (Increments, Option<Sensed>) {
+        let of_triads = self.of_triads(k);
         if self.further.on.is_empty() {
-            return increments;
+            return (of_triads, None);
         }
         let period = self.imu.period;
-        let responses = self.responses(k, attitude);
-        let added = |sensor| responses.get(sensor) * self.further.values * period;
-        Increments {
-            angle: increments.angle - added(Sensor::Gyro),
-            velocity: increments.velocity - added(Sensor::Accel),
+        let mut increments = of_triads;
+        let mut sensed = self.sensed(k, &increments, attitude);
+        // Triads see u + t(u), and u is what is looked for; the second round leaves the third order.
+        for _ in 0..2 {
+            let added = |sensor| sensed.added(sensor, &self.further.values) * period;
+            increments = Increments {
+                angle: of_triads.angle - added(Sensor::Gyro),
+                velocity: of_triads.velocity - added(Sensor::Accel),
+            };
+            sensed.force = increments.velocity / period;
         }
+        (increments, Some(sensed))
     }
 
     #[inline]
@@ -109,19 +116,24 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// What the further terms respond to in sample `k`, at about this attitude.
-    fn responses(&self, k: usize, attitude: &Matrix3<f64>) -> PerSensor<FurtherResponse> {
+    /// What the body senses in sample `k`, of these increments, at about this attitude.
+    fn sensed(&self, k: usize, increments: &Increments, attitude: &Matrix3<f64>) -> Sensed {
         let period = self.imu.period;
-        let Increments { angle, velocity } = self.of_triads(k);
-        let before = k.checked_sub(1).map_or(angle, |k| self.of_triads(k).angle);
-        let rate = angle / period;
-        let sensed = Sensed {
+        let rate = increments.angle / period;
+        // Angular acceleration at the middle of the sample, from those beside it.
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(self.imu.len() - 1));
+        let change = self.of_triads(after).angle - self.of_triads(before).angle;
+        let apart = (after - before).max(1) as f64 * period;
+        Sensed {
             rate,
             rate_over_earth: rate - attitude.tr_mul(&self.earth_rate),
-            angular_acceleration: (angle - before) / (period * period),
-            force: velocity / period,
-        };
-        PerSensor::from_fn(|sensor| sensed.response(sensor))
+            angular_acceleration: change / (period * apart),
+            force: increments.velocity / period,
+        }
+    }
+
+    fn responses(&self, sensed: &Sensed) -> PerSensor<FurtherResponse> {
+        PerSensor::from_fn(|sensor| sensed.response(sensor, &self.further.values))
     }
 
     /// Navigates through these samples of the record and gives their block. Where the record has a
@@ -129,12 +141,11 @@ impl<'a> Navigator<'a> {
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let period = self.imu.period;
         let mut moments = Moments::with_further(&self.further.on);
-        let with_further = !self.further.on.is_empty();
-        self.navigate(samples, |navigator, k, step| {
+        self.navigate(samples, |navigator, step| {
             let middle = (step.before + step.after) * 0.5;
             moments.add(&middle, &step.increments, &step.change, period);
-            if with_further {
-                let responses = navigator.responses(k, &middle);
+            if let Some(sensed) = &step.sensed {
+                let responses = navigator.responses(sensed);
                 moments.add_further(&middle, &responses, &step.change, period);
             }
         });
@@ -146,7 +157,7 @@ impl<'a> Navigator<'a> {
     /// innovations and the sensitivity to scale factors, and the two together look like information.
     pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
-        self.navigate(samples, |_, _, _| {});
+        self.navigate(samples, |_, _| {});
         let attitude = self.state.attitude;
         let force = -self.gravity;
         let mut moments = Moments::standing(&attitude, &self.earth_rate, &force, duration);
@@ -157,7 +168,7 @@ impl<'a> Navigator<'a> {
                 angular_acceleration: Vector3::zeros(),
                 force: attitude.tr_mul(&force),
             };
-            let responses = PerSensor::from_fn(|sensor| sensed.response(sensor));
+            let responses = self.responses(&sensed);
             moments.stand_further(&self.further.on, &attitude, &responses);
         }
         self.block(&moments)
@@ -165,16 +176,18 @@ impl<'a> Navigator<'a> {
 
     /// Navigates through samples and tells `each` of every one.
     #[inline]
-    fn navigate(&mut self, samples: Range<usize>, mut each: impl FnMut(&Self, usize, &Step)) {
+    fn navigate(&mut self, samples: Range<usize>, mut each: impl FnMut(&Self, &Step)) {
         let period = self.imu.period;
         let mut state = self.state;
         let mut before = samples
             .start
             .checked_sub(1)
-            .map_or_else(Increments::default, |k| self.increments(k, &state.attitude));
+            .map_or_else(Increments::default, |k| {
+                self.increments(k, &state.attitude).0
+            });
         let half_turn = self.earth_rate * (0.5 * period);
         for k in samples {
-            let increments = self.increments(k, &state.attitude);
+            let (increments, sensed) = self.increments(k, &state.attitude);
             let motion = increments.motion(&before);
             before = increments;
 
@@ -187,8 +200,9 @@ impl<'a> Navigator<'a> {
                 after: attitude,
                 increments,
                 change,
+                sensed,
             };
-            each(self, k, &step);
+            each(self, &step);
 
             let coriolis = self.earth_rate.cross(&state.velocity) * 2.0;
             let velocity = state.velocity + change + (self.gravity - coriolis) * period;
@@ -214,6 +228,8 @@ struct Step {
     increments: Increments,
     /// Velocity change by specific force.
     change: Vector3<f64>,
+    /// What the body senses, where further terms are on.
+    sensed: Option<Sensed>,
 }
 
 fn instruments(triads: &PerSensor<Triad>, period: f64) -> Option<PerSensor<Instrument>> {

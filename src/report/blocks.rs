@@ -6,18 +6,20 @@ use super::group::Group;
 use super::number::{three_digits, value};
 use super::side_by_side::Table;
 use crate::calibration::BlockEffect;
-use crate::calibration::outcome::{Consistency, Nis};
 
 const NONE: &str = "–";
 
-/// The tables; none if no block was on or tried.
+/// The tables: costs of the blocks that were on, and what those explain that were on or that the data
+/// ask for; none if there are no such blocks.
 pub(super) fn tables(effects: &[BlockEffect]) -> Vec<Table> {
     let mut tables = Vec::new();
     if effects.iter().any(|effect| effect.on) {
         tables.push(costs(effects));
     }
-    if !effects.is_empty() {
-        tables.push(explained(effects));
+    let shown = |effect: &&BlockEffect| effect.on || effect.asked_for();
+    let shown: Vec<&BlockEffect> = effects.iter().filter(shown).collect();
+    if !shown.is_empty() {
+        tables.push(explained(&shown));
     }
     tables
 }
@@ -43,67 +45,63 @@ fn costs(effects: &[BlockEffect]) -> Table {
     }
 }
 
-fn explained(effects: &[BlockEffect]) -> Table {
-    let of_table = effects.iter().any(|e| e.with.table.count > 0);
-    let mut headings = vec!["block", "", "NIS velocity"];
-    if of_table {
-        headings.push("NIS table");
-    }
-    headings.extend(["merit falls by", "by chance", "asked for"]);
-    let row = |effect: &BlockEffect| {
-        let nis = |of: fn(&Consistency) -> Nis| {
-            let (without, with) = (of(&effect.without).mean, of(&effect.with).mean);
-            format!("{} → {}", three_digits(without), three_digits(with))
-        };
-        let mut row = vec![
+fn explained(effects: &[&BlockEffect]) -> Table {
+    let headings = [
+        "block",
+        "",
+        "NIS",
+        "merit falls by",
+        "by chance",
+        "asked for",
+    ];
+    let row = |effect: &&BlockEffect| {
+        vec![
             title(effect.block).to_owned(),
-            if effect.on { "on" } else { "tried" }.to_owned(),
-            nis(|c| c.velocity),
-        ];
-        if of_table {
-            row.push(nis(|c| c.table));
-        }
-        row.extend([
+            if effect.on { "on" } else { "off" }.to_owned(),
+            nis(effect),
             three_digits(effect.gain),
             format!("< {}", three_digits(effect.limit)),
             if effect.asked_for() { "yes" } else { "no" }.to_owned(),
-        ]);
-        row
+        ]
     };
     let sections = effects.chunk_by(|a, b| a.on == b.on);
     Table {
         title: "What each block of states explains",
-        headings: headings.into_iter().map(str::to_owned).collect(),
+        headings: headings.map(str::to_owned).to_vec(),
         sections: sections
             .map(|section| section.iter().map(row).collect())
             .collect(),
-        notes: vec![
-            "NIS without → with the block. Merit: −2 ln of likelihood and prior; by chance it falls by \
-             less than this in 999 runs of 1000 where the block's errors are not there."
-                .to_owned(),
-        ],
+        notes: [
+            "NIS of all observations without → with the block. Merit: −2 ln of likelihood and prior; by \
+             chance it falls by less than this in 9999 runs of 10 000 whose errors the block has not.",
+            "Blocks that are off are tried with their usual σ and shown where the data ask for them.",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
     }
 }
 
-/// Where NIS is larger than chance allows: which block that is off would reduce it most.
-pub(super) fn advice(effects: &[BlockEffect]) -> Option<String> {
-    let tried = || effects.iter().filter(|effect| !effect.on);
-    tried().next()?;
-    let asked = tried().filter(|effect| effect.asked_for());
-    let Some(best) = asked.max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
-        return Some(
-            "NIS is larger than chance allows, and no block of states explains it: noise figures, \
-             pulses or disturbances are the likelier cause."
-                .to_owned(),
-        );
+fn nis(effect: &BlockEffect) -> String {
+    let digits = |nis: f64| {
+        if nis < 10.0 {
+            value(nis, 0.01)
+        } else {
+            three_digits(nis)
+        }
     };
-    let all = |consistency: &Consistency| three_digits(consistency.all.mean);
+    format!("{} → {}", digits(effect.without), digits(effect.with))
+}
+
+/// Where the data ask for blocks that are off: for which of them most.
+pub(super) fn advice(effects: &[BlockEffect]) -> Option<String> {
+    let off = effects.iter().filter(|effect| !effect.on);
+    let asked = off.filter(|effect| effect.asked_for());
+    let best = asked.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     Some(format!(
-        "NIS is larger than chance allows. Of the blocks that are off, {} would reduce it most, from \
-         {} to {}: --with {}.",
+        "The data show errors that are not modelled. Of the blocks of states that are off, {} would \
+         explain most (NIS {}): use --with {}, then look again.",
         title(best.block),
-        all(&best.without),
-        all(&best.with),
+        nis(best),
         best.block.name()
     ))
 }

@@ -1,9 +1,12 @@
 //! How constants beside the parameters of the triads are spoken of.
 
+use std::collections::BTreeMap;
+
 use super::number::{sigma, three_digits, value};
 use crate::calibration::further::{Constant, Further, constant_name};
 use crate::imu::Term;
 use crate::run::StateBlock;
+use crate::run::record::TermRecord;
 use crate::units::ARCSEC;
 
 /// One constant, each number as it is shown.
@@ -22,6 +25,8 @@ pub(super) struct Row {
     pub prior: String,
     /// Posterior over prior σ.
     pub remaining: f64,
+    /// Error, and error over σ, where the truth is known.
+    pub error: Option<[String; 2]>,
 }
 
 /// A block in words.
@@ -47,7 +52,7 @@ pub(super) fn unit(block: StateBlock) -> (&'static str, f64) {
 }
 
 /// Every constant that was estimated.
-pub(super) fn rows(further: &Further) -> Vec<Row> {
+pub(super) fn rows(further: &Further, truth: &BTreeMap<String, TermRecord>) -> Vec<Row> {
     let posterior = further.sigma();
     let mut last = None;
     let mut row = |k: usize| {
@@ -64,6 +69,13 @@ pub(super) fn rows(further: &Further) -> Vec<Row> {
             unit,
             prior: three_digits(prior / in_si),
             remaining: posterior[k] / prior,
+            error: truth.get(&name).map(|truth| {
+                let error = further.values[k] - truth.value;
+                [
+                    value(error / in_si, posterior[k] / in_si),
+                    value(error / posterior[k], 1.0),
+                ]
+            }),
             name,
         })
     };

@@ -31,6 +31,7 @@ mod terminal;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -40,6 +41,7 @@ use crate::calibration::outcome::{Estimate, Outcome, to_vector};
 use crate::calibration::states::ParameterVector;
 use crate::imu::{PerSensor, Triad};
 use crate::run::Run;
+use crate::run::record::TermRecord;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the
@@ -58,6 +60,8 @@ pub struct Report<'a> {
     pub closed_form: Option<ClosedForm<'a>>,
     /// The true triads, where they are known.
     pub truth: Option<&'a PerSensor<Triad>>,
+    /// True constants beside them by name, as far as they are known.
+    pub true_terms: &'a BTreeMap<String, TermRecord>,
     /// Intervals during which the table stands, s.
     pub dwells: &'a [Range<f64>],
     /// What the calibrations are worth in navigation, the closed form first; or why that cannot be

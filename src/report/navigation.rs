@@ -38,6 +38,8 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// False if the calibration says that its method did not converge.
     pub converged: bool,
+    /// Whether one of the two has further terms, which are not navigated.
+    pub terms: bool,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
     /// The triad whose errors were navigated with; none: both.
@@ -160,6 +162,12 @@ impl Navigation<'_> {
                 "{} claims no σ, so none is predicted.",
                 self.calibration
             ));
+        }
+        if self.terms {
+            warnings.push(
+                "Further error terms are taken for exact: these are the errors that K, E and D leave."
+                    .to_owned(),
+            );
         }
         warnings
     }

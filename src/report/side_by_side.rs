@@ -1,5 +1,6 @@
 //! Calibrations side by side: the same tables for a terminal and for a page, and one figure.
 
+mod constants;
 mod figure;
 mod page;
 
@@ -67,6 +68,7 @@ pub fn warnings(comparison: &Comparison) -> Vec<String> {
 /// All tables: parameters, groups, and from three calibrations on their scatter.
 pub fn tables(comparison: &Comparison) -> Vec<Table> {
     let mut tables = vec![parameters(comparison), groups(comparison)];
+    tables.extend(constants::table(comparison));
     tables.extend(scatter(comparison));
     tables
 }

@@ -18,10 +18,12 @@ use crate::calibration::states::{
 use crate::calibration::{Direction, Linearisation, Observability, Part};
 use crate::earth::Site;
 use crate::imu::*;
+use crate::run::record::TermRecord;
 use crate::run::{ImuRecord, Run, Standstill, TableRecord};
 use crate::study::navigation::Mission;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G};
 
+static NO_TERMS: BTreeMap<String, TermRecord> = BTreeMap::new();
 const PERIOD: f64 = 0.05;
 const DWELL: f64 = 20.0;
 const TURN: f64 = 8.0;
@@ -48,6 +50,7 @@ impl Synthetic {
             run: &self.run,
             outcome: Some(&self.outcome),
             effects: &[],
+            true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {
                 estimate: &self.closed,
                 note: "six positions for each triad, 60 min of its own",
@@ -305,6 +308,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             pass(false, 0.004, 7195.2, 9),
         ],
         converged: true,
+        log_determinant: 0.0,
         live_history: live(&history, &truth),
         history,
         innovations,

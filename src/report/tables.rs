@@ -146,18 +146,22 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
         rows.filter_map(|i| row(group, i)).collect()
     });
     let of_terms = report.outcome.map_or_else(Vec::new, |outcome| {
-        further::rows(&outcome.further)
+        further::rows(&outcome.further, report.true_terms)
             .into_iter()
             .map(|row| {
                 let shown = format!("{} ± {}", row.value, row.sigma);
-                vec![
+                let mut cells = vec![
                     row.name,
                     shown,
                     row.unit.to_owned(),
                     row.prior,
                     row.sigma,
                     ratio(row.remaining, 1.0),
-                ]
+                ];
+                if truth.is_some() {
+                    cells.extend(row.error.unwrap_or(["–", "–"].map(str::to_owned)));
+                }
+                cells
             })
             .collect()
     });

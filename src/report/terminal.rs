@@ -98,7 +98,7 @@ impl Report<'_> {
             }
         }
         if let Some(outcome) = self.outcome {
-            for row in further::rows(&outcome.further) {
+            for row in further::rows(&outcome.further, self.true_terms) {
                 let mut cells = vec![
                     if row.first {
                         row.title.to_owned()
@@ -114,7 +114,7 @@ impl Report<'_> {
                     three_digits(1.0 / row.remaining),
                 ];
                 if truth.is_some() {
-                    cells.extend(["–".to_owned(), "–".to_owned()]);
+                    cells.extend(row.error.unwrap_or(["–", "–"].map(str::to_owned)));
                 }
                 table.add_row(cells);
             }

@@ -184,19 +184,21 @@ pub struct NisRecord {
 pub struct BlockRecord {
     /// Its name, such as `accel-second-order`.
     pub block: String,
-    /// Whether it was on; if not, it was tried, for NIS was larger than chance allows.
+    /// Whether it was on; if not, it was tried with its usual σ.
     pub on: bool,
     /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; none where there is
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
     /// By how much the merit, −2 ln of likelihood and prior, falls with the block.
     pub merit_gain: f64,
-    /// What that stays below in 999 runs of 1000 where the block's errors are not there.
+    /// What that stays below in 9999 runs of 10000 where the block's errors are not there.
     pub merit_gain_limit: f64,
-    /// Consistency without it …
-    pub without: ConsistencyRecord,
+    /// Whether it is more, so that the data ask for the block.
+    pub asked_for: bool,
+    /// NIS of all observations without it …
+    pub nis_without: f64,
     /// … and with it.
-    pub with: ConsistencyRecord,
+    pub nis_with: f64,
 }
 
 /// A combination of parameters, each in units of its prior σ, and how well a run observed it.

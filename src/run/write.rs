@@ -12,7 +12,7 @@ use super::error::{Place, RunError, list, suggestion};
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use super::{CalibrationRecord, ImuRecord, Run, Segment, TableRecord, nanoseconds};
-use crate::imu::{Output, Sensor};
+use crate::imu::{Output, Sensor, Term};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
@@ -217,6 +217,7 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
             .to_owned(),
     );
     sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
+    sections.extend(terms_text(run));
     sections.push(format!(
         "# how still the IMU is while the table stands\n[standstill]\nposition_sigma_m = {:?}\n",
         run.standstill.position_sigma
@@ -278,6 +279,25 @@ bias_sigma = {bias_sigma}
         bias = triple(prior.bias.component_mul(&nominal)),
         bias_sigma = triple(prior.bias_sigma.component_mul(&nominal.abs())),
     )
+}
+
+/// `[imu.terms]`, if any is on.
+fn terms_text(run: &Run) -> Option<String> {
+    let on = Term::ALL.into_iter().filter_map(|term| {
+        let sigma = run.further_sigma[term.parameters().start];
+        let (unit, in_si) = term.unit();
+        let line = || {
+            format!(
+                "{} = {{ sigma = {:?} }} # {unit}\n",
+                term.name(),
+                short(sigma / in_si)
+            )
+        };
+        (sigma > 0.0).then(line)
+    });
+    let lines: String = on.collect();
+    (!lines.is_empty())
+        .then(|| format!("# further error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
 }
 
 fn meta_text(meta: &BTreeMap<String, String>) -> String {

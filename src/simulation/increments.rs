@@ -104,7 +104,7 @@ impl<'a> Sensed<'a> {
             angular_acceleration: acceleration,
             force,
         };
-        let added = |sensor| sensed.response(sensor) * self.further;
+        let added = |sensor| sensed.added(sensor, &self.further);
         (rate + added(Sensor::Gyro), force + added(Sensor::Accel))
     }
 

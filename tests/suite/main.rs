@@ -1,6 +1,7 @@
 //! What turncal promises, from the outside: one binary, so that it links once.
 
 mod batch;
+mod block_effects;
 mod calibration_file;
 mod cli;
 mod compare;

@@ -112,15 +112,17 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
     assert!(said("gyro scale z"), "{:?}", level.warnings);
 }
 
-/// A module of 2 % and 2° whose gyros turn on with a bias of 1 °/s.
-fn mems() -> Scenario {
+/// A module of 2 % and 2° whose gyros turn on with a bias of 1 °/s, and its noise in °/√h and µg/√Hz.
+fn mems(angle_random_walk: f64, velocity_random_walk: f64) -> Scenario {
     let mut scenario = scenario("three-axis");
     let directory = tempfile::tempdir().unwrap();
     let model = directory.path().join("mems.toml");
-    let text = "[gyro]\npulse_arcsec = 1.0\nangle_random_walk_deg_per_sqrt_h = 0.3\n\
-         scale_ppm = { sigma = 20000.0 }\nbias_deg_per_h = { sigma = 3600.0 }\n\
-         [accel]\npulse_um_per_s = 100.0\nvelocity_random_walk_ug_per_sqrt_hz = 60.0\n\
-         scale_ppm = { sigma = 20000.0 }\nbias_ug = { sigma = 20000.0 }\n";
+    let text = format!(
+        "[gyro]\npulse_arcsec = 1.0\nangle_random_walk_deg_per_sqrt_h = {angle_random_walk}\n\
+         scale_ppm = {{ sigma = 20000.0 }}\nbias_deg_per_h = {{ sigma = 3600.0 }}\n\
+         [accel]\npulse_um_per_s = 100.0\nvelocity_random_walk_ug_per_sqrt_hz = {velocity_random_walk}\n\
+         scale_ppm = {{ sigma = 20000.0 }}\nbias_ug = {{ sigma = 20000.0 }}\n"
+    );
     std::fs::write(&model, text).unwrap();
     scenario.instrument = Instrument::load(model.to_str().unwrap(), &Place::CommandLine).unwrap();
     let installation = directory.path().join("two-degrees.toml");
@@ -138,7 +140,7 @@ fn mems() -> Scenario {
 #[test]
 fn a_mems_module_of_two_per_cent_and_two_degrees_is_calibrated_without_a_table() {
     const RUNS: u64 = 16;
-    let scenario = mems();
+    let scenario = mems(0.3, 60.0);
     let trials = accurate_as_claimed(RUNS, |stream| trial(&scenario, stream));
     assert!(trials.iter().all(|t| t.outcome.heading_observed()));
 }
@@ -154,4 +156,27 @@ fn where_earth_rate_points_up_the_heading_is_said_to_be_unobserved() {
     // What does not depend on it is as accurate as it claims.
     let nees = nees.0 / 21.0;
     assert!((0.3..2.2).contains(&nees), "NEES/21 {nees}");
+}
+
+/// Gyros of 3 °/√h see less of Earth rate in ten minutes than it is.
+#[test]
+fn where_noise_hides_earth_rate_the_rest_is_calibrated_as_claimed() {
+    const RUNS: u64 = 12;
+    let scenario = mems(3.0, 200.0);
+    accurate_as_claimed(RUNS, |stream| trial(&scenario, stream));
+}
+
+/// A run that knows nothing of the heading must not believe so after many turns with noisy gyros, whose
+/// computed positions are off by metres.
+#[test]
+fn turns_show_nothing_of_a_heading_that_earth_rate_does_not_show() {
+    let mut scenario = mems(1.0, 200.0);
+    scenario.site = Site::with_normal_gravity(89.999 * DEGREE, 0.0, 0.0);
+    for stream in 0..3 {
+        let outcome = trial(&scenario, stream).outcome;
+        let remaining = outcome.attitude_sigma.z / outcome.prior_attitude.sigma.z;
+        println!("σ of the heading: {remaining:.4} of the prior's");
+        assert!(outcome.converged && !outcome.heading_observed());
+        assert!(remaining > 0.99, "{remaining}");
+    }
 }

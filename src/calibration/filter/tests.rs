@@ -129,7 +129,8 @@ fn scalar_observations_equal_the_dense_update_with_the_full_gain() {
         let gain = filter.p * h.transpose() * s.try_inverse().unwrap();
         let x = filter.x + gain * (z - h * filter.x);
         let p = (StateMatrix::identity() - gain * h) * filter.p;
-        let whitened = filter.whitened(sight, &z, variance).unwrap();
+        let (whitened, log_determinant) = filter.whitened(sight, &z, variance).unwrap();
+        assert_relative_eq!(log_determinant, s.determinant().ln(), max_relative = 1e-9);
         let innovation = z - h * filter.x;
         assert_relative_eq!(
             whitened.norm_squared(),

@@ -1,6 +1,6 @@
 use super::*;
 use crate::attitude::log;
-use crate::imu::{FURTHER, InstallationForm, PARAMETERS, TriadVector};
+use crate::imu::{FURTHER, InstallationForm, PARAMETERS, Term, TriadVector};
 use approx::assert_relative_eq;
 use nalgebra::SVector;
 
@@ -129,12 +129,16 @@ fn transition_of_parameter_errors_is_the_derivative_of_navigation() {
 #[test]
 fn transition_of_further_parameters_is_the_derivative_of_navigation() {
     let walk = PerSensor::default();
+    // As large as precise instruments have them.
+    let some = FurtherVector::from_fn(|k, _| {
+        0.1 * Term::of(k).map_or(0.0, Term::usual_sigma) * (k as f64).cos()
+    });
     let with = |values: FurtherVector| {
         Navigator::new(&record(), &site(), walk, &triads(), start())
             .unwrap()
             .with_further(FurtherTerms {
                 on: (0..FURTHER).collect(),
-                values,
+                values: some + values,
             })
             .advance(0..SAMPLES)
     };

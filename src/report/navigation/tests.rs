@@ -43,6 +43,7 @@ fn navigation<'a>(mission: &'a Mission, moments: &'a [Moment]) -> Navigation<'a>
         calibration: "monday",
         truth: "truth",
         converged: true,
+        terms: false,
         body_frame: BodyFrame::Table,
         only: None,
         mission,
