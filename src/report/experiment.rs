@@ -13,7 +13,7 @@ mod verdict;
 use std::path::Path;
 
 use super::canvas::{Area, DrawError};
-use super::number::{count, three_digits};
+use super::number::{count, minutes, three_digits};
 use super::study::StudyReport;
 use super::{Figure, ReportError, write_files};
 use crate::imu::InstallationForm;
@@ -120,10 +120,6 @@ fn facts(experiment: &Experiment) -> Vec<(String, String)> {
 
 fn hours(experiment: &Experiment) -> f64 {
     f64::from(experiment.study.intervals) * INTERVAL / HOUR
-}
-
-fn minutes(seconds: f64) -> String {
-    format!("{} min", three_digits(seconds / MINUTE))
 }
 
 /// Every method with its table time, s.

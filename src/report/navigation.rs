@@ -127,18 +127,12 @@ impl Navigation<'_> {
             Some(Sensor::Gyro) => "of the gyros; the accelerometers are exact",
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
-        let frame = match self.body_frame {
-            BodyFrame::Table => "of the turntable's mounting face",
-            BodyFrame::Accelerometer => {
-                "of the accelerometers (x along accelerometer x, y in the plane of x and y)"
-            }
-        };
         let hours = number::three_digits(self.hours());
         [
             ("motion", motion),
             ("duration", format!("{hours} h")),
             ("errors", errors.to_owned()),
-            ("body axes", frame.to_owned()),
+            ("body frame", self.body_frame.words().to_owned()),
             (
                 "start",
                 "perfect alignment, velocity and position; height is held to the true one"

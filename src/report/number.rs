@@ -1,6 +1,9 @@
 //! Numbers as a reader wants them: digits up to the second that σ leaves meaning to.
 
+use crate::study::Ratio;
+
 const MINUS: char = '−';
+const MINUTE: f64 = 60.0;
 
 /// Decimals that show two digits of `sigma`.
 fn decimals(sigma: f64) -> usize {
@@ -63,6 +66,26 @@ pub(super) fn count(n: usize) -> String {
         text.push(digit);
     }
     text
+}
+
+/// An interval with the digits that its width leaves meaning to.
+pub(super) fn interval((low, high): (f64, f64)) -> String {
+    let fine = 0.5 * (high - low);
+    format!("{}…{}", value(low, fine), value(high, fine))
+}
+
+/// A ratio with the digits that its interval leaves meaning to, and the interval.
+pub(super) fn ratio(ratio: &Ratio) -> [String; 2] {
+    let (low, high) = ratio.interval;
+    [
+        value(ratio.value, 0.5 * (high - low)),
+        interval(ratio.interval),
+    ]
+}
+
+/// A time in minutes with its unit.
+pub(super) fn minutes(seconds: f64) -> String {
+    format!("{} min", three_digits(seconds / MINUTE))
 }
 
 /// A tick of an axis whose ticks are `step` apart.

@@ -4,11 +4,10 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::axis::Axis;
 use super::super::canvas::{Area, DrawError, INK, Pen};
+use super::super::number;
 use super::super::panel::{Margins, Mark, Panel};
 use super::super::{Figure, ReportError};
-use super::facts::minutes;
 use super::merit::merits;
-use super::tables;
 use crate::study::{Accuracy, Figures, Ratio};
 
 const MARGINS: Margins = Margins {
@@ -65,11 +64,11 @@ pub(super) fn gain(accuracy: &Accuracy) -> Result<Figure, ReportError> {
         "RMS error of the closed form over that of the EKF in {}, logarithmic, with 99 % intervals. \
          Above the line at 1 the EKF is better, below the closed form. Left, shaded: closed form in its \
          own {}.",
-        minutes(accuracy.table_time),
-        minutes(accuracy.baseline.table_time)
+        number::minutes(accuracy.table_time),
+        number::minutes(accuracy.baseline.table_time)
     );
     caption.push_str(&match accuracy.baseline.equal_time() {
-        Some(time) => format!(" Right, open: closed form in {}.", minutes(time)),
+        Some(time) => format!(" Right, open: closed form in {}.", number::minutes(time)),
         None => " Its positions cannot be had in the time of the EKF.".to_owned(),
     });
     let title = "Gain over the closed form";
@@ -148,7 +147,7 @@ fn bar(panel: &mut Panel, x: f64, ratio: &Ratio, shaded: bool) -> Result<(), Dra
     panel.text(
         (x, ratio.interval.0),
         (0.0, 5.0),
-        &tables::ratio(ratio),
+        &number::ratio(ratio)[0],
         below,
     )
 }
@@ -159,7 +158,7 @@ fn value_above(panel: &Panel, x: f64, ratio: &Ratio) -> Result<(), DrawError> {
     panel.text(
         (x, ratio.interval.1),
         (0.0, -5.0),
-        &tables::ratio(ratio),
+        &number::ratio(ratio)[0],
         above,
     )
 }

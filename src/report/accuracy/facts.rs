@@ -1,7 +1,7 @@
 //! What was studied, as pairs of a name and a value.
 
 use super::super::further::title;
-use super::super::number::{count, three_digits, value};
+use super::super::number::{count, minutes, three_digits, value};
 use crate::run::StateBlock;
 use crate::study::Accuracy;
 use crate::units::DEGREE;
@@ -94,11 +94,6 @@ fn blocks(accuracy: &Accuracy) -> String {
         ));
     }
     text
-}
-
-/// A time in minutes with its unit.
-pub(super) fn minutes(seconds: f64) -> String {
-    format!("{} min", three_digits(seconds / 60.0))
 }
 
 /// Median and largest number of passes; none if no run gave an estimate.

@@ -2,10 +2,10 @@
 
 use super::super::axis::Axis;
 use super::super::canvas::{INK, Pen, QUIET};
-use super::super::number::{count, value};
+use super::super::number::{count, interval, value};
 use super::super::panel::{Margins, Mark, Panel};
 use super::super::{Figure, ReportError};
-use super::tables::{self, interval};
+use super::tables;
 use crate::study::Accuracy;
 
 /// Runs this many times above the upper end of the interval make the axis logarithmic.

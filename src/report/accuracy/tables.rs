@@ -2,9 +2,8 @@
 
 use super::super::blocks;
 use super::super::further::{title, unit};
-use super::super::number::{count, three_digits, value};
+use super::super::number::{count, interval, minutes, ratio, three_digits, value};
 use super::super::side_by_side::Table;
-use super::facts::minutes;
 use super::merit::{Merit, journey_name, merits, region_name};
 use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
@@ -21,12 +20,6 @@ pub(super) fn tables(accuracy: &Accuracy) -> Vec<Table> {
     tables
 }
 
-/// An interval with the digits that its width leaves meaning to.
-pub(super) fn interval((low, high): (f64, f64)) -> String {
-    let fine = 0.5 * (high - low);
-    format!("{}…{}", value(low, fine), value(high, fine))
-}
-
 /// What ought to be one, with the digits that the width of its interval leaves meaning to.
 pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
     if mean < 10.0 {
@@ -41,15 +34,8 @@ pub(super) fn factor(factor: f64) -> String {
     mean(factor, (0.99, 1.01))
 }
 
-/// A ratio with the digits that its interval leaves meaning to.
-pub(super) fn ratio(ratio: &Ratio) -> String {
-    value(ratio.value, 0.5 * (ratio.interval.1 - ratio.interval.0))
-}
-
 fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
-    of.map_or([NONE; 2].map(str::to_owned), |of| {
-        [ratio(of), interval(of.interval)]
-    })
+    of.map_or([NONE; 2].map(str::to_owned), ratio)
 }
 
 /// A row for each merit, a section for each triad and for navigation.

@@ -1,11 +1,10 @@
 //! What the figures say, in sentences.
 
 use super::super::blocks;
-use super::super::number::{count, value};
+use super::super::number::{count, interval, minutes, ratio, value};
 use super::super::study::Sentence;
-use super::facts::minutes;
 use super::merit::{journey_name, merits, region_name};
-use super::tables::{self, interval, percent, ratio};
+use super::tables::{self, percent};
 use crate::calibration::outcome::Nis;
 use crate::imu::Output;
 use crate::study::accuracy::Containment;
@@ -98,7 +97,10 @@ fn named(
     let with_ratio = merits.filter_map(|m| Some((of(m.figures)?, m.title)));
     with_ratio
         .filter(|(ratio, _)| chosen(ratio))
-        .map(|(r, title)| format!("{title} {} ({})", ratio(&r), interval(r.interval)))
+        .map(|(r, title)| {
+            let [by, interval] = ratio(&r);
+            format!("{title} {by} ({interval})")
+        })
         .collect()
 }
 

@@ -1,12 +1,12 @@
 //! The tables, for terminal and page alike.
 
-use super::super::number::{three_digits, value};
+use super::super::number::{ratio, three_digits, value};
 use super::super::side_by_side::Table;
 use super::{PAPER_HOURS, estimator_name, hours, in_general, method_name, miles, navigated};
 use crate::calibration::Group;
 use crate::imu::{InstallationForm, Sensor};
+use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Method, Navigated, Situation, Spread, Worth};
-use crate::study::{Experiment, Ratio};
 
 pub(super) const NONE: &str = "–";
 
@@ -57,16 +57,6 @@ pub(super) fn nmile(metres: f64) -> String {
 /// An interval in nmile.
 pub(super) fn nmile_interval((low, high): (f64, f64)) -> String {
     format!("{}…{}", nmile(low), nmile(high))
-}
-
-/// A ratio and its interval, with the digits that the interval leaves meaning to.
-pub(super) fn ratio(ratio: &Ratio) -> [String; 2] {
-    let (low, high) = ratio.interval;
-    let fine = 0.5 * (high - low);
-    [
-        value(ratio.value, fine),
-        format!("{}…{}", value(low, fine), value(high, fine)),
-    ]
 }
 
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {

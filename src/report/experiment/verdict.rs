@@ -1,8 +1,8 @@
 //! What the experiment says, in sentences.
 
-use super::super::number::{count, three_digits, value};
+use super::super::number::{count, ratio, three_digits, value};
 use super::super::study::Sentence;
-use super::tables::{nmile, ratio};
+use super::tables::nmile;
 use super::{estimator_name, hours, in_general, method_name, navigated, situation_name};
 use crate::study::Experiment;
 use crate::study::experiment::{Budget, Estimator, Method, Situation};
