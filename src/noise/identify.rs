@@ -1,0 +1,88 @@
+//! Which processes a curve shows, how strong they are, and what could hide in it.
+//!
+//! Generalised least squares of the Allan variance itself, at cluster times half an octave apart,
+//! with the covariance that its points have under the very mixture that is fitted. Of all combinations
+//! of processes the most likely one is taken, where each parameter must raise twice the logarithm of
+//! the likelihood by [`SIGNIFICANT`]: a slope that is not there gives no coefficient. For the likelihood the cube
+//! roots of the variances count as normal (Wilson, Hilferty 1931), for at long cluster times they have
+//! few degrees of freedom.
+//!
+//! After El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
+//! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least
+//! squares with the covariance of the points).
+
+mod clusters;
+mod search;
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::allan::Curve;
+use super::process::Process;
+
+pub use clusters::Clusters;
+
+/// What each parameter must raise twice the logarithm of the likelihood by: three standard deviations,
+/// squared.
+const SIGNIFICANT: f64 = 9.0;
+
+/// A process that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Which.
+    pub process: Process,
+    /// Its strength, see [`Process`].
+    pub strength: f64,
+    /// 1σ of the strength.
+    pub sigma: f64,
+    /// 1σ of the logarithm of the correlation time, where it has one.
+    pub sigma_log_time: Option<f64>,
+}
+
+/// A process that was not found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hidden {
+    /// Which.
+    pub process: Process,
+    /// What its strength may be at most, with 95 % probability.
+    pub limit: f64,
+}
+
+/// What a curve shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identified {
+    /// Processes found.
+    pub found: Vec<Found>,
+    /// Slopes not found.
+    pub hidden: Vec<Hidden>,
+    /// By how much the curve departs from every mixture of processes beyond chance, as a part of the
+    /// Allan variance (1σ); zero if it does not.
+    pub misfit: f64,
+    /// Equivalent degrees of freedom of each point.
+    pub freedom: Vec<f64>,
+    /// The Gauss–Markov process nearest to what wanders in the curve, if anything does.
+    pub wander: Option<Found>,
+}
+
+impl Identified {
+    /// Allan variance at a cluster time of all that was found.
+    pub fn allan_variance(&self, tau: f64) -> f64 {
+        let parts = self.found.iter();
+        parts
+            .map(|f| f.strength.powi(2) * f.process.allan_variance(tau))
+            .sum()
+    }
+
+    /// A process of a kind, if it was found.
+    pub fn found(&self, process: Process) -> Option<&Found> {
+        self.found.iter().find(|f| f.process.same_kind(process))
+    }
+
+    /// The interval that holds the Allan variance at a point with this probability, by χ².
+    pub fn interval(&self, curve: &Curve, point: usize, probability: f64) -> Option<(f64, f64)> {
+        let (freedom, variance) = (*self.freedom.get(point)?, *curve.variance.get(point)?);
+        let distribution = ChiSquared::new(freedom).ok()?;
+        let tail = 0.5 * (1.0 - probability);
+        let at = |p: f64| freedom * variance / distribution.inverse_cdf(p);
+        Some((at(1.0 - tail), at(tail)))
+    }
+}
