@@ -81,10 +81,11 @@ mod tests {
         assert!((data[0] - 0.574_890_442_1).abs() < 1e-9);
         let curve = overlapping(data.into_iter(), 1.0, &[1, 10, 100]);
         // NIST SP 1065, table 31.
-        for (variance, published) in curve
-            .variance
-            .iter()
-            .zip([2.922_319e-1, 9.159_953e-2, 3.241_343e-2])
+        for (variance, published) in
+            curve
+                .variance
+                .iter()
+                .zip([2.922_319e-1, 9.159_953e-2, 3.241_343e-2])
         {
             let deviation = variance.sqrt();
             assert!((deviation / published - 1.0).abs() < 2e-7, "{deviation}");

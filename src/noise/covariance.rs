@@ -14,10 +14,10 @@ use super::process::Process;
 
 /// Weights of a second difference.
 const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
-/// Lags are taken in steps of this part of the shorter cluster.
-const STEPS: usize = 8;
-/// Clusters that differ in length by more than this factor vary together through quantisation alone.
-const FAR: usize = 64;
+/// Near the ends and the middle of a cluster, lags are taken in steps of this part of the shorter one.
+const STEPS: usize = 16;
+/// Further away each step is longer than the one before by this factor.
+const GROWTH: f64 = 1.1;
 
 /// The tables for one record, for every pair of cluster times.
 pub(super) struct Covariance {
@@ -58,7 +58,9 @@ impl Covariance {
     /// time counts as that of the tables.
     pub fn under(&self, mixture: &[(Process, f64)]) -> DMatrix<f64> {
         let strength = |wanted: &Process| {
-            let found = mixture.iter().find(|(process, _)| process.same_kind(*wanted));
+            let found = mixture
+                .iter()
+                .find(|(process, _)| process.same_kind(*wanted));
             found.map_or(0.0, |(_, strength)| *strength)
         };
         let strengths: Vec<f64> = self.processes.iter().map(strength).collect();
@@ -96,8 +98,7 @@ impl Pair {
         let places = |size: usize| (samples + 1).saturating_sub(2 * size) as i64;
         let (first, second) = (places(short), places(long));
         // Pairs of places that are so many samples apart.
-        let common =
-            |lag: i64| (first.min(second + lag) - lag.max(0)).max(0) as f64;
+        let common = |lag: i64| (first.min(second + lag) - lag.max(0)).max(0) as f64;
         let (m, n) = (short as i64, long as i64);
         let crossing = |process: Process, lag: i64| -> f64 {
             let mut sum = 0.0;
@@ -120,18 +121,14 @@ impl Pair {
                 }
             }
         };
-        if long <= FAR * short {
-            let step = (short / STEPS).max(1);
-            let reach = 2 * (m + n);
-            let mut values = vec![0.0; count];
-            for lag in (-reach..=reach).step_by(step) {
-                let weight = common(lag) * step as f64;
-                if weight > 0.0 {
-                    for (value, &process) in values.iter_mut().zip(processes) {
-                        *value = crossing(process, lag);
-                    }
-                    add(weight, &values);
+        let mut values = vec![0.0; count];
+        for (lag, steps) in graded_lags(m, n) {
+            let weight = common(lag) * steps;
+            if weight > 0.0 {
+                for (value, &process) in values.iter_mut().zip(processes) {
+                    *value = crossing(process, lag);
                 }
+                add(weight, &values);
             }
         }
         // Quantisation has its covariance at single lags, so it is not stepped over.
@@ -165,4 +162,33 @@ impl Pair {
             scale: 4.0 * (tau(short) * tau(long)).powi(2) * (first * second) as f64,
         }
     }
+}
+
+/// Lags at which a sum over all lags is taken, with how many lags each stands for: dense where second
+/// differences over clusters of `short` and `long` samples have a corner in common, sparse elsewhere, and
+/// every lag once where clusters are short.
+fn graded_lags(short: i64, long: i64) -> Vec<(i64, f64)> {
+    let step = (short / STEPS as i64).max(1);
+    let reach = 2 * (short + long);
+    let mut lags = Vec::new();
+    for corner in [0, long, 2 * long].map(|corner| corner - short) {
+        let (mut distance, mut stride) = (0, step);
+        while distance <= 2 * reach {
+            lags.extend([corner - distance, corner + distance]);
+            if distance >= 2 * short {
+                stride = (stride as f64 * GROWTH).ceil() as i64;
+            }
+            distance += stride;
+        }
+    }
+    lags.retain(|lag| (-reach..=reach).contains(lag));
+    lags.sort_unstable();
+    lags.dedup();
+    let gap = |i: usize| lags.get(i + 1).map_or(1.0, |next| (next - lags[i]) as f64);
+    (0..lags.len())
+        .map(|i| {
+            let before = if i == 0 { 1.0 } else { gap(i - 1) };
+            (lags[i], 0.5 * (before + gap(i)))
+        })
+        .collect()
 }

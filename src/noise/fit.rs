@@ -50,7 +50,13 @@ impl<'a> Weighted<'a> {
     pub fn solve(&self, processes: &[Process]) -> Option<Mixture> {
         let design = Scaled::new(&self.design(processes.iter().copied())?)?;
         let strengths = design.solve(&self.variance);
-        Some(processes.iter().copied().zip(strengths.iter().copied()).collect())
+        Some(
+            processes
+                .iter()
+                .copied()
+                .zip(strengths.iter().copied())
+                .collect(),
+        )
     }
 
     /// Covariance of the strengths squared of a fit, and last of the logarithm of the correlation time

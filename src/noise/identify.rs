@@ -20,6 +20,7 @@ use super::allan::Curve;
 use super::process::Process;
 
 pub use clusters::Clusters;
+pub(super) use clusters::mean;
 
 /// What each parameter must raise twice the logarithm of the likelihood by: three standard deviations,
 /// squared.
@@ -36,6 +37,18 @@ pub struct Found {
     pub sigma: f64,
     /// 1σ of the logarithm of the correlation time, where it has one.
     pub sigma_log_time: Option<f64>,
+}
+
+impl Found {
+    /// Its own Allan variance at a cluster time.
+    pub fn allan_variance(&self, tau: f64) -> f64 {
+        self.strength.powi(2) * self.process.allan_variance(tau)
+    }
+}
+
+/// One of a kind, if it is among some processes.
+pub fn of_kind(found: &[Found], process: Process) -> Option<&Found> {
+    found.iter().find(|f| f.process.same_kind(process))
 }
 
 /// A process that was not found.
@@ -59,22 +72,16 @@ pub struct Identified {
     pub misfit: f64,
     /// Equivalent degrees of freedom of each point.
     pub freedom: Vec<f64>,
-    /// The Gauss–Markov process nearest to what wanders in the curve, if anything does.
-    pub wander: Option<Found>,
+    /// What a filter that knows white noise and one Gauss–Markov process should use: the same as what was
+    /// found, but for the nearest Gauss–Markov process in the place of whatever else wanders.
+    pub for_filter: Vec<Found>,
 }
 
 impl Identified {
     /// Allan variance at a cluster time of all that was found.
     pub fn allan_variance(&self, tau: f64) -> f64 {
         let parts = self.found.iter();
-        parts
-            .map(|f| f.strength.powi(2) * f.process.allan_variance(tau))
-            .sum()
-    }
-
-    /// A process of a kind, if it was found.
-    pub fn found(&self, process: Process) -> Option<&Found> {
-        self.found.iter().find(|f| f.process.same_kind(process))
+        parts.map(|found| found.allan_variance(tau)).sum()
     }
 
     /// The interval that holds the Allan variance at a point with this probability, by χ².

@@ -4,9 +4,11 @@
 //! what showing needs (differences, units, extremes).
 
 pub mod accuracy;
+pub mod allan;
 mod axis;
 mod canvas;
 mod comparison;
+pub mod conversion;
 mod correlation;
 mod estimates;
 pub mod experiment;

@@ -43,10 +43,16 @@ impl Clusters {
         &self.sizes
     }
 
-    /// What the mean of some curves over these clusters shows; `None` if they are too short or are zero
-    /// somewhere. Axes that are averaged count as independent.
+    /// What the mean of some curves over these clusters shows; `None` if they are of others, too short or
+    /// zero somewhere. Axes that are averaged count as independent.
     pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
-        Search::new(self, shares(curves), &mean(curves)?).run()
+        if curves
+            .iter()
+            .any(|curve| curve.variance.len() != self.sizes.len())
+        {
+            return None;
+        }
+        Search::new(self, shares(curves), &mean(curves)).run()
     }
 
     /// How the points of one curve vary together under a mixture.
@@ -63,7 +69,9 @@ impl Clusters {
             .markov()
             .iter()
             .min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        nearest.map_or(&self.slopes, |(_, tables)| tables).under(mixture)
+        nearest
+            .map_or(&self.slopes, |(_, tables)| tables)
+            .under(mixture)
     }
 
     /// Correlation times to be tried, in s.
@@ -95,21 +103,16 @@ impl Clusters {
 }
 
 /// The mean of curves at the same cluster times.
-pub(in crate::noise) fn mean(curves: &[&Curve]) -> Option<Curve> {
-    let (first, others) = curves.split_first()?;
-    let mut variance = first.variance.clone();
-    for other in others {
-        for (sum, more) in variance.iter_mut().zip(&other.variance) {
-            *sum += more;
-        }
+pub(in crate::noise) fn mean(curves: &[&Curve]) -> Curve {
+    let mut variance = Vec::new();
+    let tau = curves
+        .first()
+        .map_or_else(Vec::new, |first| first.tau.clone());
+    for point in 0..tau.len() {
+        let sum: f64 = curves.iter().map(|curve| curve.variance[point]).sum();
+        variance.push(sum / curves.len() as f64);
     }
-    for sum in &mut variance {
-        *sum /= curves.len() as f64;
-    }
-    Some(Curve {
-        tau: first.tau.clone(),
-        variance,
-    })
+    Curve { tau, variance }
 }
 
 /// As how many equal ones the averaged curves count at each cluster time.

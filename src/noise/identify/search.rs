@@ -81,15 +81,16 @@ impl<'a> Search<'a> {
         let best = self.refined(best, misfit);
         let weighted = self.weighted(&best.mixture, misfit)?;
         let covariance = self.covariance(&best.mixture, 0.0);
-        let freedom = self.curve.tau.iter().enumerate().map(|(i, &tau)| {
-            2.0 * allan_variance(&best.mixture, tau).powi(2) / covariance[(i, i)]
-        });
+        let freedom =
+            self.curve.tau.iter().enumerate().map(|(i, &tau)| {
+                2.0 * allan_variance(&best.mixture, tau).powi(2) / covariance[(i, i)]
+            });
         Some(Identified {
             found: found(&weighted, &best.mixture)?,
             hidden: self.hidden(&weighted, &best),
             misfit,
             freedom: freedom.collect(),
-            wander: self.wander(&best, misfit),
+            for_filter: self.for_filter(&best, misfit)?,
         })
     }
 
@@ -258,26 +259,22 @@ impl<'a> Search<'a> {
         hidden.filter_map(limit).collect()
     }
 
-    /// The Gauss–Markov process that with white noise, quantisation and a ramp comes nearest to a curve
-    /// in which something wanders.
-    fn wander(&self, best: &Candidate, misfit: f64) -> Option<Found> {
+    /// With the nearest Gauss–Markov process in the place of whatever wanders.
+    fn for_filter(&self, best: &Candidate, misfit: f64) -> Option<Vec<Found>> {
         let wanders = [Process::BiasInstability, Process::RateRandomWalk, MARKOV];
-        if !wanders.into_iter().any(|process| best.has(process)) {
-            return None;
-        }
-        let others: Vec<Process> = best
+        let (wandering, others): (Vec<Process>, Vec<Process>) = best
             .processes()
             .into_iter()
-            .filter(|process| !wanders.iter().any(|w| w.same_kind(*process)))
-            .collect();
-        let nearest = self
-            .with_markov(&others)
-            .filter_map(|processes| self.candidate(&processes, misfit))
-            .min_by(|a, b| a.unlikelihood.total_cmp(&b.unlikelihood))?;
-        let nearest = self.refined(nearest, misfit);
-        let weighted = self.weighted(&nearest.mixture, misfit)?;
-        let found = found(&weighted, &nearest.mixture)?;
-        found.into_iter().find(|f| f.process.same_kind(MARKOV))
+            .partition(|process| wanders.iter().any(|w| w.same_kind(*process)));
+        let mut nearest = best.clone();
+        if !wandering.is_empty() {
+            nearest = self
+                .with_markov(&others)
+                .filter_map(|processes| self.candidate(&processes, misfit))
+                .min_by(|a, b| a.unlikelihood.total_cmp(&b.unlikelihood))?;
+            nearest = self.refined(nearest, misfit);
+        }
+        found(&self.weighted(&nearest.mixture, misfit)?, &nearest.mixture)
     }
 }
 
