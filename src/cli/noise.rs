@@ -16,7 +16,7 @@ use super::output::print;
   turncal noise 0.005 'deg/s/sqrt(Hz)' --rate 100
   turncal noise 1.7e-4 gyroscope_noise_density
 
-Units:\n{}", known()))]
+Units, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 and the like:\n{}", known()))]
 pub struct Noise {
     /// The figure
     #[arg(value_name = "VALUE", value_parser = positive)]

@@ -11,6 +11,8 @@ use crate::run::Run;
 
 /// Neighbouring samples that differ by more than this many σ are no noise.
 const KNOCK: f64 = 8.0;
+/// What varies by less than this part of itself is rounding.
+const ROUNDING: f64 = 1e-9;
 /// σ of a normal distribution over the median of its absolute values.
 const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
@@ -46,6 +48,8 @@ pub struct AxisNoise {
     pub identified: Option<Identified>,
     /// Samples that jump farther than noise does.
     pub knocks: usize,
+    /// Whether its samples do not vary but for rounding.
+    pub is_constant: bool,
 }
 
 /// Noise figures for a run, and where they come from.
@@ -127,15 +131,26 @@ impl TriadNoise {
         let axes = [0, 1, 2].map(|axis| {
             let values = || samples.iter().map(|sample| sample[axis]);
             let curve = overlapping(values(), period, clusters.sizes());
+            let is_constant = is_constant(values(), &curve);
             AxisNoise {
-                identified: clusters.identify(&[&curve]),
+                identified: if is_constant {
+                    None
+                } else {
+                    clusters.identify(&[&curve])
+                },
                 knocks: knocks(values()),
                 curve,
+                is_constant,
             }
         });
         let curves = axes.each_ref().map(|axis| &axis.curve);
         let mean = AxisNoise {
-            identified: clusters.identify(&curves),
+            identified: if axes.iter().any(|axis| axis.is_constant) {
+                None
+            } else {
+                clusters.identify(&curves)
+            },
+            is_constant: axes.iter().all(|axis| axis.is_constant),
             knocks: axes.iter().map(|axis| axis.knocks).sum(),
             curve: mean(&curves),
         };
@@ -161,6 +176,16 @@ impl AxisNoise {
         let points = tau.iter().zip(variance);
         let (time, lowest) = points.min_by(|a, b| a.1.total_cmp(b.1))?;
         (tau.last() != Some(time)).then(|| (*time, lowest.sqrt()))
+    }
+}
+
+/// Whether increments vary by rounding alone.
+fn is_constant(values: impl Iterator<Item = f64>, curve: &Curve) -> bool {
+    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), v| (sum + v, count + 1));
+    let mean = (sum / count.max(1) as f64).abs();
+    match (curve.tau.first(), curve.variance.first()) {
+        (Some(tau), Some(variance)) => variance.sqrt() * tau <= ROUNDING * mean,
+        _ => true,
     }
 }
 

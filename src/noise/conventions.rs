@@ -96,7 +96,9 @@ pub struct Line {
 pub enum ConversionError {
     /// No such unit.
     #[error(
-        "`{unit}` is no unit of noise that is known.{} Known are:\n{}",
+        "`{unit}` is no unit of noise that is known.{} Known are, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 \
+         and the like:
+{}",
         hint(unit),
         known()
     )]
@@ -167,7 +169,7 @@ impl Convention {
 
 /// A unit in the one way that all its ways of writing come down to.
 fn normalised(unit: &str) -> String {
-    const SAME: [(&str, &str); 14] = [
+    const SAME: [(&str, &str); 15] = [
         ("µ", "u"),
         ("μ", "u"),
         ("°", "deg"),
@@ -176,6 +178,7 @@ fn normalised(unit: &str) -> String {
         ("²", "2"),
         ("³", "3"),
         ("⁵", "5"),
+        ("–", "-"),
         ("^", ""),
         ("(", ""),
         (")", ""),

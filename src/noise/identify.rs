@@ -13,6 +13,8 @@
 
 mod clusters;
 mod search;
+#[cfg(test)]
+mod tests;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

@@ -49,7 +49,7 @@ pub fn text(conversion: &Conversion) -> String {
         meaning,
     } = conversion.given;
     let at = match conversion.rate {
-        Some(rate) => format!(", at {rate} Hz"),
+        Some(rate) => format!(" at {rate} Hz"),
         None => String::new(),
     };
     let longest = conversion
@@ -58,7 +58,7 @@ pub fn text(conversion: &Conversion) -> String {
         .map(|line| line.unit.chars().count());
     let longest = longest.max().unwrap_or(0);
     let mut text = format!(
-        "{}{at}: {value} {unit} ({meaning})\n\n",
+        "{value} {unit}{at}, read as {}: {meaning}\n\n",
         conversion.quantity
     );
     for line in &conversion.lines {

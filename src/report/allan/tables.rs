@@ -34,7 +34,11 @@ pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         rows.push(row(of.name, of.unit, columns.iter().map(cell)));
         if process == MARKOV {
             let time = |axis: &&AxisNoise| found(axis).map_or(NONE.to_owned(), correlation_time);
-            rows.push(row("  correlation time", "s", columns.iter().map(time)));
+            rows.push(row(
+                "Gauss–Markov correlation time",
+                "s",
+                columns.iter().map(time),
+            ));
         }
     }
     let (symbol, unit, _) = deviation_unit(sensor);
@@ -47,7 +51,7 @@ pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         let minimum = axis.minimum();
         minimum.map_or(NONE.to_owned(), |(tau, _)| three_digits(tau))
     });
-    rows.push(row("  at", "s", at));
+    rows.push(row("at a cluster time of", "s", at));
     let name = match sensor {
         Sensor::Gyro => "Gyros",
         Sensor::Accel => "Accelerometers",

@@ -7,6 +7,8 @@ use crate::noise::{Hidden, NoiseAnalysis, Process, TriadNoise, of_kind};
 
 /// Random walks of the axes of a triad that differ by more than this factor are not alike.
 const UNLIKE: f64 = 1.5;
+/// Departures of the variance from all models that are not worth a word.
+const SMALL: f64 = 0.02;
 
 pub(super) const INTERVALS: &str = "A deviation s with ν degrees of freedom lies with 95 % probability \
     between s √(ν/χ²₀.₉₇₅) and s √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
@@ -34,15 +36,17 @@ pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
         let name = sensor.name();
         for (axis, letter) in triad.axes.iter().zip(AXES) {
             match &axis.identified {
-                None if axis.curve.variance.iter().all(|v| *v == 0.0) => warnings.push(format!(
-                    "{name} {letter}: all samples are equal, so nothing is known of its noise."
+                None if axis.is_constant => warnings.push(format!(
+                    "{name} {letter}: its samples do not vary but for rounding, so nothing is known of its \
+                     noise."
                 )),
                 None => warnings.push(format!(
                     "{name} {letter}: no process describes its deviations."
                 )),
-                Some(of) if of.misfit > 0.0 => warnings.push(format!(
+                Some(of) if of.misfit > SMALL => warnings.push(format!(
                     "{name} {letter}: its deviations depart from every sum of processes by {} %, as \
-                     vibration, filters or steps of temperature make them; σ allow for that.",
+                     vibration, filters, steps of temperature, or pulses coarser than the noise make \
+                     them; σ allow for that.",
                     // Of a deviation, half as much as of a variance.
                     sigma(50.0 * of.misfit)
                 )),
@@ -56,9 +60,22 @@ pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
                 ));
             }
         }
+        warnings.extend(ramp(triad, sensor));
         warnings.extend(unlike(triad, sensor));
     }
     warnings
+}
+
+fn ramp(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
+    let of = quantity(Process::RateRamp, sensor);
+    let found = of_kind(triad.mean.found(), Process::RateRamp)?;
+    Some(format!(
+        "{}: a ramp of {} {} is no noise, and [imu.noise] has no place for it: let the instrument warm up \
+         and hold its temperature.",
+        sensor.name(),
+        three_digits(found.strength / of.value),
+        of.unit
+    ))
 }
 
 fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
