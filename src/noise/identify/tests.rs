@@ -88,11 +88,11 @@ fn white_noise_shows_its_random_walk_and_nothing_else_in_97_of_100_records() {
         random_walk: 2.0,
         ..Made::default()
     };
-    let (times, square, wrong) = count(made, 20_000, 200, Process::RandomWalk, 2.0, &[]);
-    assert_eq!(times, 200);
-    assert!(wrong <= 6, "{wrong}");
-    // 200 squares scatter by 0.1.
-    assert!((square - 1.0).abs() < 0.3, "{square}");
+    let (times, square, wrong) = count(made, 20_000, 150, Process::RandomWalk, 2.0, &[]);
+    assert_eq!(times, 150);
+    assert!(wrong <= 4, "{wrong}");
+    // The mean of 150 squares scatters by 0.12.
+    assert!((square - 1.0).abs() < 0.35, "{square}");
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn a_gauss_markov_process_is_found_within_its_sigma_and_its_correlation_time() {
     let samples = 50_000;
     let clusters = clusters(samples);
     let (mut strengths, mut times) = (0.0, 0.0);
-    let seeds = 40;
+    let seeds = 25;
     for seed in 0..seeds {
         let identified = made.identified(&clusters, samples, seed);
         let markov = Process::GaussMarkov {
@@ -156,7 +156,7 @@ fn a_gauss_markov_process_is_found_within_its_sigma_and_its_correlation_time() {
         assert!(identified.for_filter == identified.found);
     }
     for square in [strengths, times].map(|sum| sum / seeds as f64) {
-        assert!((0.4..1.7).contains(&square), "{square}");
+        assert!((0.35..1.9).contains(&square), "{square}");
     }
 }
 
