@@ -2,8 +2,8 @@
 //!
 //! Generalised least squares of the Allan variance itself, at cluster times half an octave apart,
 //! with the covariance that its points have under the very mixture that is fitted. Of all combinations
-//! of processes the most likely one is taken, where each parameter must raise twice the logarithm of
-//! the likelihood by [`SIGNIFICANT`]: a slope that is not there gives no coefficient. For the likelihood the cube
+//! of processes the most likely one is taken, where each process must raise twice the logarithm of
+//! the likelihood by [`SIGNIFICANT`], and a correlation time by [`TELLS_TIME`]: a slope that is not there gives no coefficient. For the likelihood the cube
 //! roots of the variances count as normal (Wilson, Hilferty 1931), for at long cluster times they have
 //! few degrees of freedom.
 //!
@@ -24,9 +24,12 @@ use super::process::Process;
 pub use clusters::Clusters;
 pub(super) use clusters::mean;
 
-/// What each parameter must raise twice the logarithm of the likelihood by: three standard deviations,
+/// What each process must raise twice the logarithm of the likelihood by: three standard deviations,
 /// squared.
 const SIGNIFICANT: f64 = 9.0;
+/// What its correlation time must raise it by besides: two, for this only tells which process it is that
+/// wanders.
+const TELLS_TIME: f64 = 4.0;
 
 /// A process that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use super::super::allan::Curve;
 use super::super::fit::{Mixture, Weighted, allan_variance};
 use super::super::process::Process;
 use super::clusters::Clusters;
-use super::{Found, Hidden, Identified, SIGNIFICANT};
+use super::{Found, Hidden, Identified, SIGNIFICANT, TELLS_TIME};
 
 /// A fit less probable than this does not describe the curve.
 const IMPROBABLE: f64 = 1e-3;
@@ -56,7 +56,8 @@ impl Candidate {
     }
 
     fn score(&self) -> f64 {
-        self.unlikelihood + SIGNIFICANT * self.parameters() as f64
+        let time = if self.has(MARKOV) { TELLS_TIME } else { 0.0 };
+        self.unlikelihood + SIGNIFICANT * self.mixture.len() as f64 + time
     }
 }
 

@@ -65,7 +65,7 @@ fn panel(
     let (low, high) = (y.low(), y.high());
     let margins = Margins {
         left: 56.0,
-        right: 16.0,
+        right: 28.0,
     };
     let x = Axis::log(curve.tau.iter().copied());
     let mut panel = Panel::new(area, title, margins, (x, y), "cluster time τ, s", &[])?;
