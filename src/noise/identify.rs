@@ -16,7 +16,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::allan::Curve;
 use super::process::Process;
@@ -30,6 +30,8 @@ const SIGNIFICANT: f64 = 9.0;
 /// What its correlation time must raise it by besides: two, for this only tells which process it is that
 /// wanders.
 const TELLS_TIME: f64 = 4.0;
+/// From so many degrees of freedom on a variance is as good as normal.
+const MANY: f64 = 1e4;
 
 /// A process that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,8 +94,13 @@ impl Identified {
     /// The interval that holds the Allan variance at a point with this probability, by χ².
     pub fn interval(&self, curve: &Curve, point: usize, probability: f64) -> Option<(f64, f64)> {
         let (freedom, variance) = (*self.freedom.get(point)?, *curve.variance.get(point)?);
-        let distribution = ChiSquared::new(freedom).ok()?;
         let tail = 0.5 * (1.0 - probability);
+        if freedom > MANY {
+            // Normal, and exact where nothing is random.
+            let reach = Normal::standard().inverse_cdf(1.0 - tail) * (2.0 / freedom).sqrt();
+            return Some((variance / (1.0 + reach), variance / (1.0 - reach)));
+        }
+        let distribution = ChiSquared::new(freedom).ok()?;
         let at = |p: f64| freedom * variance / distribution.inverse_cdf(p);
         Some((at(1.0 - tail), at(tail)))
     }

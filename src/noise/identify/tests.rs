@@ -235,3 +235,28 @@ fn three_axes_together_see_more_than_one() {
     let ratio = one.found[0].sigma / all.found[0].sigma;
     assert!((ratio - 3f64.sqrt()).abs() < 0.1, "{ratio}");
 }
+
+#[test]
+fn an_interval_is_there_where_a_ramp_leaves_nothing_random() {
+    let curve = Curve {
+        tau: vec![1.0],
+        variance: vec![2.0],
+    };
+    let mut identified = Identified {
+        found: Vec::new(),
+        hidden: Vec::new(),
+        misfit: 0.0,
+        freedom: vec![f64::INFINITY],
+        for_filter: Vec::new(),
+    };
+    assert_eq!(identified.interval(&curve, 0, 0.95), Some((2.0, 2.0)));
+    // On both sides of the change to the normal distribution.
+    let width = |identified: &Identified| {
+        let (low, high) = identified.interval(&curve, 0, 0.95).unwrap();
+        high - low
+    };
+    identified.freedom = vec![0.999 * MANY];
+    let exact = width(&identified);
+    identified.freedom = vec![1.001 * MANY];
+    assert!((width(&identified) / exact - 1.0).abs() < 0.01);
+}
