@@ -34,8 +34,8 @@ pub struct NoiseAnalysis {
 pub struct TriadNoise {
     /// x, y, z.
     pub axes: [AxisNoise; 3],
-    /// The mean of the three Allan variances and what it shows: where the axes are alike it sees more
-    /// than each alone.
+    /// The mean of the Allan variances of all axes that vary, and what it shows: where they are alike it
+    /// sees more than each alone.
     pub mean: AxisNoise,
 }
 
@@ -143,16 +143,20 @@ impl TriadNoise {
                 is_constant,
             }
         });
-        let curves = axes.each_ref().map(|axis| &axis.curve);
+        let varying: Vec<&Curve> = axes
+            .iter()
+            .filter(|axis| !axis.is_constant)
+            .map(|axis| &axis.curve)
+            .collect();
         let mean = AxisNoise {
-            identified: if axes.iter().any(|axis| axis.is_constant) {
-                None
-            } else {
-                clusters.identify(&curves)
-            },
-            is_constant: axes.iter().all(|axis| axis.is_constant),
+            identified: clusters.identify(&varying),
             knocks: axes.iter().map(|axis| axis.knocks).sum(),
-            curve: mean(&curves),
+            is_constant: varying.is_empty(),
+            curve: if varying.is_empty() {
+                axes[0].curve.clone()
+            } else {
+                mean(&varying)
+            },
         };
         Self { axes, mean }
     }

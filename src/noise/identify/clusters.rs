@@ -103,7 +103,7 @@ impl Clusters {
 }
 
 /// The mean of curves at the same cluster times.
-pub(in super::super) fn mean(curves: &[&Curve]) -> Curve {
+pub(in crate::noise) fn mean(curves: &[&Curve]) -> Curve {
     let mut variance = Vec::new();
     let tau = curves
         .first()

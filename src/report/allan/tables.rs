@@ -43,12 +43,13 @@ pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     }
     let (symbol, unit, _) = deviation_unit(sensor);
     let lowest = columns.iter().map(|axis| match axis.minimum() {
+        _ if axis.is_constant => NONE.to_owned(),
         Some((_, deviation)) => three_digits(deviation / unit),
         None => "falling".to_owned(),
     });
     rows.push(row("lowest deviation", symbol, lowest));
     let at = columns.iter().map(|axis| {
-        let minimum = axis.minimum();
+        let minimum = axis.minimum().filter(|_| !axis.is_constant);
         minimum.map_or(NONE.to_owned(), |(tau, _)| three_digits(tau))
     });
     rows.push(row("at a cluster time of", "s", at));
