@@ -8,7 +8,7 @@
 //! * SI and radians everywhere; [`units`] at the edges.
 //!
 //! # Rooms
-//! Data flow one way: [`run`] → [`navigation`] and [`calibration`] → [`study`] → [`report`]. [`earth`],
+//! Data flow one way: [`run`] → [`navigation`], [`calibration`] and [`noise`] → [`study`] → [`report`]. [`earth`],
 //! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`].
 
 pub mod attitude;
@@ -17,6 +17,7 @@ pub mod earth;
 pub mod imu;
 pub mod models;
 pub mod navigation;
+pub mod noise;
 pub mod report;
 pub mod run;
 pub mod simulation;

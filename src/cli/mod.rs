@@ -1,11 +1,13 @@
 //! Commands: each parses its arguments, calls the library and says what came of it.
 
+mod allan;
 mod block;
 mod calibrate;
 mod compare;
 mod demo;
 mod names;
 mod navigate;
+mod noise;
 mod output;
 mod progress;
 mod simulate;
@@ -35,6 +37,8 @@ enum Command {
     Compare(compare::Compare),
     Navigate(navigate::Navigate),
     Study(study::Study),
+    Allan(allan::Allan),
+    Noise(noise::Noise),
 }
 
 impl Cli {
@@ -47,6 +51,8 @@ impl Cli {
             Command::Compare(compare) => compare.run(),
             Command::Navigate(navigate) => navigate.run(),
             Command::Study(study) => study.run(),
+            Command::Allan(allan) => allan.run(),
+            Command::Noise(noise) => noise.run(),
         }
     }
 }

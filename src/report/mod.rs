@@ -4,10 +4,12 @@
 //! what showing needs (differences, units, extremes).
 
 pub mod accuracy;
+pub mod allan;
 mod axis;
 mod blocks;
 mod canvas;
 mod comparison;
+pub mod conversion;
 mod correlation;
 mod estimates;
 pub mod experiment;

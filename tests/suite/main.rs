@@ -1,5 +1,6 @@
 //! What turncal promises, from the outside: one binary, so that it links once.
 
+mod allan;
 mod batch;
 mod block_effects;
 mod calibration_file;

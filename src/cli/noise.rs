@@ -1,0 +1,52 @@
+//! `turncal noise`
+
+use turncal::noise::conventions::{convert, known};
+use turncal::report::conversion;
+
+use super::output::print;
+
+/// A noise figure in every convention: data sheets, Kalibr, PSINS, KF-GINS
+///
+/// Each line says which convention it is and who uses it. Densities are two-sided, as in IEEE Std 952; a
+/// one-sided density is √2 times as large. A unit of the rate itself (deg/s, m/s^2) means the noise of each
+/// sample with --rate, and bias instability without.
+#[derive(Debug, clap::Args)]
+#[command(after_help = format!("Examples:
+  turncal noise 0.3 'deg/sqrt(h)'
+  turncal noise 0.005 'deg/s/sqrt(Hz)' --rate 100
+  turncal noise 1.7e-4 gyroscope_noise_density
+
+Units, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 and the like:\n{}", known()))]
+pub struct Noise {
+    /// The figure
+    #[arg(value_name = "VALUE", value_parser = positive)]
+    value: f64,
+    /// Its unit, or the name that a program has for it
+    #[arg(value_name = "UNIT")]
+    unit: String,
+    /// Sample rate in Hz, for the noise of each sample
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    rate: Option<f64>,
+    /// Print the figures as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+impl Noise {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let conversion = convert(self.value, &self.unit, self.rate)?;
+        let text = if self.json {
+            serde_json::to_string_pretty(&conversion::document(&conversion))? + "\n"
+        } else {
+            conversion::text(&conversion)
+        };
+        print(text.as_bytes())
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a number above zero".to_owned()),
+    }
+}

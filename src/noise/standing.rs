@@ -1,0 +1,164 @@
+//! Which stretch of a run is examined.
+
+use std::ops::Range;
+
+use crate::run::{Run, Segment};
+
+/// Part of a stretch that must lie in one standstill.
+const STANDING: f64 = 0.95;
+/// Fewer samples show no slope.
+const FEWEST: usize = 256;
+
+/// A stretch of samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// Its samples.
+    pub samples: Range<usize>,
+    /// Which it is, such as `the whole record`.
+    pub name: String,
+    /// Whether the instrument stands during it, as far as it says.
+    pub stands: bool,
+}
+
+/// No stretch to examine.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StretchError {
+    /// The label is not among the segments.
+    #[error("no segment is labelled `{label}`; {}", known(labels))]
+    UnknownLabel {
+        /// As asked for.
+        label: String,
+        /// All that there are.
+        labels: Vec<String>,
+    },
+    /// Nothing stands.
+    #[error(
+        "found no standstill in the record, expected one of minutes or better hours: let the instrument \
+         stand undisturbed, or name a section of it with --segment"
+    )]
+    NoStandstill,
+    /// Sections laid end to end without labels.
+    #[error(
+        "the record is not continuous and has no [segments] that say where its sections are: add them, \
+         or record without a break"
+    )]
+    NoSections,
+    /// Too few samples.
+    #[error(
+        "{name} has {found} samples, expected at least {FEWEST}, and for bias instability some minutes to \
+         hours: record longer standing still"
+    )]
+    TooShort {
+        /// Which stretch.
+        name: String,
+        /// Its samples.
+        found: usize,
+    },
+}
+
+fn known(labels: &[String]) -> String {
+    if labels.is_empty() {
+        return "the run has no [segments]: leave --segment out, or add them to run.toml"
+            .to_owned();
+    }
+    let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
+    quoted.dedup();
+    format!("there are {}", quoted.join(", "))
+}
+
+impl Stretch {
+    /// The longest segment of this label; without a label the longest standstill, or the longest segment
+    /// where the record is not continuous.
+    ///
+    /// # Errors
+    /// [`StretchError`] if there is none, or if it is too short.
+    pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {
+        let stretch = match label {
+            Some(label) => Self::labelled(run, label)?,
+            None if !run.imu.continuous => Self::section(run)?,
+            None => Self::standstill(run)?,
+        };
+        if stretch.samples.len() < FEWEST {
+            return Err(StretchError::TooShort {
+                name: stretch.name,
+                found: stretch.samples.len(),
+            });
+        }
+        Ok(stretch)
+    }
+
+    fn labelled(run: &Run, label: &str) -> Result<Self, StretchError> {
+        let of_label = || run.segments.iter().filter(|s| s.label == label);
+        let longest = of_label().max_by(|a, b| length(a).total_cmp(&length(b)));
+        let Some(segment) = longest else {
+            return Err(StretchError::UnknownLabel {
+                label: label.to_owned(),
+                labels: run.segments.iter().map(|s| s.label.clone()).collect(),
+            });
+        };
+        let which = match of_label().count() {
+            1 => "segment".to_owned(),
+            count => format!("the longest of {count} segments"),
+        };
+        Ok(Self::of_segment(run, segment, &which))
+    }
+
+    fn section(run: &Run) -> Result<Self, StretchError> {
+        let sections = run.segments.iter();
+        let stretch = sections
+            .map(|segment| Self::of_segment(run, segment, "the longest segment that stands,"))
+            .filter(|stretch| stretch.stands)
+            .max_by_key(|stretch| stretch.samples.len());
+        match stretch {
+            Some(stretch) => Ok(stretch),
+            None if run.segments.is_empty() => Err(StretchError::NoSections),
+            None => Err(StretchError::NoStandstill),
+        }
+    }
+
+    fn standstill(run: &Run) -> Result<Self, StretchError> {
+        let dwells = run.dwells().into_iter().map(|dwell| dwell.samples);
+        let samples = dwells
+            .max_by_key(|samples| samples.len())
+            .ok_or(StretchError::NoStandstill)?;
+        let name = if samples.len() == run.imu.len() {
+            "the whole record".to_owned()
+        } else {
+            format!("the longest standstill, {}", times(run, &samples))
+        };
+        Ok(Self {
+            samples,
+            name,
+            stands: true,
+        })
+    }
+
+    fn of_segment(run: &Run, segment: &Segment, which: &str) -> Self {
+        let imu = &run.imu;
+        let at = |time: f64| {
+            let sample = (time - imu.start) / imu.period;
+            (sample.round().max(0.0) as usize).min(imu.len())
+        };
+        let samples = at(segment.start)..at(segment.end);
+        let needed = STANDING * samples.len() as f64;
+        let stands = run.dwells().iter().any(|dwell| {
+            let begin = samples.start.max(dwell.samples.start);
+            let end = samples.end.min(dwell.samples.end);
+            end.saturating_sub(begin) as f64 >= needed
+        });
+        Self {
+            name: format!("{which} `{}`, {}", segment.label, times(run, &samples)),
+            samples,
+            stands,
+        }
+    }
+}
+
+fn length(segment: &Segment) -> f64 {
+    segment.end - segment.start
+}
+
+fn times(run: &Run, samples: &Range<usize>) -> String {
+    let at = |sample| run.imu.time(sample);
+    format!("{:.1} s to {:.1} s", at(samples.start), at(samples.end))
+}
