@@ -1,5 +1,6 @@
 //! Commands: each parses its arguments, calls the library and says what came of it.
 
+mod apply;
 mod block;
 mod calibrate;
 mod compare;
@@ -34,6 +35,7 @@ enum Command {
     Calibrate(calibrate::Calibrate),
     Compare(compare::Compare),
     Navigate(navigate::Navigate),
+    Apply(apply::Apply),
     Study(study::Study),
 }
 
@@ -46,6 +48,7 @@ impl Cli {
             Command::Calibrate(calibrate) => calibrate.run(),
             Command::Compare(compare) => compare.run(),
             Command::Navigate(navigate) => navigate.run(),
+            Command::Apply(apply) => apply.run(),
             Command::Study(study) => study.run(),
         }
     }

@@ -1,5 +1,6 @@
 //! What turncal promises, from the outside: one binary, so that it links once.
 
+mod apply;
 mod batch;
 mod calibration_file;
 mod cli;
