@@ -37,6 +37,9 @@ pub struct Calibrated {
 /// Scale factors of one instrument are within this factor of its nominal ones.
 const SCALE_FACTOR: f64 = 2.0;
 
+/// Axes that span less than this of a cube do not span the space.
+const SMALLEST_VOLUME: f64 = 1e-6;
+
 /// A term changes what it responds to itself by a hundredth at most, so three rounds leave a
 /// millionth of it.
 const ROUNDS: usize = 3;
@@ -46,8 +49,8 @@ const ROUNDS: usize = 3;
 pub enum CorrectionError {
     /// The matrix has no inverse.
     #[error(
-        "the sensitivity matrix scale * installation of the {} has no inverse: correct the \
-         calibration, or calibrate again", .0.name()
+        "the sensitivity matrix scale * installation of the {} has no inverse, for its axes lie in one \
+         plane; correct scale and installation in the calibration, or calibrate again", .0.name()
     )]
     Singular(Sensor),
     /// A constant that is not known.
@@ -97,8 +100,12 @@ impl Correction {
             Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j])
         });
         let inverse = |sensor: Sensor| {
-            let inverse = sensitivity.get(sensor).try_inverse();
-            let inverse = inverse.filter(|m| m.iter().all(|value| value.is_finite()));
+            let sensitivity = sensitivity.get(sensor);
+            let volume = sensitivity.determinant()
+                / sensitivity.row_iter().map(|r| r.norm()).product::<f64>();
+            let inverse = sensitivity
+                .try_inverse()
+                .filter(|_| volume.abs() > SMALLEST_VOLUME);
             inverse.ok_or(CorrectionError::Singular(sensor))
         };
         let mut further = FurtherVector::zeros();

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::error::ErrorKind;
 use turncal::calibration::Correction;
 use turncal::export::{sample_rows, write_samples};
 use turncal::imu::Term;
 use turncal::run::{CalibrationRecord, Run};
 
-use super::output::stream;
+use super::output::{keep, stream};
 use super::progress::Activity;
 
 /// Turns a run's raw samples into angular rate and specific force
@@ -57,7 +57,7 @@ impl Apply {
         activity.next("writing");
         match &self.output {
             Some(output) => {
-                self.keep_inputs(output)?;
+                keep(output, self.inputs())?;
                 write_samples(output, &correction, &run, self.force)?;
             }
             None => stream(|rows| sample_rows(rows, &correction, &run))?,
@@ -75,28 +75,18 @@ impl Apply {
         Ok(())
     }
 
-    /// What it is made from is never replaced, not even by force.
-    fn keep_inputs(&self, output: &Path) -> anyhow::Result<()> {
-        let Ok(target) = output.canonicalize() else {
-            return Ok(());
-        };
+    /// Every file that the samples are made from.
+    fn inputs(&self) -> impl Iterator<Item = PathBuf> {
         let text = std::fs::read_to_string(&self.run).unwrap_or_default();
         let tables: toml::Table = text.parse().unwrap_or_default();
-        let directory = self.run.parent().unwrap_or(Path::new(""));
-        let named = ["imu", "turntable", "segments"]
+        let directory = self.run.parent().unwrap_or(Path::new("")).to_owned();
+        ["imu", "turntable", "segments"]
             .into_iter()
-            .filter_map(|table| tables.get(table)?.get("file")?.as_str())
-            .map(|file| directory.join(file));
-        for input in named.chain([self.calibration.clone(), self.run.clone()]) {
-            if input.canonicalize().is_ok_and(|input| input == target) {
-                bail!(
-                    "{}: this is a file that the calibrated samples are made from; choose another \
-                     name",
-                    output.display()
-                );
-            }
-        }
-        Ok(())
+            .filter_map(move |table| {
+                let file = tables.get(table)?.get("file")?.as_str()?;
+                Some(directory.join(file))
+            })
+            .chain([self.calibration.clone(), self.run.clone()])
     }
 }
 

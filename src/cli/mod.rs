@@ -5,6 +5,7 @@ mod block;
 mod calibrate;
 mod compare;
 mod demo;
+mod export;
 mod names;
 mod navigate;
 mod output;
@@ -36,6 +37,7 @@ enum Command {
     Compare(compare::Compare),
     Navigate(navigate::Navigate),
     Apply(apply::Apply),
+    Export(export::Export),
     Study(study::Study),
 }
 
@@ -49,6 +51,7 @@ impl Cli {
             Command::Compare(compare) => compare.run(),
             Command::Navigate(navigate) => navigate.run(),
             Command::Apply(apply) => apply.run(),
+            Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
         }
     }

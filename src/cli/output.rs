@@ -3,6 +3,7 @@
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use serde::Serialize;
 use turncal::report::ReportError;
 use turncal::run::{RunError, WholeDirectory};
@@ -81,6 +82,22 @@ impl Begun<'_> {
         }
         Ok(())
     }
+}
+
+/// Refuses an output file that is one of the inputs: not even force replaces those.
+pub fn keep(output: &Path, inputs: impl IntoIterator<Item = PathBuf>) -> anyhow::Result<()> {
+    let Ok(target) = output.canonicalize() else {
+        return Ok(());
+    };
+    let is_target = |input: PathBuf| input.canonicalize().is_ok_and(|input| input == target);
+    if inputs.into_iter().any(is_target) {
+        bail!(
+            "{}: found an input of this command, expected a name that is free. Choose another name; \
+             replacing this file would delete what the output is made from.",
+            output.display()
+        );
+    }
+    Ok(())
 }
 
 /// Writes to standard output. A reader that has seen enough, such as `head`, is no failure.

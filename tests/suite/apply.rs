@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
 use turncal::export::HEADER;
-use turncal::imu::{FurtherVector, PerSensor, Sensor, Term};
+use turncal::imu::{FurtherVector, Output, PerSensor, Sensor, Term};
 use turncal::run::record::{TermRecord, TriadRecord};
 use turncal::run::{CalibrationRecord, Run};
 use turncal::simulation::{Scenario, true_increments};
@@ -160,60 +160,80 @@ fn rows_are_correction_times_output_less_bias_in_every_unit_and_on_every_body_ax
     }
 }
 
-#[test]
-fn a_simulated_instrument_with_every_term_gives_back_what_it_sensed() {
+/// Largest errors of calibrated samples of a simulated noiseless instrument with these terms, with
+/// them in its calibration and without.
+fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
     let mut scenario = Scenario::load("demo").unwrap();
     scenario.instrument.noise = Default::default();
-    scenario.output = turncal::imu::Output::Increment;
+    scenario.output = Output::Increment;
     scenario.table.errors = Default::default();
-    for parameter in 0..turncal::imu::FURTHER {
-        scenario.instrument.further_sigma[parameter] = Term::of(parameter).unwrap().usual_sigma();
+    for term in terms {
+        for parameter in term.parameters() {
+            scenario.instrument.further_sigma[parameter] = term.usual_sigma();
+        }
     }
     let simulated = scenario.simulate(3, 0).unwrap();
     let run = &simulated.run;
     let mut record = truth_record(&simulated.truth, run);
-    for parameter in 0..turncal::imu::FURTHER {
+    for parameter in terms.iter().flat_map(|term| term.parameters()) {
         let value = simulated.further[parameter];
         assert!(value != 0.0);
         let name = Term::parameter_name(parameter).unwrap();
         record.terms.insert(name, TermRecord { value, sigma: None });
     }
+    let imperfection = Imperfection::none(&scenario.table);
+    let motion = Motion::new(&scenario.table, &scenario.path, &imperfection).unwrap();
+    let Scenario {
+        site, integrator, ..
+    } = &scenario;
+    let ideal = true_increments(&motion, site, integrator, &FurtherVector::zeros());
+    let largest = |record: &CalibrationRecord| {
+        let correction = Correction::for_run(record, run).unwrap();
+        let period = run.imu.period;
+        let mut largest = PerSensor::from_fn(|_| 0.0_f64);
+        for (k, sample) in correction.samples(run).enumerate() {
+            let rate = (sample.rate - ideal.gyro[k] / period).amax();
+            let force = (sample.force - ideal.accel[k] / period).amax();
+            largest.gyro = largest.gyro.max(rate);
+            largest.accel = largest.accel.max(force);
+        }
+        largest
+    };
+    let with = largest(&record);
+    record.terms.clear();
     // A constant of the table has no effect on samples.
     let table = TermRecord {
         value: 1.0,
         sigma: None,
     };
     record.terms.insert("table.base.up".to_owned(), table);
+    let without = largest(&record);
+    println!("{terms:?}: {with:?}, uncorrected {without:?}");
+    [with, without]
+}
 
-    let imperfection = Imperfection::none(&scenario.table);
-    let motion = Motion::new(&scenario.table, &scenario.path, &imperfection).unwrap();
-    let ideal = true_increments(
-        &motion,
-        &scenario.site,
-        &scenario.integrator,
-        &FurtherVector::zeros(),
-    );
-    let errors = |record: &CalibrationRecord| {
-        let correction = Correction::for_run(record, run).unwrap();
-        let mut worst = PerSensor::from_fn(|_| 0.0_f64);
-        for (k, sample) in correction.samples(run).enumerate() {
-            let period = run.imu.period;
-            worst.gyro = worst
-                .gyro
-                .max((sample.rate - ideal.gyro[k] / period).amax());
-            worst.accel = worst
-                .accel
-                .max((sample.force - ideal.accel[k] / period).amax());
-        }
-        worst
-    };
-    let with = errors(&record);
-    record.terms.clear();
-    let without = errors(&record);
-    println!("with terms {with:?}, without {without:?}");
-    assert!(with.gyro < 1e-10 && without.gyro > 1e-6);
-    // What remains is curvature within a sample, and the Earth rate in the time offset.
-    assert!(with.accel < 2e-5 && without.accel > 1e-2);
+#[test]
+fn a_simulated_instrument_gives_back_what_the_body_did() {
+    let [with, _] = errors(&[]);
+    assert!(with.gyro < 1e-13 && with.accel < 1e-12, "{with:?}");
+    // The bounds are those of means over a sample: how a term's input bends within it. Earth rate
+    // times 10 ms times gravity is 7e-6 m/s².
+    let [with, without] = errors(&Term::ALL);
+    assert!(1e3 * with.gyro < without.gyro && 1e3 * with.accel < without.accel);
+    for (term, sensor, bound) in [
+        (Term::AccelSecondOrder, Sensor::Accel, 1e-8),
+        (Term::AccelAsymmetry, Sensor::Accel, 3e-6),
+        (Term::SizeEffect, Sensor::Accel, 6e-5),
+        (Term::TimeOffset, Sensor::Accel, 7.2e-6),
+        (Term::GSensitivity, Sensor::Gyro, 1e-12),
+    ] {
+        let [with, without] = errors(&[term]);
+        let (with, without) = (with.get(sensor), without.get(sensor));
+        assert!(
+            *with < bound && 50.0 * with < *without,
+            "{term:?}: {with:e} of {without:e}"
+        );
+    }
 }
 
 #[test]

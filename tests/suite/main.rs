@@ -6,6 +6,7 @@ mod calibration_file;
 mod cli;
 mod compare;
 mod door;
+mod export;
 mod navigate;
 mod navigation;
 mod observability;
