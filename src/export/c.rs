@@ -7,18 +7,7 @@ use super::source::{Document, Source};
 use crate::imu::Sensor;
 
 pub(super) fn write(source: &Source) -> Exported {
-    let sigma = "sigma and covariance of the parameters; they are in calibration.json".to_owned();
-    let terms = source.terms_note(|_| false);
-    let mut file = Document::new(source, "//", [sigma].into_iter().chain(terms));
-    for line in source.term_lines(|_| true) {
-        file.comment(&line);
-    }
-    let vectors = source.test_vectors();
-    if !vectors.is_empty() {
-        file.comment("");
-        file.comment("test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
-        vectors.iter().for_each(|line| file.comment(line));
-    }
+    let mut file = Document::of_code(source, "//");
     file.line("\n#ifndef TURNCAL_CALIBRATION_H\n#define TURNCAL_CALIBRATION_H\n");
     for sensor in Sensor::ALL {
         let (name, unit) = (sensor.name(), source.unit(sensor));
@@ -27,13 +16,13 @@ pub(super) fn write(source: &Source) -> Exported {
             Sensor::Accel => "m/s^2",
         };
         file.comment(&format!(
-            "{input} along each axis for one {unit} (per second) of each output"
+            "{input} along each axis for one {unit} of each output"
         ));
         let matrix = rows(source.correction.matrix.get(sensor));
         file.line(&format!(
             "static const double turncal_{name}_correction[3][3] = {{\n{matrix}\n}};"
         ));
-        file.comment(&format!("{unit} (per second)"));
+        file.comment(&unit);
         let bias = list(source.correction.bias.get(sensor));
         file.line(&format!(
             "static const double turncal_{name}_bias[3] = {bias};\n"

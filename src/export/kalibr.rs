@@ -39,7 +39,7 @@ pub(super) fn write(source: &Source) -> Exported {
         file.comment(&line);
     }
     file.comment("");
-    file.comment("the file is about rad/s and m/s^2; per second,");
+    file.comment("Kalibr reads rad/s and m/s^2;");
     let nominal = PerSensor::from_fn(|sensor| triads.get(sensor).nominal.into());
     file.comment(&divide(&nominal));
     file.comment("measured = M C_i_b f + bias");

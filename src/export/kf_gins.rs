@@ -72,7 +72,7 @@ pub(super) fn write(source: &Source) -> Exported {
     }
     file.comment("");
     let nominal = PerSensor::from_fn(|sensor| reordered(normalised.get(sensor).nominal));
-    file.comment("an imu file of KF-GINS holds rad and m/s a sample along front, right, down;");
+    file.comment("KF-GINS reads rad and m/s a sample, along front, right, down;");
     file.comment(&divide(&nominal));
     for sensor in Sensor::ALL {
         for (axis, row) in ["front", "right", "down"]

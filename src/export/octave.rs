@@ -7,18 +7,7 @@ use super::source::{Document, Source};
 use crate::imu::Sensor;
 
 pub(super) fn write(source: &Source) -> Exported {
-    let sigma = "sigma and covariance of the parameters; they are in calibration.json".to_owned();
-    let terms = source.terms_note(|_| false);
-    let mut file = Document::new(source, "%", [sigma].into_iter().chain(terms));
-    for line in source.term_lines(|_| true) {
-        file.comment(&line);
-    }
-    let vectors = source.test_vectors();
-    if !vectors.is_empty() {
-        file.comment("");
-        file.comment("test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
-        vectors.iter().for_each(|line| file.comment(line));
-    }
+    let mut file = Document::of_code(source, "%");
     file.comment("");
     file.comment("save as turncal_calibrate.m; a row of raw is N, a row of u is u:");
     file.comment("gyros x y z, accelerometers x y z");
@@ -35,8 +24,7 @@ pub(super) fn write(source: &Source) -> Exported {
     file.finish()
 }
 
-const BODY: &str = "\
-  if size(raw, 2) ~= 6
+const BODY: &str = "  if size(raw, 2) ~= 6
     error('raw has %d columns, expected 6: gyros x y z, accelerometers x y z', size(raw, 2));
   end
   u = [bsxfun(@minus, raw(:, 1:3), gyro_bias) * gyro_correction.', ...

@@ -39,12 +39,19 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// The unit of a triad's rows.
-    pub fn unit(&self, sensor: Sensor) -> &str {
-        match &self.record.unit {
-            Some(unit) => unit.get(sensor),
-            None => "an unnamed unit",
+    /// The unit of `N`. A count is one of a rate or, per second, of an increment: the record does not
+    /// tell them apart.
+    pub fn unit(&self, sensor: Sensor) -> String {
+        match self.row_unit(sensor) {
+            None => "an unnamed unit".to_owned(),
+            Some(unit @ ("rad" | "deg" | "arcsec" | "m/s" | "g*s")) => format!("{unit}/s"),
+            Some(unit) => unit.to_owned(),
         }
+    }
+
+    fn row_unit(&self, sensor: Sensor) -> Option<&str> {
+        let unit = self.record.unit.as_ref()?;
+        Some(unit.get(sensor))
     }
 
     /// Whose calibration this is, what `N` and `u` are.
@@ -97,7 +104,9 @@ impl<'a> Source<'a> {
     /// calibrated scale factors, rounded to three digits.
     pub fn normalised(&self, sensor: Sensor) -> Normalised {
         let sensitivity = self.correction.sensitivity.get(sensor);
-        let unit = unit_scale(sensor, self.unit(sensor));
+        let unit = self
+            .row_unit(sensor)
+            .and_then(|unit| unit_scale(sensor, unit));
         let nominal = match (self.run, unit) {
             (Some(run), _) => run.nominal.get(sensor).0,
             (None, Some(scale)) => Vector3::repeat(scale),
@@ -183,6 +192,23 @@ impl Document {
         document
     }
 
+    /// Begins a file of code: it corrects K, E and D, and has terms and test vectors in comments.
+    pub fn of_code(source: &Source, mark: &'static str) -> Self {
+        let sigma = "sigma and covariance of the parameters; they are in calibration.json";
+        let terms = source.terms_note(|_| false);
+        let mut document = Self::new(source, mark, [sigma.to_owned()].into_iter().chain(terms));
+        for line in source.term_lines(|_| true) {
+            document.comment(&line);
+        }
+        let vectors = source.test_vectors();
+        if !vectors.is_empty() {
+            document.comment("");
+            document.comment("test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
+            vectors.iter().for_each(|line| document.comment(line));
+        }
+        document
+    }
+
     /// A comment of one line, whatever is in it: names and warnings come from files.
     pub fn comment(&mut self, line: &str) {
         let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
@@ -235,7 +261,7 @@ pub(super) fn divide(nominal: &PerSensor<[f64; 3]>) -> String {
         yaml_list(values)
     };
     format!(
-        "divide the raw output first: gyros by {} to get rad, accelerometers by {} to get m and s",
+        "divide the raw output for that: gyros by {}, accelerometers by {}",
         list(Sensor::Gyro),
         list(Sensor::Accel)
     )
