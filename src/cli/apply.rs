@@ -6,11 +6,15 @@ use anyhow::Context;
 use clap::error::ErrorKind;
 use turncal::calibration::Correction;
 use turncal::export::{sample_rows, write_samples};
-use turncal::imu::Term;
+use turncal::imu::{Sensor, Term};
 use turncal::run::{CalibrationRecord, Run};
+use turncal::units::PPM;
 
 use super::output::{keep, stream};
 use super::progress::Activity;
+
+/// A scale factor this many of the run's σ off is hardly one of its instrument.
+const SUSPECT_SIGMAS: f64 = 10.0;
 
 /// Turns a run's raw samples into angular rate and specific force
 ///
@@ -98,6 +102,22 @@ fn notes(record: &CalibrationRecord, correction: &Correction, run: &Run) -> Vec<
     if record.unit.is_none() {
         notes
             .push("the calibration names no units; they are taken for those of the run".to_owned());
+    }
+    for sensor in Sensor::ALL {
+        let scale = correction.sensitivity.get(sensor).diagonal();
+        let off = scale
+            .component_div(&run.nominal.get(sensor).0)
+            .add_scalar(-1.0);
+        let sigmas = off.abs().component_div(&run.prior.get(sensor).scale_sigma);
+        if sigmas.max() > SUSPECT_SIGMAS {
+            notes.push(format!(
+                "{} scale factors are up to {:.0} ppm off the run's nominal ones, {:.0} times the 1σ in \
+                 [imu.prior.{0}]: is this the calibration of this instrument?",
+                sensor.name(),
+                off.amax() / PPM,
+                sigmas.max()
+            ));
+        }
     }
     if correction.has(Term::TimeOffset) {
         notes.push("the time offset of the accelerometers neglects Earth rate".to_owned());

@@ -126,15 +126,15 @@ impl<'a> Source<'a> {
     pub fn term_lines(&self, has: impl Fn(Term) -> bool) -> Vec<String> {
         let line = |k: usize| {
             let term = Term::of(k).filter(|&term| has(term))?;
-            let unit = match term {
-                Term::AccelSecondOrder => "s^2/m, adds q f^2 along its axis to f",
-                Term::AccelAsymmetry => "(no unit), adds q |f| along its axis to f",
-                Term::SizeEffect => "m, lever arm r: adds its row of ([w' x] + [w x]^2) r to f",
-                Term::TimeOffset => "s, accelerometers sampled later: adds -q w x f to f",
-                Term::GSensitivity => "(rad/s)/(m/s^2), row and column of Q: adds Q f to w",
+            let (name, value) = (Term::parameter_name(k)?, self.correction.further[k]);
+            let adds = match term {
+                Term::AccelSecondOrder => "q f^2 along its axis to f",
+                Term::AccelAsymmetry => "q |f| along its axis to f",
+                Term::SizeEffect => "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
+                Term::TimeOffset => "-q w x f to f, accelerometers sampled later",
+                Term::GSensitivity => "Q f to w, this the row and column of Q",
             };
-            let name = Term::parameter_name(k)?;
-            Some(format!("{name} = {:e} {unit}", self.correction.further[k]))
+            Some(format!("{name} = {value:e} {}, adds {adds}", si_unit(term)))
         };
         self.correction.terms().filter_map(line).collect()
     }
@@ -161,6 +161,17 @@ impl<'a> Source<'a> {
         vectors
             .map(|v| format!("{} -> {}", numbers(&v.raw), numbers(&v.calibrated)))
             .collect()
+    }
+}
+
+/// The SI unit of a term's parameters.
+pub(super) fn si_unit(term: Term) -> &'static str {
+    match term {
+        Term::AccelSecondOrder => "s^2/m",
+        Term::AccelAsymmetry => "1",
+        Term::SizeEffect => "m",
+        Term::TimeOffset => "s",
+        Term::GSensitivity => "(rad/s)/(m/s^2)",
     }
 }
 

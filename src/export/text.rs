@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::Exported;
-use super::source::{Document, Source};
-use crate::imu::{AXES, Sensor};
+use super::source::{Document, Source, si_unit};
+use crate::imu::{AXES, FURTHER, Sensor, Term};
 use crate::run::record::TriadRecord;
 
 pub(super) fn write(source: &Source) -> Exported {
@@ -18,15 +18,11 @@ pub(super) fn write(source: &Source) -> Exported {
         triad(&mut file, source, sensor);
     }
     for (name, term) in &source.record.terms {
-        let known = source.term_lines(|_| true);
-        let unit = known
-            .iter()
-            .find_map(|line| line.strip_prefix(&format!("{name} = {:e} ", term.value)));
-        let unit = unit.unwrap_or(if name.starts_with("table.") {
-            "rad"
-        } else {
-            "SI"
-        });
+        let of_term = (0..FURTHER)
+            .find(|&k| Term::parameter_name(k).as_ref() == Some(name))
+            .and_then(Term::of);
+        // The others are the table's, all of them angles.
+        let unit = of_term.map_or("rad", si_unit);
         row(&mut file, name, term.value, term.sigma, unit);
     }
     for sensor in Sensor::ALL {

@@ -320,6 +320,13 @@ fn a_calibration_of_another_instrument_is_refused_with_the_reason() {
         message.contains("accel x") && message.contains("imu.prior.accel"),
         "{message}"
     );
+    // Within a factor of two, but forty of the run's σ off.
+    let path = written(root.path(), "near.json", &calibration(units, [2.08e6, 1e5]));
+    let done = turncal(&[Path::new("apply"), &path, &run])
+        .assert()
+        .success();
+    let said = String::from_utf8_lossy(&done.get_output().stderr);
+    assert!(said.contains("gyro scale factors are up to"), "{said}");
     let mut reversed = calibration(units, scale);
     reversed.gyro.scale[2] *= -1.0;
     let message = of("sign.json", &reversed);
