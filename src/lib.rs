@@ -9,11 +9,13 @@
 //!
 //! # Rooms
 //! Data flow one way: [`run`] → [`navigation`], [`calibration`] and [`noise`] → [`study`] → [`report`]. [`earth`],
-//! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`].
+//! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`], [`export`]
+//! writes what other programs read.
 
 pub mod attitude;
 pub mod calibration;
 pub mod earth;
+pub mod export;
 pub mod imu;
 pub mod models;
 pub mod navigation;

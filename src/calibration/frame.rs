@@ -173,7 +173,7 @@ pub(super) fn own_nominal(record: &CalibrationRecord) -> PerSensor<Nominal> {
     })
 }
 
-fn triad_record(record: &CalibrationRecord, sensor: Sensor) -> &TriadRecord {
+pub(super) fn triad_record(record: &CalibrationRecord, sensor: Sensor) -> &TriadRecord {
     match sensor {
         Sensor::Gyro => &record.gyro,
         Sensor::Accel => &record.accel,
@@ -187,7 +187,7 @@ fn sensitivity(triad: &TriadRecord, nominal: &Nominal) -> Matrix3<f64> {
 
 /// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. Its rows are
 /// those of `a`, made orthonormal one after the other; NaN where `a` does not span the space.
-fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
+pub(crate) fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
     let rows: [Vector3<f64>; 2] = [0, 1].map(|i| a.row(i).transpose());
     let x = rows[0].normalize();
     let z = x.cross(&rows[1]).normalize();

@@ -1,10 +1,12 @@
 //! Commands: each parses its arguments, calls the library and says what came of it.
 
 mod allan;
+mod apply;
 mod block;
 mod calibrate;
 mod compare;
 mod demo;
+mod export;
 mod names;
 mod navigate;
 mod noise;
@@ -36,6 +38,8 @@ enum Command {
     Calibrate(calibrate::Calibrate),
     Compare(compare::Compare),
     Navigate(navigate::Navigate),
+    Apply(apply::Apply),
+    Export(export::Export),
     Study(study::Study),
     Allan(allan::Allan),
     Noise(noise::Noise),
@@ -50,6 +54,8 @@ impl Cli {
             Command::Calibrate(calibrate) => calibrate.run(),
             Command::Compare(compare) => compare.run(),
             Command::Navigate(navigate) => navigate.run(),
+            Command::Apply(apply) => apply.run(),
+            Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),

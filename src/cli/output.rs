@@ -1,8 +1,9 @@
 //! Where output goes, alike in every command.
 
-use std::io::Write;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use serde::Serialize;
 use turncal::report::ReportError;
 use turncal::run::{RunError, WholeDirectory};
@@ -83,11 +84,32 @@ impl Begun<'_> {
     }
 }
 
+/// Refuses an output file that is one of the inputs: not even force replaces those.
+pub fn keep(output: &Path, inputs: impl IntoIterator<Item = PathBuf>) -> anyhow::Result<()> {
+    let Ok(target) = output.canonicalize() else {
+        return Ok(());
+    };
+    let is_target = |input: PathBuf| input.canonicalize().is_ok_and(|input| input == target);
+    if inputs.into_iter().any(is_target) {
+        bail!(
+            "{}: found an input of this command, expected a name that is free. Choose another name; \
+             replacing this file would delete what the output is made from.",
+            output.display()
+        );
+    }
+    Ok(())
+}
+
 /// Writes to standard output. A reader that has seen enough, such as `head`, is no failure.
 pub fn print(bytes: &[u8]) -> anyhow::Result<()> {
-    let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+    stream(|stdout| stdout.write_all(bytes))
+}
+
+/// The same for what is too long to be held.
+pub fn stream(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
+    let mut stdout = BufWriter::new(io::stdout().lock());
+    match write(&mut stdout).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(anyhow::Error::new(error).context("cannot write to standard output"))
         }
         _ => Ok(()),

@@ -22,12 +22,15 @@ mod write;
 
 pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
+pub(crate) use quantity::unit_scale;
 pub use record::CalibrationRecord;
 pub use state_block::StateBlock;
 pub use table_geometry::{
     AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,
 };
+pub(crate) use whole::write_whole_with;
 pub use whole::{WholeDirectory, write_whole};
+pub(crate) use write::write_rows;
 pub use write::write_run;
 
 use std::collections::BTreeMap;
@@ -187,6 +190,6 @@ pub struct Segment {
 }
 
 /// A time rounded to 1 ns, so that it prints short.
-fn nanoseconds(time: f64) -> f64 {
+pub(crate) fn nanoseconds(time: f64) -> f64 {
     (time * 1e9).round() / 1e9
 }

@@ -39,3 +39,13 @@ pub(super) fn units(sensor: Sensor, output: Output) -> &'static [(&'static str, 
         ],
     }
 }
+
+/// What a unit of rows says of the nominal scale of a triad: the file's quantity per second for one
+/// rad/s or m/s²; none for counts and for what is no unit.
+pub(crate) fn unit_scale(sensor: Sensor, unit: &str) -> Option<f64> {
+    let all = OUTPUTS
+        .iter()
+        .flat_map(|&(_, output)| units(sensor, output));
+    let (_, scale) = all.into_iter().find(|&&(name, _)| name == unit)?;
+    *scale
+}

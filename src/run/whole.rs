@@ -1,6 +1,7 @@
 //! Output that appears whole or not at all: written beside its place, then renamed into it.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
@@ -168,6 +169,15 @@ impl WholeDirectory {
 /// Writes a file whole or not at all; an existing one is replaced only with `force`, a directory
 /// never.
 pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), RunError> {
+    write_whole_with(path, force, |mut file| file.write_all(bytes))
+}
+
+/// The same for what is too long to be held: `write` gets the file that will appear.
+pub(crate) fn write_whole_with(
+    path: &Path,
+    force: bool,
+    write: impl FnOnce(File) -> io::Result<()>,
+) -> Result<(), RunError> {
     match fs::symlink_metadata(path) {
         Ok(_) if !force => return Err(taken(path)),
         Ok(existing) if existing.is_dir() => {
@@ -182,14 +192,16 @@ pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), RunErro
         _ => {}
     }
     let stage = Stage::new(path, force)?;
-    fs::write(stage.new_path(), bytes).map_err(|error| {
-        RunError::io(
-            path,
-            "write the file",
-            &error,
-            "Make room or choose another place.",
-        )
-    })?;
+    File::create_new(stage.new_path())
+        .and_then(write)
+        .map_err(|error| {
+            RunError::io(
+                path,
+                "write the file",
+                &error,
+                "Make room or choose another place.",
+            )
+        })?;
     stage.commit()
 }
 

@@ -52,22 +52,7 @@ pub fn write_run(
     }
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = directory.join(name);
-        let written = File::create(&path).and_then(|file| {
-            if name.ends_with(".gz") {
-                // No time of writing in the header, so that the same run gives the same bytes.
-                let gz = GzBuilder::new()
-                    .mtime(0)
-                    .write(file, Compression::default());
-                let mut rows = BufWriter::with_capacity(1 << 16, gz);
-                content(&mut rows)?;
-                rows.into_inner()?.finish()?;
-                Ok(())
-            } else {
-                let mut text = BufWriter::new(file);
-                content(&mut text)?;
-                text.flush()
-            }
-        });
+        let written = File::create(&path).and_then(|file| write_rows(&path, file, content));
         written.map_err(|error| {
             RunError::io(
                 &path,
@@ -92,6 +77,28 @@ pub fn write_run(
         write("truth.json", &|file| file.write_all(&bytes))?;
     }
     Ok(())
+}
+
+/// Writes rows into a file, compressed if the name ends in `.gz`.
+pub(crate) fn write_rows(
+    name: &Path,
+    file: File,
+    rows: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    if name.extension().is_some_and(|extension| extension == "gz") {
+        // No time of writing in the header, so that the same run gives the same bytes.
+        let gz = GzBuilder::new()
+            .mtime(0)
+            .write(file, Compression::default());
+        let mut buffer = BufWriter::with_capacity(1 << 16, gz);
+        rows(&mut buffer)?;
+        buffer.into_inner()?.finish()?;
+        Ok(())
+    } else {
+        let mut buffer = BufWriter::new(file);
+        rows(&mut buffer)?;
+        buffer.flush()
+    }
 }
 
 fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {

@@ -85,7 +85,7 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each block of constants beside the parameters that was estimated.
     pub further: Vec<FurtherAccuracy>,
-    /// What each block of states did to the filter in the first run: see [`block_effects`].
+    /// What each block of states did to the filter in the first run: see [`crate::calibration::block_effects`].
     pub effects: Vec<BlockEffect>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,

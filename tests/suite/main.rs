@@ -1,12 +1,14 @@
 //! What turncal promises, from the outside: one binary, so that it links once.
 
 mod allan;
+mod apply;
 mod batch;
 mod block_effects;
 mod calibration_file;
 mod cli;
 mod compare;
 mod door;
+mod export;
 mod navigate;
 mod navigation;
 mod observability;

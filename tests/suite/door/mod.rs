@@ -1,7 +1,7 @@
 //! Runs come in through the door as they are, go out so that they come in again, and nothing wrong
 //! gets in.
 
-mod made;
+pub mod made;
 mod reading;
 mod round_trip;
 mod wrong_input;

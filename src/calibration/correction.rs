@@ -1,0 +1,235 @@
+//! A calibration, ready to turn outputs into what the body does.
+
+use nalgebra::{Matrix3, Vector3};
+use thiserror::Error;
+
+use super::frame::triad_record;
+use crate::imu::{AXES, FURTHER, FurtherVector, PerSensor, Sensed, Sensor, Term};
+use crate::run::{CalibrationRecord, Run};
+
+/// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correction {
+    /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along right, front
+    /// and up.
+    pub sensitivity: PerSensor<Matrix3<f64>>,
+    /// `(K C)⁻¹`.
+    pub matrix: PerSensor<Matrix3<f64>>,
+    /// `D`, the file's quantity per second.
+    pub bias: PerSensor<Vector3<f64>>,
+    /// Parameters `q` of further terms, in SI; zero where the record has none.
+    pub further: FurtherVector,
+}
+
+/// One sample, calibrated, along right, front and up of the calibration's body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Calibrated {
+    /// Time at which the sample begins, s.
+    pub start: f64,
+    /// Time at which it ends, s.
+    pub end: f64,
+    /// Mean angular rate against inertial space, rad/s.
+    pub rate: Vector3<f64>,
+    /// Mean specific force, m/s².
+    pub force: Vector3<f64>,
+}
+
+/// Scale factors of one instrument are within this factor of its nominal ones.
+const SCALE_FACTOR: f64 = 2.0;
+
+/// Axes that span less than this of a cube do not span the space.
+const SMALLEST_VOLUME: f64 = 1e-6;
+
+/// A term changes what it responds to itself by a hundredth at most, so three rounds leave a
+/// millionth of it.
+const ROUNDS: usize = 3;
+
+/// Why a calibration cannot be applied.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CorrectionError {
+    /// The matrix has no inverse.
+    #[error(
+        "the sensitivity matrix scale * installation of the {} has no inverse, for its axes lie in one \
+         plane; correct scale and installation in the calibration, or calibrate again", .0.name()
+    )]
+    Singular(Sensor),
+    /// A constant that is not known.
+    #[error(
+        "`{0}` in terms is no parameter of a known term; calibrate again with this version, or remove \
+         the entry if it should have no effect"
+    )]
+    UnknownTerm(String),
+    /// Another unit than the run's.
+    #[error(
+        "the calibration is for {} output in `{calibration}`, the run's is in `{run}`; give the \
+         calibration of this instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
+    )]
+    Unit {
+        /// Which triad.
+        sensor: Sensor,
+        /// Unit of the calibration.
+        calibration: String,
+        /// Unit of the run.
+        run: String,
+    },
+    /// Another scale than the run's.
+    #[error(
+        "{} {axis}: the calibration has {calibration:.6e} for one {}, the run's nominal scale is \
+         {run:.6e}; they must agree within a factor of two and in sign. Give the calibration of this \
+         instrument, or correct scale in [imu.prior.{0}], output or body_axes in run.toml",
+        .sensor.name(),
+        match .sensor { Sensor::Gyro => "rad/s", Sensor::Accel => "m/s²" }
+    )]
+    Scale {
+        /// Which triad.
+        sensor: Sensor,
+        /// Which axis.
+        axis: char,
+        /// Diagonal of `K C`, in the file's quantity per second.
+        calibration: f64,
+        /// Nominal scale of the run.
+        run: f64,
+    },
+}
+
+impl Correction {
+    /// What a record says. Constants of the table (`table.…`) are no part of it.
+    pub fn of_record(record: &CalibrationRecord) -> Result<Self, CorrectionError> {
+        let sensitivity = PerSensor::from_fn(|sensor| {
+            let triad = triad_record(record, sensor);
+            Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j])
+        });
+        let inverse = |sensor: Sensor| {
+            let sensitivity = sensitivity.get(sensor);
+            let volume = sensitivity.determinant()
+                / sensitivity.row_iter().map(|r| r.norm()).product::<f64>();
+            let inverse = sensitivity
+                .try_inverse()
+                .filter(|_| volume.abs() > SMALLEST_VOLUME);
+            inverse.ok_or(CorrectionError::Singular(sensor))
+        };
+        let mut further = FurtherVector::zeros();
+        for (name, term) in &record.terms {
+            if name.starts_with("table.") {
+                continue;
+            }
+            let known = (0..FURTHER).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
+            let known = known.ok_or_else(|| CorrectionError::UnknownTerm(name.clone()))?;
+            further[known] = term.value;
+        }
+        Ok(Self {
+            matrix: PerSensor {
+                gyro: inverse(Sensor::Gyro)?,
+                accel: inverse(Sensor::Accel)?,
+            },
+            bias: PerSensor::from_fn(|sensor| Vector3::from(triad_record(record, sensor).bias)),
+            sensitivity,
+            further,
+        })
+    }
+
+    /// The same, and the record must be one of the run's instrument: units and nominal scales agree.
+    pub fn for_run(record: &CalibrationRecord, run: &Run) -> Result<Self, CorrectionError> {
+        let correction = Self::of_record(record)?;
+        for sensor in Sensor::ALL {
+            let expected = run.unit.get(sensor);
+            if let Some(unit) = &record.unit
+                && unit.get(sensor) != expected
+            {
+                return Err(CorrectionError::Unit {
+                    sensor,
+                    calibration: unit.get(sensor).clone(),
+                    run: expected.clone(),
+                });
+            }
+            let scales = correction.sensitivity.get(sensor).diagonal();
+            for (axis, (&calibration, &run)) in
+                scales.iter().zip(&run.nominal.get(sensor).0).enumerate()
+            {
+                if !(1.0 / SCALE_FACTOR..=SCALE_FACTOR).contains(&(calibration / run)) {
+                    return Err(CorrectionError::Scale {
+                        sensor,
+                        axis: AXES[axis],
+                        calibration,
+                        run,
+                    });
+                }
+            }
+        }
+        Ok(correction)
+    }
+
+    /// Parameters of further terms that are not zero.
+    pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..FURTHER).filter(|&k| self.further[k] != 0.0)
+    }
+
+    /// Whether it has a parameter of a term.
+    pub fn has(&self, term: Term) -> bool {
+        self.terms().any(|k| term.parameters().contains(&k))
+    }
+
+    /// The samples of a run, one after the other.
+    ///
+    /// Further terms respond to the calibrated sample itself. The angular acceleration that the size
+    /// effect asks for is the difference of the rates before and after; where the record is not
+    /// continuous it is taken for zero. The time offset asks for the rate over the Earth and gets the
+    /// inertial one: 10 ms times Earth rate is 0.7 µg.
+    pub fn samples<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = Calibrated> + 'a {
+        let plain = self.terms().next().is_none();
+        (0..run.imu.len()).map(move |k| {
+            let of_triads = PerSensor::from_fn(|sensor| self.of_triad(sensor, run, k));
+            let u = if plain {
+                of_triads
+            } else {
+                self.without_terms(&of_triads, self.angular_acceleration(run, k))
+            };
+            Calibrated {
+                start: run.imu.time(k),
+                end: run.imu.time(k + 1),
+                rate: u.gyro,
+                force: u.accel,
+            }
+        })
+    }
+
+    /// `(K C)⁻¹ (N − D)` of sample `k`.
+    fn of_triad(&self, sensor: Sensor, run: &Run, k: usize) -> Vector3<f64> {
+        let increment = match sensor {
+            Sensor::Gyro => run.imu.gyro[k],
+            Sensor::Accel => run.imu.accel[k],
+        };
+        let output = increment.component_mul(&run.nominal.get(sensor).0) / run.imu.period;
+        self.matrix.get(sensor) * (output - self.bias.get(sensor))
+    }
+
+    fn angular_acceleration(&self, run: &Run, k: usize) -> Vector3<f64> {
+        let first = k.saturating_sub(1);
+        let last = (k + 1).min(run.imu.len() - 1);
+        if !run.imu.continuous || first == last {
+            return Vector3::zeros();
+        }
+        let rate = |k| self.of_triad(Sensor::Gyro, run, k);
+        (rate(last) - rate(first)) / ((last - first) as f64 * run.imu.period)
+    }
+
+    fn without_terms(
+        &self,
+        of_triads: &PerSensor<Vector3<f64>>,
+        angular_acceleration: Vector3<f64>,
+    ) -> PerSensor<Vector3<f64>> {
+        let mut u = *of_triads;
+        for _ in 0..ROUNDS {
+            let sensed = Sensed {
+                rate: u.gyro,
+                rate_over_earth: u.gyro,
+                angular_acceleration,
+                force: u.accel,
+            };
+            u = PerSensor::from_fn(|sensor| {
+                of_triads.get(sensor) - sensed.added(sensor, &self.further)
+            });
+        }
+        u
+    }
+}

@@ -1,0 +1,133 @@
+//! `turncal apply`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::error::ErrorKind;
+use turncal::calibration::Correction;
+use turncal::export::{sample_rows, write_samples};
+use turncal::imu::{Sensor, Term};
+use turncal::run::{CalibrationRecord, Run};
+use turncal::units::PPM;
+
+use super::output::{keep, stream};
+use super::progress::Activity;
+
+/// A scale factor this many of the run's σ off is hardly one of its instrument.
+const SUSPECT_SIGMAS: f64 = 10.0;
+
+/// Turns a run's raw samples into angular rate and specific force
+///
+/// Writes a row a sample: its begin and end in s, angular rate in rad/s and specific force in m/s², both
+/// mean over the sample, along right, front and up of the calibration's body frame. Further terms of
+/// the calibration are taken out, too; its time offset takes the inertial rate for that over the
+/// Earth. The file is itself a record for a run.toml: output = "rate", time_stamp = "end".
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal apply result/calibration.json my-run/run.toml -o calibrated.csv.gz
+  turncal apply result/calibration.json my-run/run.toml | head")]
+pub struct Apply {
+    /// The calibration
+    #[arg(value_name = "CALIBRATION.json")]
+    calibration: PathBuf,
+    /// The run's run.toml
+    #[arg(value_name = "RUN.toml")]
+    run: PathBuf,
+    /// File to write, `.csv` or `.csv.gz` [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace the output file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+impl Apply {
+    pub fn run(&self) -> anyhow::Result<()> {
+        if let Some(output) = &self.output {
+            let name = output.to_string_lossy();
+            if !(name.ends_with(".csv") || name.ends_with(".csv.gz")) {
+                let message = format!(
+                    "-o {name}: the rows are CSV; give a name that ends in .csv, or in .csv.gz to \
+                     compress them\n"
+                );
+                clap::Error::raw(ErrorKind::ValueValidation, message).exit();
+            }
+        }
+        let record = CalibrationRecord::read(&self.calibration)?;
+        let activity = Activity::new(format!("reading {}", self.run.display()));
+        let run = Run::read(&self.run)?;
+        let correction = Correction::for_run(&record, &run)
+            .with_context(|| format!("{}, {}", self.calibration.display(), self.run.display()))?;
+        activity.next("writing");
+        match &self.output {
+            Some(output) => {
+                keep(output, self.inputs())?;
+                write_samples(output, &correction, &run, self.force)?;
+            }
+            None => stream(|rows| sample_rows(rows, &correction, &run))?,
+        }
+        drop(activity);
+        eprintln!(
+            "{} samples of {} s; x right, y front, z up, along: {}",
+            run.imu.len(),
+            run.imu.period,
+            record.body_frame.words()
+        );
+        for note in notes(&record, &correction, &run) {
+            eprintln!("note: {note}");
+        }
+        Ok(())
+    }
+
+    /// Every file that the samples are made from.
+    fn inputs(&self) -> impl Iterator<Item = PathBuf> {
+        let text = std::fs::read_to_string(&self.run).unwrap_or_default();
+        let tables: toml::Table = text.parse().unwrap_or_default();
+        let directory = self.run.parent().unwrap_or(Path::new("")).to_owned();
+        ["imu", "turntable", "segments"]
+            .into_iter()
+            .filter_map(move |table| {
+                let file = tables.get(table)?.get("file")?.as_str()?;
+                Some(directory.join(file))
+            })
+            .chain([self.calibration.clone(), self.run.clone()])
+    }
+}
+
+fn notes(record: &CalibrationRecord, correction: &Correction, run: &Run) -> Vec<String> {
+    let mut notes = Vec::new();
+    if record.converged == Some(false) {
+        notes.push("the calibration did not converge".to_owned());
+    }
+    if record.unit.is_none() {
+        notes
+            .push("the calibration names no units; they are taken for those of the run".to_owned());
+    }
+    for sensor in Sensor::ALL {
+        let scale = correction.sensitivity.get(sensor).diagonal();
+        let off = scale
+            .component_div(&run.nominal.get(sensor).0)
+            .add_scalar(-1.0);
+        let sigmas = off.abs().component_div(&run.prior.get(sensor).scale_sigma);
+        if sigmas.max() > SUSPECT_SIGMAS {
+            notes.push(format!(
+                "{} scale factors are up to {:.0} ppm off the run's nominal ones, {:.0} times the 1σ in \
+                 [imu.prior.{0}]: is this the calibration of this instrument?",
+                sensor.name(),
+                off.amax() / PPM,
+                sigmas.max()
+            ));
+        }
+    }
+    if correction.has(Term::TimeOffset) {
+        notes.push("the time offset of the accelerometers neglects Earth rate".to_owned());
+    }
+    if correction.has(Term::SizeEffect) && !run.imu.continuous {
+        notes.push(
+            "the record is not continuous, so the size effect is taken out without its part by \
+             angular acceleration"
+                .to_owned(),
+        );
+    }
+    notes
+}

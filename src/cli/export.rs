@@ -1,0 +1,86 @@
+//! `turncal export`
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::ValueEnum;
+use turncal::export;
+use turncal::run::{CalibrationRecord, Run, write_whole};
+
+use super::output::{keep, print};
+
+/// Writes a calibration as what other programs read
+///
+/// Formats that want rad/s and m/s² say what raw output is divided by first: the nominal scale of its
+/// unit, for counts that of --run, or else the calibrated scale factors rounded to three digits. What
+/// a format cannot hold is said in the file and on standard error.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal export result/calibration.json --format c -o turncal_calibration.h
+  turncal export result/calibration.json --format kalibr --run my-run/run.toml -o imu.yaml
+  turncal export result/calibration.json --format text")]
+pub struct Export {
+    /// The calibration
+    #[arg(value_name = "CALIBRATION.json")]
+    calibration: PathBuf,
+    /// What to write
+    #[arg(long, value_enum)]
+    format: Format,
+    /// A run of the same instrument, for noise figures, sample rate and nominal scales
+    #[arg(long, value_name = "RUN.toml")]
+    run: Option<PathBuf>,
+    /// File to write [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace the output file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Format {
+    /// IMU intrinsics of Kalibr, model scale-misalignment
+    Kalibr,
+    /// The part of a KF-GINS configuration that is about the IMU
+    KfGins,
+    /// A C99 header with constants and a function
+    C,
+    /// A function file of Octave or MATLAB
+    Octave,
+    /// Every value with its name, σ and unit
+    Text,
+}
+
+impl From<Format> for export::Format {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Kalibr => Self::Kalibr,
+            Format::KfGins => Self::KfGins,
+            Format::C => Self::C,
+            Format::Octave => Self::Octave,
+            Format::Text => Self::Text,
+        }
+    }
+}
+
+impl Export {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let record = CalibrationRecord::read(&self.calibration)?;
+        let run = self.run.as_deref().map(Run::read).transpose()?;
+        let exported = export::write(&record, self.format.into(), run.as_ref())
+            .with_context(|| self.calibration.display().to_string())?;
+        let text = exported.text.as_bytes();
+        match &self.output {
+            Some(output) => {
+                let inputs = [Some(&self.calibration), self.run.as_ref()];
+                keep(output, inputs.into_iter().flatten().cloned())?;
+                write_whole(output, text, self.force)?;
+            }
+            None => print(text)?,
+        }
+        for note in exported.notes {
+            eprintln!("not held: {note}");
+        }
+        Ok(())
+    }
+}
