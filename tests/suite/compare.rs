@@ -5,6 +5,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use turncal::imu::PerSensor;
 use turncal::run::CalibrationRecord;
+use turncal::run::record::TermRecord;
 
 use crate::calibration_file::{record, written};
 
@@ -42,6 +43,32 @@ fn a_scale_factor_that_is_too_large_by_four_sigma_is_flagged_and_has_its_sign() 
     let row = rows.find(|l| l.starts_with("gyro K x")).unwrap();
     assert!(row.contains("−1.0 ± 1.0  −1.0"), "{row}");
     assert!(row.contains("4.0 ± 1.0  ! 4.0"), "{row}");
+}
+
+#[test]
+fn further_terms_stand_side_by_side_in_the_units_of_data_sheets() {
+    let root = tempfile::tempdir().unwrap();
+    let with_offset = |milliseconds: f64| {
+        let mut record = calibration(0.0);
+        let offset = TermRecord {
+            value: milliseconds * 1e-3,
+            sigma: Some(3e-6),
+        };
+        record.terms.insert("accel.time_offset".to_owned(), offset);
+        record
+    };
+    let first = written(root.path(), "first.json", &with_offset(5.0));
+    let second = written(root.path(), "second.json", &with_offset(5.006));
+    let without = written(root.path(), "without.json", &calibration(0.0));
+    let text = stdout(&compare(&[&first, &second, &without]).success());
+    let mut rows = text.lines().map(str::trim_start);
+    let row = rows.find(|l| l.starts_with("accel.time_offset")).unwrap();
+    // 6 µs with a σ of 3 √2 µs.
+    let cells: Vec<&str> = row.split_whitespace().collect();
+    let expected = [
+        "5.0000", "±", "0.0030", "ms", "5.0060", "±", "0.0030", "1.4", "–", "–",
+    ];
+    assert_eq!(cells[1..], expected, "{row}");
 }
 
 #[test]

@@ -72,6 +72,36 @@ fn each_term_is_recovered_as_well_as_its_sigma_says() {
     }
 }
 
+#[test]
+fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let (models, run) = (
+        directory.path().join("scenario.toml"),
+        directory.path().join("run"),
+    );
+    let instrument = directory.path().join("with-offset.toml");
+    let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/models/imu/paper.toml");
+    let text =
+        std::fs::read_to_string(paper).unwrap() + "\n[terms]\ntime-offset = { sigma = 2.0 }\n";
+    std::fs::write(&instrument, text).unwrap();
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/models/scenario/demo.toml");
+    let text = std::fs::read_to_string(demo).unwrap();
+    let text = text.replace("model = \"paper\"", "model = \"with-offset.toml\"");
+    std::fs::write(&models, text).unwrap();
+    let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let simulate = command.arg("simulate").arg(&models).arg("-o").arg(&run);
+    simulate.assert().success();
+
+    let scenario = Scenario::load(models.to_str().unwrap()).unwrap();
+    let made = scenario.simulate(scenario.seed, 0).unwrap();
+    let read = turncal::run::Run::read(&run.join("run.toml")).unwrap();
+    assert_eq!(read.further_sigma, made.run.further_sigma);
+    let truth = CalibrationRecord::read(&run.join("truth.json")).unwrap();
+    let offset = made.further[Term::TimeOffset.parameters().start];
+    assert_eq!(truth.terms["accel.time_offset"].value, offset);
+    assert_eq!(truth.terms.len(), 1);
+}
+
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
     run.further_sigma = FurtherVector::zeros();
