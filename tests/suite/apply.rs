@@ -275,18 +275,18 @@ fn the_calibrated_record_is_a_record_again() {
     assert_eq!(read.imu.start, 0.0);
 }
 
+/// A calibration and a log of two rows, both in SI.
+fn in_si(directory: &Path) -> (PathBuf, PathBuf) {
+    let (units, scale) = (["rad/s", "m/s^2"], [1.0, 1.0]);
+    let run = log(directory, "output = \"rate\"", units, scale, [[0.5; 6]; 2]);
+    let path = written(directory, "calibration.json", &calibration(units, scale));
+    (path, run)
+}
+
 #[test]
 fn standard_output_has_the_same_bytes_as_a_file() {
     let root = tempfile::tempdir().unwrap();
-    let (units, scale) = (["rad/s", "m/s^2"], [1.0, 1.0]);
-    let run = log(
-        root.path(),
-        "output = \"rate\"",
-        units,
-        scale,
-        [[0.5; 6]; 2],
-    );
-    let path = written(root.path(), "calibration.json", &calibration(units, scale));
+    let (path, run) = in_si(root.path());
     let output = root.path().join("calibrated.csv");
     let apply = [Path::new("apply"), &path, &run];
     let printed = turncal(&apply).assert().success();
@@ -358,15 +358,7 @@ fn a_term_that_is_not_known_is_not_passed_over() {
 #[test]
 fn the_raw_record_is_never_replaced_and_a_name_says_what_is_written() {
     let root = tempfile::tempdir().unwrap();
-    let (units, scale) = (["rad/s", "m/s^2"], [1.0, 1.0]);
-    let run = log(
-        root.path(),
-        "output = \"rate\"",
-        units,
-        scale,
-        [[0.5; 6]; 2],
-    );
-    let path = written(root.path(), "calibration.json", &calibration(units, scale));
+    let (path, run) = in_si(root.path());
     let raw = root.path().join("imu.csv");
     let before = fs::read(&raw).unwrap();
     let apply = [Path::new("apply"), &path, &run, Path::new("-o")];

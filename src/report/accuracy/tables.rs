@@ -11,6 +11,15 @@ use crate::study::accuracy::FurtherAccuracy;
 use crate::study::{Accuracy, Ratio};
 
 const NONE: &str = "–";
+const AGAINST_BOUND: [&str; 7] = [
+    "",
+    "unit",
+    "RMS error",
+    "RMS σ",
+    "RMS bound",
+    "error/bound",
+    "99 % interval",
+];
 
 pub(super) fn tables(accuracy: &Accuracy) -> Vec<Table> {
     let mut tables = vec![bound(accuracy), gain(accuracy), consistency(accuracy)];
@@ -51,26 +60,20 @@ fn by_merit(accuracy: &Accuracy, cells: impl Fn(&Merit) -> Vec<String>) -> Vec<V
         .collect()
 }
 
+/// RMS error, σ and bound in a unit, and the ratio of the first to the last.
+fn against_bound(rms: [f64; 3], unit: f64, ratio: Option<&Ratio>) -> impl Iterator<Item = String> {
+    let rms = rms.map(|rms| three_digits(rms / unit));
+    rms.into_iter().chain(ratio_cells(ratio))
+}
+
 fn bound(accuracy: &Accuracy) -> Table {
-    let headings = [
-        "",
-        "unit",
-        "RMS error",
-        "RMS σ",
-        "RMS bound",
-        "error/bound",
-        "99 % interval",
-    ];
     Table {
         title: "EKF against the Cramér–Rao bound",
-        headings: headings.map(str::to_owned).to_vec(),
+        headings: AGAINST_BOUND.map(str::to_owned).to_vec(),
         sections: by_merit(accuracy, |of| {
             let figures = of.figures;
-            [figures.filter, figures.claimed, figures.bound]
-                .map(|rms| three_digits(rms / of.unit_value))
-                .into_iter()
-                .chain(ratio_cells(figures.ratio.as_ref()))
-                .collect()
+            let rms = [figures.filter, figures.claimed, figures.bound];
+            against_bound(rms, of.unit_value, figures.ratio.as_ref()).collect()
         }),
         notes: [
             "RMS over all runs and the parameters of a group; σ: what the filter claims.",
@@ -84,26 +87,20 @@ fn bound(accuracy: &Accuracy) -> Table {
 
 /// Constants beside the parameters; none if no block of them was on.
 fn further(accuracy: &Accuracy) -> Option<Table> {
-    let headings = [
-        "",
-        "unit",
-        "RMS error",
-        "RMS σ",
-        "RMS bound",
-        "error/bound",
-        "99 % interval",
-    ];
     let row = |of: &FurtherAccuracy| {
         let (unit, in_si) = unit(of.block);
         [title(of.block).to_owned(), unit.to_owned()]
             .into_iter()
-            .chain([of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / in_si)))
-            .chain(ratio_cells(of.ratio.as_ref()))
+            .chain(against_bound(
+                [of.filter, of.claimed, of.bound],
+                in_si,
+                of.ratio.as_ref(),
+            ))
             .collect()
     };
     (!accuracy.further.is_empty()).then(|| Table {
         title: "Blocks of states beside K, E and D",
-        headings: headings.map(str::to_owned).to_vec(),
+        headings: AGAINST_BOUND.map(str::to_owned).to_vec(),
         sections: vec![accuracy.further.iter().map(row).collect()],
         notes: vec!["RMS over all runs and the constants of a block.".to_owned()],
     })
