@@ -16,9 +16,9 @@ use nalgebra::Vector3;
 
 use super::curvature::curvature;
 use super::error::CalibrationError;
-use super::estimator::problem;
+use super::linearisation::singular;
 use super::outcome::{Estimate, Outcome, from_vector, to_vector};
-use super::pass::{Problem, singular};
+use super::problem::Problem;
 use super::schedule::{Schedule, Standing};
 use super::states::{
     ATTITUDE, NAVIGATION, POSITION, ParameterMatrix, ParameterVector, VELOCITY,
@@ -48,7 +48,7 @@ pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, Calibrat
     }
     let form = outcome.estimate.form();
     let schedule = Schedule::new(run, &run.dwells())?;
-    let problem = problem(
+    let problem = Problem::new(
         run,
         schedule,
         form,

@@ -8,11 +8,11 @@ use nalgebra::{DMatrix, DVector, Dyn, linalg::Cholesky};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
-use super::estimator::problem;
 use super::further::{CONSTANTS, Constant};
 use super::group::Group;
 use super::outcome::Outcome;
 use super::pass::{Gate, Mode, PassResult, pass};
+use super::problem::Problem;
 use super::schedule::Schedule;
 use super::states::{PARAMETERS, ParameterVector};
 use crate::run::{Run, StateBlock};
@@ -120,7 +120,7 @@ fn constant_blocks() -> impl Iterator<Item = StateBlock> {
 
 /// The last pass of a calibration with the blocks of a run.
 fn once_more(run: &Run, outcome: &Outcome) -> Result<PassResult, CalibrationError> {
-    let problem = problem(
+    let problem = Problem::new(
         run,
         Schedule::new(run, &run.dwells())?,
         outcome.estimate.form(),

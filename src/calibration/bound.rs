@@ -2,10 +2,11 @@
 
 use super::coarse::{AttitudePrior, coarse_start};
 use super::error::CalibrationError;
-use super::estimator::problem;
 use super::further::Further;
+use super::linearisation::Linearisation;
 use super::outcome::{Estimate, Moment};
-use super::pass::{Gate, Linearisation, Mode, pass};
+use super::pass::{Gate, Mode, pass};
+use super::problem::Problem;
 use super::schedule::{Schedule, first_reading};
 use super::standstill::velocity_sigma;
 use crate::imu::{FurtherVector, PerSensor, Triad};
@@ -48,7 +49,7 @@ pub fn bound(
         initial_attitude: attitude.mean,
     };
     let sigma = velocity_sigma(run, &dwells);
-    let problem = problem(run, schedule, form, attitude, sigma);
+    let problem = Problem::new(run, schedule, form, attitude, sigma);
     let result = pass(&problem, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {

@@ -11,8 +11,8 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::CalibrationError;
+use super::linearisation::{Linearisation, singular};
 use super::outcome::{from_vector, to_vector};
-use super::pass::{Linearisation, singular};
 use super::schedule::first_reading;
 use crate::attitude::exp;
 use crate::imu::{FurtherVector, InstallationForm, PerSensor, Triad};

@@ -1,20 +1,20 @@
 //! The estimator: coarse start, with a table a live pass, and held passes until nothing moves.
 
-use super::coarse::{AttitudePrior, CoarseStart, coarse_start};
+use super::coarse::{CoarseStart, coarse_start};
 use super::consistency::consistency;
 use super::curvature::curvature;
 use super::error::CalibrationError;
-use super::filter::Start;
 use super::form::{FormTest, form_test};
 use super::further::constant_name;
+use super::linearisation::{Linearisation, singular};
 use super::observability::Observability;
 use super::outcome::{Estimate, Innovation, Outcome, Pass, to_vector};
-use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, Variance, gate, pass, singular};
+use super::pass::{Gate, Mode, PassResult, pass};
+use super::problem::Problem;
 use super::schedule::Schedule;
 use super::standstill::velocity_sigma;
-use super::states::ParameterVector;
 
-use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
+use crate::imu::{InstallationForm, Sensor};
 use crate::run::Run;
 use crate::run::record::BodyFrame;
 use crate::units::DEGREE;
@@ -31,8 +31,6 @@ const PASSES: usize = 10;
 const MERIT_RISE: f64 = 0.1;
 /// After a step of more than this part of the one before, all go half as far.
 const SHRINKS: f64 = 0.8;
-/// 1σ of the initial velocity: a table at rest, m/s.
-const INITIAL_VELOCITY: f64 = 1e-3;
 /// More than this part of all observations beyond the gate are no outliers.
 const MOST_OUTLIERS: f64 = 0.05;
 /// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
@@ -59,7 +57,7 @@ pub fn estimate(
     let start = coarse_start(run, &dwells, form)?;
     let velocity_sigma = velocity_sigma(run, &dwells);
     let attempt = |start: CoarseStart| {
-        let problem = problem(run, schedule.clone(), form, start.attitude, velocity_sigma);
+        let problem = Problem::new(run, schedule.clone(), form, start.attitude, velocity_sigma);
         attempt(problem, start.at, progress)
     };
     let of_start = attempt(start);
@@ -217,52 +215,6 @@ fn beyond(result: &PassResult, gate: f64) -> f64 {
     result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
 }
 
-pub(super) fn problem<'a>(
-    run: &'a Run,
-    schedule: Schedule,
-    form: InstallationForm,
-    attitude: AttitudePrior,
-    velocity_sigma: f64,
-) -> Problem<'a> {
-    let table_geometry = run.table.as_ref().map(|t| t.geometry).unwrap_or_default();
-    let (position_sigma, reading_sigma) = run.table.as_ref().map_or((0.0, 0.0), |table| {
-        (table.position_sigma, table.reading_sigma)
-    });
-    let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
-    let sigma_of_triads = run.prior_sigma(form);
-    let mut prior_sigma = ParameterVector::zeros();
-    for sensor in Sensor::ALL {
-        prior_sigma
-            .fixed_rows_mut::<PER_TRIAD>(super::states::parameter(sensor, 0))
-            .copy_from(sigma_of_triads.get(sensor));
-    }
-    Problem {
-        run,
-        schedule,
-        form,
-        attitude,
-        prior_mean: to_vector(&run.prior_mean(form)),
-        prior_sigma,
-        further_sigma: run.further_sigma,
-        table_geometry,
-        start: Start {
-            attitude: attitude.sigma,
-            velocity: INITIAL_VELOCITY,
-            position: run.standstill.position_sigma,
-            table: position_sigma,
-        },
-        variance: Variance {
-            velocity: velocity_sigma.powi(2) + quantisation(run.imu.pulse.accel),
-            position: run.standstill.position_sigma.powi(2),
-            reading: reading_sigma.powi(2),
-            attitude: quantisation(run.imu.pulse.gyro),
-            table: position_sigma.powi(2),
-        },
-        velocity_sigma,
-        gate: gate(),
-    }
-}
-
 fn summary(result: &PassResult, at: &Linearisation, live: bool) -> Pass {
     let sigma = result.covariance.diagonal().map(f64::sqrt);
     let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
@@ -359,6 +311,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::coarse::AttitudePrior;
     use super::super::outcome::from_vector;
     use super::super::schedule::first_reading;
     use super::*;
@@ -377,7 +330,7 @@ mod tests {
         let reading = first_reading(&simulated.run, &dwells).unwrap();
         let table = simulated.run.table.as_ref().unwrap();
         let prior = AttitudePrior::of_reading(table, reading);
-        let mut problem = problem(&simulated.run, schedule, form, prior, 1e-6);
+        let mut problem = Problem::new(&simulated.run, schedule, form, prior, 1e-6);
         // As tight a prior of attitude and scale as a run gives, so that it counts.
         problem.start.attitude = Vector3::repeat(ARCSEC);
         problem.prior_mean = to_vector(&simulated.truth);

@@ -3,9 +3,10 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
-use super::estimator::problem;
 use super::frame::in_general_form;
-use super::pass::{Gate, Linearisation, Mode, PassResult, Problem, pass};
+use super::linearisation::Linearisation;
+use super::pass::{Gate, Mode, PassResult, pass};
+use super::problem::Problem;
 use crate::imu::InstallationForm;
 
 /// The likelihood ratio of a restricted installation form against the general one.
@@ -42,7 +43,7 @@ pub(super) fn form_test(
     let Ok(chi2) = ChiSquared::new(more as f64) else {
         return Ok(None);
     };
-    let problem = problem(
+    let problem = Problem::new(
         restricted.run,
         restricted.schedule.clone(),
         general,

@@ -97,6 +97,12 @@ impl Further {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
     }
 
+    /// Whether a term of the instrument was estimated.
+    pub fn has_terms(&self) -> bool {
+        let of_terms = self.prior_sigma.fixed_rows::<FURTHER>(TABLE_GEOMETRY);
+        of_terms.iter().any(|&sigma| sigma > 0.0)
+    }
+
     /// The estimated parameters of terms.
     pub fn terms(&self) -> FurtherVector {
         self.values.fixed_rows::<FURTHER>(TABLE_GEOMETRY).into()

@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use super::coarse::AttitudePrior;
 use super::form::FormTest;
 use super::further::Further;
+use super::linearisation::Linearisation;
 use super::observability::Observability;
-use super::pass::Linearisation;
 use super::states::{ParameterMatrix, ParameterVector, parameter, sensor_and_parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 

@@ -2,83 +2,22 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use nalgebra::Vector3;
 
-use super::coarse::AttitudePrior;
 use super::error::CalibrationError;
-use super::filter::{Filter, Sight, Start};
+use super::filter::{Filter, Sight};
 use super::further::{Further, constants};
+use super::linearisation::{Linearisation, singular};
 use super::observability::AttitudeCovariance;
 use super::outcome::{Innovation, Moment, Observation, from_vector, to_vector};
-use super::schedule::{Schedule, Standing};
+use super::problem::Problem;
+use super::schedule::Standing;
 use super::states::{
     ALL_STATES, ParameterMatrix, ParameterVector, STATES, STATES_WITH_DRIFT, STATES_WITH_TABLE,
 };
 use crate::attitude::{exp, from_tilt_and_heading, log, to_tilt_and_heading};
-use crate::imu::{FURTHER, FurtherVector, InstallationForm, PerSensor, Sensor, Triad};
+use crate::imu::{FURTHER, FurtherVector, PerSensor, Sensor};
 use crate::navigation::{FurtherTerms, Navigator, State};
-use crate::run::{Run, TableGeometry};
-
-/// What all passes over a run share.
-#[derive(Debug, Clone)]
-pub(super) struct Problem<'a> {
-    pub run: &'a Run,
-    pub schedule: Schedule,
-    pub form: InstallationForm,
-    /// What is known of the initial attitude before the run.
-    pub attitude: AttitudePrior,
-    pub prior_mean: ParameterVector,
-    pub prior_sigma: ParameterVector,
-    /// 1σ of each further parameter before the run, whose mean is zero; zero where its term is off.
-    pub further_sigma: FurtherVector,
-    pub table_geometry: TableGeometry,
-    pub start: Start,
-    pub variance: Variance,
-    /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
-    pub velocity_sigma: f64,
-    pub gate: f64,
-}
-
-/// Variance of each observation per axis.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Variance {
-    pub velocity: f64,
-    pub position: f64,
-    /// Of one reading of the table.
-    pub reading: f64,
-    /// Of the computed attitude: a pulse's worth.
-    pub attitude: f64,
-    /// Of the table's position, drawn anew at each.
-    pub table: f64,
-}
-
-/// The point at which a pass linearises.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Linearisation {
-    /// The instrument.
-    pub triads: PerSensor<Triad>,
-    /// Parameters of its further terms.
-    pub further: FurtherVector,
-    /// `C_b_n` at the first sample.
-    pub initial_attitude: Matrix3<f64>,
-}
-
-impl Linearisation {
-    /// The point a fraction of the way to another.
-    pub(super) fn towards(&self, other: &Self, fraction: f64) -> Self {
-        let from = to_vector(&self.triads);
-        let turn = log(&(other.initial_attitude * self.initial_attitude.transpose()));
-        Self {
-            triads: from_vector(
-                self.triads.gyro.form,
-                &(from + (to_vector(&other.triads) - from) * fraction),
-            ),
-            further: self.further + (other.further - self.further) * fraction,
-            initial_attitude: exp(turn * fraction) * self.initial_attitude,
-        }
-    }
-}
 
 /// How a pass treats its estimates and its gate.
 #[derive(Debug, Clone, Copy)]
@@ -123,22 +62,12 @@ pub(super) struct PassResult {
     pub history: Vec<Moment>,
 }
 
-/// Chance that the gate rejects a sound observation.
-const FALSE_REJECTION: f64 = 1e-6;
 /// After this many rejections in a row the gate doubts itself rather than the data.
 const REOPEN: usize = 5;
 /// At most this many observations of a dwell are left out for having shut the gate.
 const MOST_SHUTTING: usize = 3;
 /// Spacing of the history, s.
 const MOMENT: f64 = 1.0;
-
-/// Squared whitened innovation of three components beyond which an observation is an outlier.
-pub(super) fn gate() -> f64 {
-    // Three degrees of freedom are always valid.
-    ChiSquared::new(3.0).map_or(f64::INFINITY, |chi2| {
-        chi2.inverse_cdf(1.0 - FALSE_REJECTION)
-    })
-}
 
 pub(super) fn pass(
     problem: &Problem,
@@ -457,13 +386,4 @@ impl<'a, const N: usize> Pass<'a, N> {
             sigma: self.filter.parameter_sigma(),
         }
     }
-}
-
-/// The error that names the triad whose sensitivity is singular.
-pub(super) fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
-    let sensor = Sensor::ALL
-        .into_iter()
-        .find(|&sensor| triads.get(sensor).correction().is_none())
-        .unwrap_or(Sensor::Gyro);
-    CalibrationError::Singular { sensor }
 }

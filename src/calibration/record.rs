@@ -13,7 +13,7 @@ use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, 
 use crate::run::Run;
 use crate::run::record::{
     Aiding, BlockRecord, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord,
-    EQUATION, Method, NisRecord, TermRecord, TestVector, TriadRecord,
+    EQUATION, EQUATION_WITH_TERMS, Method, NisRecord, TermRecord, TestVector, TriadRecord,
 };
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -34,6 +34,10 @@ impl Outcome {
                 BodyFrame::Accelerometer => Aiding::Velocity,
             }),
             terms: self.further.records(),
+            equation: Some(match self.further.has_terms() {
+                true => EQUATION_WITH_TERMS.to_owned(),
+                false => EQUATION.to_owned(),
+            }),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),

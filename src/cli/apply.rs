@@ -1,6 +1,6 @@
 //! `turncal apply`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::error::ErrorKind;
@@ -61,7 +61,7 @@ impl Apply {
         activity.next("writing");
         match &self.output {
             Some(output) => {
-                keep(output, self.inputs())?;
+                keep(output, run.files.iter().chain([&self.calibration]))?;
                 write_samples(output, &correction, &run, self.force)?;
             }
             None => stream(|rows| sample_rows(rows, &correction, &run))?,
@@ -77,20 +77,6 @@ impl Apply {
             eprintln!("note: {note}");
         }
         Ok(())
-    }
-
-    /// Every file that the samples are made from.
-    fn inputs(&self) -> impl Iterator<Item = PathBuf> {
-        let text = std::fs::read_to_string(&self.run).unwrap_or_default();
-        let tables: toml::Table = text.parse().unwrap_or_default();
-        let directory = self.run.parent().unwrap_or(Path::new("")).to_owned();
-        ["imu", "turntable", "segments"]
-            .into_iter()
-            .filter_map(move |table| {
-                let file = tables.get(table)?.get("file")?.as_str()?;
-                Some(directory.join(file))
-            })
-            .chain([self.calibration.clone(), self.run.clone()])
     }
 }
 

@@ -72,8 +72,8 @@ impl Export {
         let text = exported.text.as_bytes();
         match &self.output {
             Some(output) => {
-                let inputs = [Some(&self.calibration), self.run.as_ref()];
-                keep(output, inputs.into_iter().flatten().cloned())?;
+                let files = run.iter().flat_map(|run| &run.files);
+                keep(output, files.chain([&self.calibration]))?;
                 write_whole(output, text, self.force)?;
             }
             None => print(text)?,

@@ -85,11 +85,14 @@ impl Begun<'_> {
 }
 
 /// Refuses an output file that is one of the inputs: not even force replaces those.
-pub fn keep(output: &Path, inputs: impl IntoIterator<Item = PathBuf>) -> anyhow::Result<()> {
+pub fn keep<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> anyhow::Result<()> {
     let Ok(target) = output.canonicalize() else {
         return Ok(());
     };
-    let is_target = |input: PathBuf| input.canonicalize().is_ok_and(|input| input == target);
+    let is_target = |input: &PathBuf| input.canonicalize().is_ok_and(|input| input == target);
     if inputs.into_iter().any(is_target) {
         bail!(
             "{}: found an input of this command, expected a name that is free. Choose another name; \

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Exported;
 use crate::calibration::{Correction, CorrectionError};
 use crate::imu::{PerSensor, Sensor, Term};
-use crate::run::record::{Aiding, Method};
+use crate::run::record::{Aiding, EQUATION, Method};
 use crate::run::{CalibrationRecord, Run, unit_scale};
 
 /// A calibration and, perhaps, a run of its instrument.
@@ -82,7 +82,7 @@ impl<'a> Source<'a> {
         lines.extend(record.warnings.iter().map(|w| format!("warning: {w}")));
         lines.extend([
             String::new(),
-            "N = scale * (installation * u) + bias; u = correction * (N - bias)".to_owned(),
+            EQUATION.to_owned(),
             format!(
                 "N: raw output per second, gyros in {}, accelerometers in {}; rows of pulses or \
                  increments are divided by the sample period, rows of rates stand as they are",

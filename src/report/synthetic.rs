@@ -154,6 +154,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
             geometry: Default::default(),
             tilts: Vec::new(),
         }),
+        files: Vec::new(),
         notes: Vec::new(),
         segments: Vec::new(),
     }

@@ -34,6 +34,7 @@ pub(crate) use write::write_rows;
 pub use write::write_run;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -70,6 +71,8 @@ pub struct Run {
     pub table: Option<TableRecord>,
     /// Labelled sections, if there are any.
     pub segments: Vec<Segment>,
+    /// The files that it was read from; none if it was made.
+    pub files: Vec<PathBuf>,
     /// What the files say that has no effect yet, a sentence each.
     pub notes: Vec<String>,
 }

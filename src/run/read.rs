@@ -70,6 +70,9 @@ impl Run {
         };
 
         // The small files' fields are checked before the large files are read.
+        let mut files = vec![path.to_owned(), instrument.log.file.clone()];
+        files.extend(table_log.as_ref().map(|log| log.file.clone()));
+        files.extend(segments_file.clone());
         let imu = instrument.log.read()?;
         let table = table_log.map(|log| log.read(&imu)).transpose()?;
         let segments = match segments_file {
@@ -89,6 +92,7 @@ impl Run {
             standstill,
             table,
             segments,
+            files,
             notes,
         })
     }

@@ -15,8 +15,12 @@ use crate::imu::{InstallationForm, PARAMETERS, PerSensor, Sensor, Triad};
 /// The version of the format.
 pub const FORMAT: &str = "turncal-calibration/1";
 
-/// The equation that every record states.
+/// The equation of a record.
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
+
+/// The equation of a record with further terms of the instrument.
+pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
+     to u, zero in test_vectors";
 
 /// A calibration with its accuracy and how it was reached, or a known truth.
 ///
@@ -78,7 +82,7 @@ pub struct CalibrationRecord {
     /// Names of parameters that were not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
-    /// The model in words, [`EQUATION`].
+    /// The model in words, [`EQUATION`] or [`EQUATION_WITH_TERMS`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equation: Option<String>,
     /// The matrix of `u = correction (N − bias)`, ready to use.

@@ -142,6 +142,7 @@ impl Scenario {
                     .max(self.integrator.lever_arm.norm()),
             },
             table: Some(self.readings(&read, seed, stream)),
+            files: Vec::new(),
             notes: Vec::new(),
             segments: Vec::new(),
         };

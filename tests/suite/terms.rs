@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use turncal::calibration::outcome::to_vector;
 use turncal::calibration::{Outcome, estimate, mean_square_interval};
 use turncal::imu::{FURTHER, FurtherVector, InstallationForm, Term};
+use turncal::run::record::{EQUATION, EQUATION_WITH_TERMS};
 use turncal::run::{CalibrationRecord, StateBlock, TABLE_GEOMETRY};
 use turncal::simulation::{Scenario, Simulated};
 
@@ -100,6 +101,23 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
     let offset = made.further[Term::TimeOffset.parameters().start];
     assert_eq!(truth.terms["accel.time_offset"].value, offset);
     assert_eq!(truth.terms.len(), 1);
+}
+
+#[test]
+fn a_record_with_terms_says_that_the_correction_is_not_all() {
+    let mut run = Scenario::load("real-table")
+        .unwrap()
+        .simulate(SEED, 0)
+        .unwrap()
+        .run;
+    let equation = |run: &turncal::run::Run| {
+        let outcome = estimate(run, FORM, &|_| {}).unwrap();
+        outcome.record(run, &[]).equation.unwrap()
+    };
+    // Errors of the table are none of the instrument.
+    assert_eq!(equation(&run), EQUATION);
+    run.switch_on(StateBlock::Term(Term::TimeOffset));
+    assert_eq!(equation(&run), EQUATION_WITH_TERMS);
 }
 
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {

@@ -1,7 +1,7 @@
 //! Accelerometers from the size of gravity.
 
 use super::super::error::CalibrationError;
-use super::super::pass::singular;
+use super::super::linearisation::singular;
 use super::equations::Equations;
 use super::gauss_newton;
 use crate::imu::{PerSensor, Sensor, Triad, TriadVector};

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::super::error::CalibrationError;
-use super::super::pass::singular;
+use super::super::linearisation::singular;
 use super::equations::Equations;
 use super::gauss_newton;
 use crate::attitude::log;

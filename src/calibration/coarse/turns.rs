@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::super::error::CalibrationError;
+use super::super::linearisation::{Linearisation, singular};
 use super::super::outcome::{from_vector, to_vector};
-use super::super::pass::{Linearisation, singular};
 use super::equations::Equations;
 use super::heading::{Gyrocompass, Rest, gyrocompass};
 use crate::attitude::{exp, tilt};

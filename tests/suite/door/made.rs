@@ -78,6 +78,7 @@ pub fn made_run(name: &str) -> Run {
             end: 4.25,
             label: "rot_x+360".to_owned(),
         }],
+        files: Vec::new(),
         notes: Vec::new(),
     }
 }
