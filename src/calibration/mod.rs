@@ -33,7 +33,9 @@ pub mod states;
 pub use batch::batch_estimate;
 pub use block_effect::{BlockEffect, block_effects};
 pub use bound::{Bound, bound};
-pub use closed_form::{ClosedForm, Position, six_position, six_position_of, six_position_triad};
+pub use closed_form::{
+    ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
+};
 pub use coarse::{AttitudePrior, CoarseStart, coarse_start};
 pub use comparison::{Comparison, Named, Side, compare};
 pub use consistency::mean_square_interval;

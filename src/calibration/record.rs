@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::block_effect::BlockEffect;
+use super::closed_form::ClosedForm;
 use super::further::{Further, constant_name};
 use super::observability::Direction;
 use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
@@ -48,6 +49,18 @@ impl Outcome {
     }
 }
 
+impl ClosedForm {
+    /// The record of this calibration of a run.
+    pub fn record(&self, run: &Run) -> CalibrationRecord {
+        CalibrationRecord {
+            method: Some(Method::SixPosition),
+            body_frame: self.reference.body_frame(),
+            warnings: self.warnings.clone(),
+            ..self.estimate.record(run)
+        }
+    }
+}
+
 impl Further {
     /// Its estimated constants by name.
     pub fn records(&self) -> BTreeMap<String, TermRecord> {
@@ -85,7 +98,6 @@ impl Estimate {
             Some(rows(&sensitivity.try_inverse()?))
         };
         CalibrationRecord {
-            method: Some(Method::SixPosition),
             installation_form: Some(form),
             body_frame: run.body_frame(),
             unit: Some(run.unit.clone()),

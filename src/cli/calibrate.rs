@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
 use turncal::calibration::{
-    self, CalibrationError, ClosedForm, Outcome, block_effects, in_body_frame, triads_of,
+    self, CalibrationError, ClosedForm, Outcome, Reference, block_effects, in_body_frame, triads_of,
 };
 use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};
@@ -43,7 +42,7 @@ pub struct Calibrate {
     /// How installation angles make the installation matrix
     #[arg(long, value_enum, default_value_t = Installation::General)]
     installation: Installation,
-    /// What the filter observes [default: table if the run has its log, else velocity]
+    /// What is observed [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
     /// Blocks of states to estimate, beside those that the run switches on
@@ -63,7 +62,7 @@ pub struct Calibrate {
 enum Method {
     /// Extended Kalman filter over the whole run
     Ekf,
-    /// Closed form from the static positions
+    /// Closed form: from the table's positions, else from labelled sections, else from gravity
     SixPosition,
 }
 
@@ -105,11 +104,6 @@ enum Result {
 
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
-        if let (Method::SixPosition, Some(Aiding::Velocity)) = (self.method, self.aiding) {
-            let message = "--method six-position takes attitudes from the table's log and observes no \
-                           velocity; leave out --aiding velocity, or use --method ekf\n";
-            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-        }
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let mut run = Run::read(&self.run)?;
         match self.aiding {
@@ -174,7 +168,11 @@ impl Calibrate {
         let effects = effects?;
         let record = match &result {
             Result::Filter(outcome) => outcome.record(&run, &effects),
-            Result::ClosedForm(closed_form) => closed_form.estimate.record(&run),
+            Result::ClosedForm(closed_form) => closed_form.record(&run),
+        };
+        let body_frame = match &result {
+            Result::Filter(_) => run.body_frame(),
+            Result::ClosedForm(closed_form) => closed_form.reference.body_frame(),
         };
         let note = match &result {
             Result::Filter(_) => String::new(),
@@ -184,6 +182,7 @@ impl Calibrate {
         let report = Report {
             title: &run.name,
             run: &run,
+            body_frame,
             outcome: match &result {
                 Result::Filter(outcome) => Some(outcome),
                 Result::ClosedForm(_) => None,
@@ -195,6 +194,7 @@ impl Calibrate {
                 Result::ClosedForm(closed_form) => Some(report::ClosedForm {
                     estimate: &closed_form.estimate,
                     note: &note,
+                    warnings: &closed_form.warnings,
                 }),
             },
             truth: truth_in_form.as_ref(),
@@ -233,12 +233,18 @@ pub fn filter(run: &Run, form: InstallationForm, activity: &Activity) -> anyhow:
 
 /// What a closed form was made of, in a few words.
 pub fn note(closed_form: &ClosedForm) -> String {
-    format!(
-        "{} positions for the gyros, {} for the accelerometers, {:.0} min of standing",
-        closed_form.positions.gyro,
-        closed_form.positions.accel,
-        closed_form.standing_time / 60.0
-    )
+    let PerSensor { gyro, accel } = closed_form.positions;
+    let turns = closed_form.turns;
+    let from = match closed_form.reference {
+        Reference::Table => format!("{gyro} positions for the gyros, {accel} for the accelerometers"),
+        Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
+        Reference::Gravity => {
+            format!("gravity in {accel} dwells and its direction over {turns} turns")
+        }
+    };
+    let minutes = closed_form.standing_time / 60.0;
+    let digits = usize::from(minutes < 10.0);
+    format!("{from}, {minutes:.digits$} min of standing")
 }
 
 /// Navigates 40 h standing level at the run's site by the calibration of each method.

@@ -65,12 +65,14 @@ impl Demo {
         let report = Report {
             title: "turncal demo",
             run,
+            body_frame: run.body_frame(),
             outcome: Some(&outcome),
             effects: &effects,
             true_terms: &BTreeMap::new(),
             closed_form: Some(report::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
+                warnings: &closed_form.warnings,
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
@@ -89,7 +91,7 @@ impl Demo {
         write(&standing, &closed)?;
         let record = outcome.record(run, &effects);
         record.write(&filtered.join("calibration.json"), false)?;
-        let record = closed_form.estimate.record(&standing.run);
+        let record = closed_form.record(&standing.run);
         record.write(&closed.join("calibration.json"), false)?;
         write_report(&report, &root.join("report"))?;
         directory.commit()?;

@@ -43,7 +43,7 @@ use crate::calibration::outcome::{Estimate, Outcome, to_vector};
 use crate::calibration::states::ParameterVector;
 use crate::imu::{PerSensor, Triad};
 use crate::run::Run;
-use crate::run::record::TermRecord;
+use crate::run::record::{BodyFrame, TermRecord};
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the
@@ -54,6 +54,8 @@ pub struct Report<'a> {
     pub title: &'a str,
     /// The record.
     pub run: &'a Run,
+    /// What fixes the body axes.
+    pub body_frame: BodyFrame,
     /// The filter's result, if it ran.
     pub outcome: Option<&'a Outcome>,
     /// What blocks of states did to it, or would do.
@@ -87,6 +89,8 @@ pub struct ClosedForm<'a> {
     pub estimate: &'a Estimate,
     /// What it was made of, such as `six positions, 60 min of its own`.
     pub note: &'a str,
+    /// What must be known before using it.
+    pub warnings: &'a [String],
 }
 
 /// A report that could not be written.

@@ -33,8 +33,9 @@ impl Report<'_> {
 
     /// What a calibration engineer must know before using the figures.
     pub(super) fn warnings(&self) -> Vec<String> {
+        let of_closed_form = self.closed_form.map_or(&[][..], |closed| closed.warnings);
         let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.warnings);
-        let mut warnings = of_outcome.to_vec();
+        let mut warnings = [of_closed_form, of_outcome].concat();
         warnings.extend(blocks::advice(self.effects));
         warnings
     }
@@ -52,7 +53,7 @@ impl Report<'_> {
         if let Some(estimate) = self.estimate() {
             let _ = write!(text, "; {} installation", estimate.form().name());
         }
-        let _ = writeln!(text, "; body frame: {}", self.run.body_frame().words());
+        let _ = writeln!(text, "; body frame: {}", self.body_frame.words());
         if let Some(outcome) = self.outcome {
             let _ = writeln!(text, "{}", passes(outcome));
         } else if let Some(closed_form) = self.closed_form {

@@ -130,7 +130,7 @@ pub enum Aiding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyFrame {
-    /// The table's mounting face.
+    /// The mounting face, of the table or of labelled positions.
     #[default]
     Table,
     /// Accelerometer x along body x, accelerometer y in the xy plane.
@@ -141,7 +141,7 @@ impl BodyFrame {
     /// In a few words.
     pub fn words(self) -> &'static str {
         match self {
-            Self::Table => "mounting face of the turntable",
+            Self::Table => "mounting face",
             Self::Accelerometer => {
                 "x along accelerometer x, y in the plane of accelerometers x and y"
             }

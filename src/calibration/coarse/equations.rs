@@ -2,10 +2,10 @@
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::outcome::to_vector;
-use super::super::states::{ParameterVector, parameter};
+use super::super::states::{ParameterMatrix, ParameterVector, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::Block;
 use crate::run::Run;
@@ -77,6 +77,30 @@ impl Equations {
     fn add_row(&mut self, row: ParameterVector, error: f64, variance: f64) {
         let weight = 1.0 / (variance + ROUNDING.powi(2)).sqrt();
         self.rows.push((row * weight, error * weight));
+    }
+
+    /// Covariance of the unknown parameters; zero for all others. `None` if they are not determined.
+    pub(super) fn covariance(&self) -> Option<ParameterMatrix> {
+        let n = self.unknown.len();
+        let information = DMatrix::from_fn(n, n, |i, j| {
+            let (i, j) = (self.unknown[i], self.unknown[j]);
+            self.rows.iter().map(|(row, _)| row[i] * row[j]).sum()
+        });
+        let inverse = information.cholesky()?.inverse();
+        let mut covariance = ParameterMatrix::zeros();
+        for (i, &row) in self.unknown.iter().enumerate() {
+            for (j, &column) in self.unknown.iter().enumerate() {
+                covariance[(row, column)] = inverse[(i, j)];
+            }
+        }
+        Some(covariance)
+    }
+
+    /// Sum of squared errors, each over its σ, the prior's included, and how many more there are than
+    /// unknown parameters.
+    pub(super) fn misfit(&self) -> (f64, usize) {
+        let sum = self.rows.iter().map(|(_, error)| error.powi(2)).sum();
+        (sum, self.rows.len() - self.unknown.len())
     }
 
     /// The step δθ of least squares.

@@ -17,24 +17,28 @@ pub(super) fn accelerometers(
     dwells: &[Dwell],
     from: &PerSensor<Triad>,
 ) -> Result<PerSensor<Triad>, CalibrationError> {
-    let rests: Vec<_> = dwells
-        .iter()
-        .map(|dwell| dwell.mean(Sensor::Accel, run))
-        .collect();
-    gauss_newton(*from, |triads| {
-        let mut equations = Equations::new(run, triads, &[Sensor::Accel]);
-        let triad = &triads.accel;
-        let correction = triad.correction().ok_or_else(|| singular(triads))?;
-        let response = triad.response();
-        for rest in &rests {
-            let force = correction * (rest.output - triad.bias);
-            let direction = force.normalize();
-            let row = TriadVector::from_fn(|p, _| {
-                direction.dot(&(correction * (response[p] * force.push(1.0))))
-            });
-            let error = force.norm() - run.site.gravity;
-            equations.add(Sensor::Accel, &row, error, rest.variance);
-        }
-        Ok(equations)
-    })
+    gauss_newton(*from, |triads| equations(run, dwells, triads))
+}
+
+/// `|f| = g` in every dwell.
+pub(super) fn equations(
+    run: &Run,
+    dwells: &[Dwell],
+    triads: &PerSensor<Triad>,
+) -> Result<Equations, CalibrationError> {
+    let mut equations = Equations::new(run, triads, &[Sensor::Accel]);
+    let triad = &triads.accel;
+    let correction = triad.correction().ok_or_else(|| singular(triads))?;
+    let response = triad.response();
+    for dwell in dwells {
+        let rest = dwell.mean(Sensor::Accel, run);
+        let force = correction * (rest.output - triad.bias);
+        let direction = force.normalize();
+        let row = TriadVector::from_fn(|p, _| {
+            direction.dot(&(correction * (response[p] * force.push(1.0))))
+        });
+        let error = force.norm() - run.site.gravity;
+        equations.add(Sensor::Accel, &row, error, rest.variance);
+    }
+    Ok(equations)
 }

@@ -17,7 +17,17 @@ use crate::run::{Dwell, MeanOutput, Run};
 /// percents need four rounds.
 const ROUNDS: usize = 6;
 
-/// The gyros, and the attitude at the first sample of the first dwell; and the 1σ of its heading, rad.
+/// Gyros and attitude as gravity and the rates at rest show them.
+pub(super) struct Gyros {
+    /// The triads, and the attitude at the first sample of the first dwell.
+    pub at: Linearisation,
+    /// 1σ of its heading, rad.
+    pub heading_sigma: f64,
+    /// What they are found from, made at them.
+    pub equations: Equations,
+}
+
+/// The gyros and the attitude.
 ///
 /// Over a turn between two dwells the gyros must carry the direction of gravity from where the
 /// accelerometers saw it before to where they see it after; at rest they must sense Earth rate.
@@ -28,7 +38,7 @@ pub(super) fn gyros_and_attitude(
     run: &Run,
     dwells: &[Dwell],
     triads: &PerSensor<Triad>,
-) -> Result<(Linearisation, f64), CalibrationError> {
+) -> Result<Gyros, CalibrationError> {
     let up = gravity_directions(run, dwells, triads)?;
     let rests: Vec<MeanOutput> = dwells
         .iter()
@@ -42,21 +52,28 @@ pub(super) fn gyros_and_attitude(
     // Within Earth rate the output at rest is the bias.
     let outputs: Vector3<f64> = rests.iter().map(|rest| rest.output).sum();
     at.triads.gyro.bias = outputs / rests.len() as f64;
-    let mut heading_sigma = f64::INFINITY;
-    for _ in 0..ROUNDS {
+    let mut round = 0;
+    loop {
         let mut chain = Chain::new(run, dwells, &at, &up)?;
         let compass = chain.gyrocompass(run, &at.triads, &rests)?;
         chain.turn(&compass.turn);
-        heading_sigma = compass.sigma;
         at.initial_attitude = chain.attitudes[0];
         at.triads.gyro.bias += at.triads.gyro.sensitivity() * compass.bias;
-        let step = chain.equations(run, &at.triads, &rests, &compass)?.solve();
+        let equations = chain.equations(run, &at.triads, &rests, &compass)?;
+        if round == ROUNDS {
+            return Ok(Gyros {
+                at,
+                heading_sigma: compass.sigma,
+                equations,
+            });
+        }
+        let step = equations.solve();
         if !step.iter().all(|v| v.is_finite()) {
             return Err(singular(triads));
         }
         at.triads = from_vector(at.triads.gyro.form, &(to_vector(&at.triads) + step));
+        round += 1;
     }
-    Ok((at, heading_sigma))
 }
 
 /// Direction of specific force along body axes in each dwell, and with it Up.
