@@ -25,11 +25,10 @@ pub struct Position {
     pub input: Vector3<f64>,
     /// Mean normalised output, rad/s or m/s².
     pub output: Vector3<f64>,
-    /// Variance of each output axis, (rad/s)² or (m/s²)², by which it is weighted.
+    /// Variance of each output axis, (rad/s)² or (m/s²)².
     pub variance: Vector3<f64>,
-    /// Variance beyond that, which widens the σ but has no weight: the second order of an attitude that
-    /// is known to degrees only.
-    pub second_order: Vector3<f64>,
+    /// The same, by which it is weighted: the variance itself unless that would trust it too much.
+    pub weighted: Vector3<f64>,
 }
 
 /// Where the inputs of a closed form are known from.
@@ -205,7 +204,7 @@ pub fn six_position_triad(
     // A size for the inputs, so that columns are of one size.
     let unscale = Matrix4::from_diagonal(&Vector4::new(1.0 / size, 1.0 / size, 1.0 / size, 1.0));
     for axis in 0..3 {
-        let sigma = |p: &Position| p.variance[axis].sqrt().max(NOISELESS * size);
+        let sigma = |p: &Position| p.weighted[axis].sqrt().max(NOISELESS * size);
         let design = Mat::from_fn(positions.len(), 4, |i, j| {
             let p = &positions[i];
             (if j < 3 { p.input[j] / size } else { 1.0 }) / sigma(p)
@@ -232,15 +231,13 @@ pub fn six_position_triad(
             a[(axis, column)] = solution[(column, 0)] / size;
         }
         bias[axis] = solution[(3, 0)];
-        let inverse = information.try_inverse()?;
-        let beyond: Matrix4<f64> = (0..positions.len())
-            .map(|k| {
-                let row = Vector4::from_fn(|j, _| design[(k, j)]);
-                let ratio = positions[k].second_order[axis] / sigma(&positions[k]).powi(2);
-                row * row.transpose() * ratio
-            })
-            .sum();
-        covariance[axis] = unscale * (inverse + inverse * beyond * inverse) * unscale;
+        // By weights that need not be the inverse variances.
+        let inverse = unscale * information.try_inverse()?;
+        for (k, position) in positions.iter().enumerate() {
+            let of_output = inverse * Vector4::from_fn(|j, _| design[(k, j)]) / sigma(position);
+            let variance = position.variance[axis].max((NOISELESS * size).powi(2));
+            covariance[axis] += of_output * variance * of_output.transpose();
+        }
     }
     let triad = Triad::from_sensitivity(form, &a, bias);
     triad.correction()?;
@@ -290,12 +287,13 @@ fn position(run: &Run, dwell: &Dwell, sensor: Sensor) -> Option<Position> {
     let input = position.attitude.tr_mul(&known);
     let attitude =
         table.position_sigma.powi(2) + table.reading_sigma.powi(2) / position.readings.len() as f64;
+    // A wrong attitude turns the other two components of the input into a third.
+    let variance = Vector3::repeat(noise) + across(&input) * attitude;
     Some(Position {
         input,
         output,
-        // A wrong attitude turns the other two components of the input into a third.
-        variance: Vector3::repeat(noise) + across(&input) * attitude,
-        second_order: Vector3::zeros(),
+        variance,
+        weighted: variance,
     })
 }
 

@@ -14,13 +14,12 @@ use super::error::CalibrationError;
 use super::linearisation::{Linearisation, singular};
 use super::outcome::{Estimate, from_vector, to_vector};
 use super::schedule::first_reading;
-use super::states::ParameterMatrix;
 use crate::attitude::exp;
 use crate::imu::{FurtherVector, InstallationForm, PerSensor, Triad};
 use crate::run::{Dwell, Run, TableRecord};
 use crate::units::{ARCSEC, DEGREE};
 use equations::Equations;
-use turns::Gyros;
+use turns::Turned;
 
 /// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
 const STEPS: usize = 6;
@@ -128,9 +127,9 @@ pub fn coarse_start(
         }),
         _ => {
             let triads = gravity::accelerometers(run, dwells, &run.prior_mean(form))?;
-            let Gyros {
+            let Turned {
                 at, heading_sigma, ..
-            } = turns::gyros_and_attitude(run, dwells, &triads)?;
+            } = turns::triads_and_attitude(run, dwells, &triads)?;
             Ok(CoarseStart {
                 at,
                 attitude: AttitudePrior::of_alignment(at.initial_attitude, heading_sigma),
@@ -156,20 +155,12 @@ pub(super) fn by_gravity(
 ) -> Result<ByGravity, CalibrationError> {
     enough(dwells)?;
     let triads = gravity::accelerometers(run, dwells, &run.prior_mean(form))?;
-    let accelerometers = gravity::equations(run, dwells, &triads)?;
-    let gyros = turns::gyros_and_attitude(run, dwells, &triads)?;
-    let triads = gyros.at.triads;
-    let mut covariance = ParameterMatrix::zeros();
-    let (mut sum, mut count) = (0.0, 0);
-    for equations in [accelerometers, gyros.equations] {
-        covariance += equations.covariance().ok_or_else(|| singular(&triads))?;
-        let (squares, more) = equations.misfit();
-        sum += squares;
-        count += more;
-    }
+    let Turned { at, equations, .. } = turns::triads_and_attitude(run, dwells, &triads)?;
+    let triads = at.triads;
+    let covariance = equations.covariance().ok_or_else(|| singular(&triads))?;
     Ok(ByGravity {
         estimate: Estimate { triads, covariance },
-        misfit: sum / count as f64,
+        misfit: equations.misfit(),
     })
 }
 

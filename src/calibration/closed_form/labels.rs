@@ -11,7 +11,7 @@ use super::super::error::CalibrationError;
 use super::{ClosedForm, Position, Reference, across, both_triads, unobserved};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor};
-use crate::run::{Dwell, LabelledMotion, MeanOutput, Run};
+use crate::run::{Dwell, LabelledMotion, Run};
 
 /// Both triads from the sections whose labels say how the instrument stands or turns.
 pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
@@ -27,25 +27,32 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
             position: None,
         };
         let duration = section.samples.len() as f64 * run.imu.period;
-        let mean = |sensor| section.mean(sensor, run);
+        let of_gyro = section.mean(Sensor::Gyro, run);
+        let noise = Vector3::repeat(of_gyro.variance);
         match motion {
             LabelledMotion::Stands { up } => {
+                let of_accel = section.mean(Sensor::Accel, run);
+                let white = Vector3::repeat(of_accel.variance);
                 let force = up * run.site.gravity;
-                let accel = set_by_hand(run, force, mean(Sensor::Accel));
-                positions.accel.push(accel);
+                positions.accel.push(Position {
+                    // As if nothing were known of how gravity falls on the other two axes: so the bias
+                    // of each comes from its own two positions, as in half sums.
+                    weighted: white + across(&force),
+                    ..set_by_hand(run, force, of_accel.output, white)
+                });
                 // Which way is north is not known, so what is level of Earth rate is noise.
                 let earth_rate = run.site.earth_rate_n();
-                let mut gyro = set_by_hand(run, up * earth_rate.z, mean(Sensor::Gyro));
-                gyro.variance += across(&up) * (0.5 * earth_rate.y.powi(2));
+                let level = across(&up) * (0.5 * earth_rate.y.powi(2));
+                let rate = up * earth_rate.z;
+                let gyro = set_by_hand(run, rate, of_gyro.output, noise + level);
                 positions.gyro.push(gyro);
                 standing_time += duration;
             }
             LabelledMotion::Turns { axis, angle } => {
                 let rate = axis * (angle / duration);
-                let mut gyro = set_by_hand(run, rate, mean(Sensor::Gyro));
                 let end = (run.segment_sigma / duration).powi(2) + ROTATION_RATE.powi(2);
-                gyro.variance.add_scalar_mut(end);
-                positions.gyro.push(gyro);
+                let noise = noise.add_scalar(end);
+                positions.gyro.push(set_by_hand(run, rate, of_gyro.output, noise));
                 turns += 1;
             }
         }
@@ -68,18 +75,18 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
     })
 }
 
-/// An input along or about an axis that is within a degree or so of where it should be.
+/// An input along or about an axis that is within a degree or so of where it should be, and this noise.
 ///
-/// To first order that turns the input into the other two axes, whose weight is therefore small; along
-/// the axis it takes off the second order, which has no weight (no position is better than another) but
-/// is in the σ.
-fn set_by_hand(run: &Run, input: Vector3<f64>, mean: MeanOutput) -> Position {
-    let variance = run.segment_sigma.powi(2);
+/// To first order that turns the input into the other two axes. Along the axis it takes off the second
+/// order: half the sum of two squared angles, whose mean square is twice the fourth power of one's σ.
+fn set_by_hand(run: &Run, input: Vector3<f64>, output: Vector3<f64>, noise: Vector3<f64>) -> Position {
+    let turn = run.segment_sigma.powi(2);
+    let along = input.map(|component| 2.0 * (component * turn).powi(2));
+    let variance = noise + across(&input) * turn + along;
     Position {
         input,
-        output: mean.output,
-        variance: across(&input) * variance + Vector3::repeat(mean.variance),
-        // Half the sum of two squared angles; its mean square is twice that of one.
-        second_order: input.map(|component| 2.0 * (component * variance).powi(2)),
+        output,
+        variance,
+        weighted: variance,
     }
 }

@@ -47,12 +47,14 @@ impl Equations {
         equations
     }
 
-    /// An equation `error = row δθ` of one triad's parameters, its error of this variance.
-    pub(super) fn add(&mut self, sensor: Sensor, row: &TriadVector, error: f64, variance: f64) {
+    /// An equation `error = Σ row δθ` of triads' parameters, its error of this variance.
+    pub(super) fn add(&mut self, rows: &[(Sensor, TriadVector)], error: f64, variance: f64) {
         let mut whole = ParameterVector::zeros();
-        whole
-            .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
-            .copy_from(row);
+        for (sensor, row) in rows {
+            whole
+                .fixed_rows_mut::<PER_TRIAD>(parameter(*sensor, 0))
+                .copy_from(row);
+        }
         self.add_row(whole, error, variance);
     }
 
@@ -96,11 +98,11 @@ impl Equations {
         Some(covariance)
     }
 
-    /// Sum of squared errors, each over its σ, the prior's included, and how many more there are than
-    /// unknown parameters.
-    pub(super) fn misfit(&self) -> (f64, usize) {
-        let sum = self.rows.iter().map(|(_, error)| error.powi(2)).sum();
-        (sum, self.rows.len() - self.unknown.len())
+    /// Mean square of the errors, each over its σ and the prior's included; one if nothing but noise is
+    /// left.
+    pub(super) fn misfit(&self) -> f64 {
+        let sum: f64 = self.rows.iter().map(|(_, error)| error.powi(2)).sum();
+        sum / (self.rows.len() - self.unknown.len()) as f64
     }
 
     /// The step δθ of least squares.
