@@ -88,12 +88,27 @@ const NOISELESS: f64 = 1e-9;
 /// # Errors
 /// [`CalibrationError`] if the positions do not determine the twelve numbers of a triad.
 pub fn six_position(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
-    if run.table.is_some() {
-        six_position_of(run, &run.dwells(), form)
+    let reference = if run.table.is_some() {
+        Reference::Table
     } else if run.segments.iter().any(|s| s.motion.is_some()) {
-        labels::by_labels(run, form)
+        Reference::Labels
     } else {
-        gravity::by_gravity(run, form)
+        Reference::Gravity
+    };
+    six_position_by(reference, run, &run.dwells(), form)
+}
+
+/// The same by what the inputs are to be known from; labels need no dwells.
+pub(super) fn six_position_by(
+    reference: Reference,
+    run: &Run,
+    dwells: &[Dwell],
+    form: InstallationForm,
+) -> Result<ClosedForm, CalibrationError> {
+    match reference {
+        Reference::Table => six_position_of(run, dwells, form),
+        Reference::Labels => labels::by_labels(run, form),
+        Reference::Gravity => gravity::by_gravity(run, dwells, form),
     }
 }
 
@@ -147,8 +162,7 @@ fn both_triads(
     let mut covariance = ParameterMatrix::zeros();
     let mut triads = PerSensor::from_fn(|_| Triad::ideal(form));
     for sensor in Sensor::ALL {
-        let (triad, of_triad) =
-            six_position_triad(positions.get(sensor), form).ok_or(sensor)?;
+        let (triad, of_triad) = six_position_triad(positions.get(sensor), form).ok_or(sensor)?;
         *triads.get_mut(sensor) = triad;
         let first = parameter(sensor, 0);
         covariance
@@ -221,7 +235,9 @@ pub fn six_position_triad(
         // weights.
         let weight = information.diagonal().map(|v: f64| v.sqrt().recip());
         let weight = Matrix4::from_diagonal(&weight);
-        let smallest = (weight * information * weight).symmetric_eigenvalues().min();
+        let smallest = (weight * information * weight)
+            .symmetric_eigenvalues()
+            .min();
         // Not a number where an input is never there.
         if !(smallest > SMALLEST_EIGENVALUE) {
             return None;

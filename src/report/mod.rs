@@ -22,6 +22,7 @@ mod number;
 mod page;
 mod panel;
 mod path;
+mod quality;
 pub mod side_by_side;
 mod sigma;
 mod study;
@@ -38,9 +39,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::calibration::BlockEffect;
 use crate::calibration::outcome::{Estimate, Outcome, to_vector};
 use crate::calibration::states::ParameterVector;
+use crate::calibration::{BlockEffect, Quality};
 use crate::imu::{PerSensor, Triad};
 use crate::run::Run;
 use crate::run::record::{BodyFrame, TermRecord};
@@ -66,6 +67,8 @@ pub struct Report<'a> {
     pub truth: Option<&'a PerSensor<Triad>>,
     /// True constants beside them by name, as far as they are known.
     pub true_terms: &'a BTreeMap<String, TermRecord>,
+    /// What the calibration leaves of gravity and turns.
+    pub quality: Option<&'a Quality>,
     /// Intervals during which the table stands, s.
     pub dwells: &'a [Range<f64>],
     /// What the calibrations are worth in navigation, the closed form first; or why that cannot be

@@ -51,6 +51,7 @@ impl Synthetic {
             body_frame: self.run.body_frame(),
             outcome: Some(&self.outcome),
             effects: &[],
+            quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {
                 estimate: &self.closed,
@@ -159,7 +160,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         files: Vec::new(),
         notes: Vec::new(),
         segments: Vec::new(),
-            segment_sigma: SET_BY_HAND,
+        segment_sigma: SET_BY_HAND,
     }
 }
 

@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
-use super::{Report, blocks, further, navigation, side_by_side};
+use super::{Report, blocks, further, navigation, quality, side_by_side};
 use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
@@ -22,6 +22,9 @@ impl Report<'_> {
         if let Some(line) = navigation::outlook::line(self.navigation.unwrap_or_default()) {
             let _ = writeln!(text, "\n{line}");
         }
+        if let Some(left) = self.quality_table() {
+            let _ = write!(text, "\n{}\n{}", left.title, columns(&left));
+        }
         for of_blocks in blocks::tables(self.effects) {
             let _ = write!(text, "\n{}\n{}", of_blocks.title, columns(&of_blocks));
         }
@@ -29,6 +32,11 @@ impl Report<'_> {
             let _ = writeln!(text, "\nWarning: {warning}");
         }
         text
+    }
+
+    /// What the calibration leaves of gravity and turns.
+    pub(super) fn quality_table(&self) -> Option<side_by_side::Table> {
+        quality::table(self.quality?, self.run)
     }
 
     /// What a calibration engineer must know before using the figures.

@@ -23,8 +23,8 @@ mod write;
 pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
 pub(crate) use quantity::unit_scale;
-pub use record::CalibrationRecord;
 pub use read::SET_BY_HAND;
+pub use record::CalibrationRecord;
 pub use segments::{LabelledMotion, Segment};
 pub use state_block::StateBlock;
 pub use table_geometry::{

@@ -136,7 +136,16 @@ mod tests {
             panic!("no turn");
         };
         assert_eq!(axis * angle, Vector3::z() * (360.0 * DEGREE));
-        for other in ["still", "x_left", "w_up", "rot_", "rot_x", "rot_é+90", "rot_x+NaN", "_up"] {
+        for other in [
+            "still",
+            "x_left",
+            "w_up",
+            "rot_",
+            "rot_x",
+            "rot_é+90",
+            "rot_x+NaN",
+            "_up",
+        ] {
             assert_eq!(of(other), None, "{other}");
         }
     }

@@ -4,18 +4,21 @@ use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
 use super::{ClosedForm, Reference, unobserved};
 use crate::imu::{InstallationForm, PerSensor};
-use crate::run::Run;
+use crate::run::{Dwell, Run};
 
 /// Weighted residuals above this times what noise makes are worth a warning.
 const DOUBTFUL: f64 = 1.2;
 
 /// Both triads from whatever positions there are, tied down by the prior where they are too few.
-pub(super) fn by_gravity(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
+pub(super) fn by_gravity(
+    run: &Run,
+    dwells: &[Dwell],
+    form: InstallationForm,
+) -> Result<ClosedForm, CalibrationError> {
     if !run.imu.continuous {
         return Err(CalibrationError::NotContinuous);
     }
-    let dwells = run.dwells();
-    let ByGravity { estimate, misfit } = coarse::by_gravity(run, &dwells, form)?;
+    let ByGravity { estimate, misfit } = coarse::by_gravity(run, dwells, form)?;
     let mut warnings = unobserved(run, &estimate, Reference::Gravity);
     let misfit = misfit.sqrt();
     if misfit > DOUBTFUL {

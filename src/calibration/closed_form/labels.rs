@@ -52,7 +52,9 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
                 let rate = axis * (angle / duration);
                 let end = (run.segment_sigma / duration).powi(2) + ROTATION_RATE.powi(2);
                 let noise = noise.add_scalar(end);
-                positions.gyro.push(set_by_hand(run, rate, of_gyro.output, noise));
+                positions
+                    .gyro
+                    .push(set_by_hand(run, rate, of_gyro.output, noise));
                 turns += 1;
             }
         }
@@ -79,7 +81,12 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
 ///
 /// To first order that turns the input into the other two axes. Along the axis it takes off the second
 /// order: half the sum of two squared angles, whose mean square is twice the fourth power of one's σ.
-fn set_by_hand(run: &Run, input: Vector3<f64>, output: Vector3<f64>, noise: Vector3<f64>) -> Position {
+fn set_by_hand(
+    run: &Run,
+    input: Vector3<f64>,
+    output: Vector3<f64>,
+    noise: Vector3<f64>,
+) -> Position {
     let turn = run.segment_sigma.powi(2);
     let along = input.map(|component| 2.0 * (component * turn).powi(2));
     let variance = noise + across(&input) * turn + along;

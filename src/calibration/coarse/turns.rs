@@ -8,7 +8,7 @@ use super::super::outcome::{from_vector, to_vector};
 use super::equations::Equations;
 use super::gravity::{add_size, input_errors};
 use super::heading::{Gyrocompass, Rest, gyrocompass};
-use crate::attitude::{exp, skew, tilt};
+use crate::attitude::{exp, level, skew, tilt};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{FurtherVector, PARAMETERS, PerSensor, Sensor, Triad};
 use crate::navigation::{Block, Navigator, State};
@@ -59,7 +59,8 @@ pub(super) fn triads_and_attitude(
     let mut round = 0;
     loop {
         let up = gravity_directions(run, dwells, &at.triads)?;
-        at.initial_attitude = exp(tilt(&(at.initial_attitude * up[0].direction))) * at.initial_attitude;
+        at.initial_attitude =
+            exp(tilt(&(at.initial_attitude * up[0].direction))) * at.initial_attitude;
         let mut chain = Chain::new(run, dwells, &at, &up)?;
         let compass = chain.gyrocompass(run, &at.triads, &rests)?;
         chain.turn(&compass.turn);
@@ -115,17 +116,6 @@ struct Up {
     direction: Vector3<f64>,
     /// Its error by the error of each accelerometer parameter; what is along it means nothing.
     error: SMatrix<f64, 3, PARAMETERS>,
-}
-
-/// Some attitude in which this direction along body axes is up.
-fn level(up: &Vector3<f64>) -> Matrix3<f64> {
-    let across = Vector3::ith(up.iamin(), 1.0);
-    let east = across.cross(up).normalize();
-    Matrix3::from_rows(&[
-        east.transpose(),
-        up.cross(&east).transpose(),
-        up.transpose(),
-    ])
 }
 
 /// Attitudes of all dwells, one carried to the next by the gyros and levelled there.

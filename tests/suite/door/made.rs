@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
 use turncal::imu::{Instability, Noise, Nominal, PerSensor, Prior, Sensor};
-use turncal::units::DEGREE;
 use turncal::run::{ImuRecord, LabelledMotion, Run, Segment, Standstill, TableRecord};
+use turncal::units::DEGREE;
 
 /// A run that turns and stands, with every optional part.
 pub fn made_run(name: &str) -> Run {
