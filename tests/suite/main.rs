@@ -4,6 +4,7 @@ mod allan;
 mod apply;
 mod batch;
 mod block_effects;
+mod by_hand;
 mod calibration_file;
 mod cli;
 mod compare;
