@@ -10,6 +10,7 @@ mod cli;
 mod compare;
 mod door;
 mod export;
+mod fuzz;
 mod navigate;
 mod navigation;
 mod observability;
