@@ -9,6 +9,7 @@ mod cli;
 mod compare;
 mod door;
 mod export;
+mod faults;
 mod navigate;
 mod navigation;
 mod observability;
