@@ -78,7 +78,7 @@ pub struct Run {
     pub segments: Vec<Segment>,
     /// The files that it was read from; none if it was made.
     pub files: Vec<PathBuf>,
-    /// What the files say that has no effect yet, a sentence each.
+    /// What is wrong with the files and was mended, and what they say without effect, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -116,7 +116,7 @@ pub struct ImuRecord {
     pub start: f64,
     /// Length of every sample, s.
     pub period: f64,
-    /// Whether each sample begins where the one before ended.
+    /// Whether each sample begins where the one before ended, and none is lost beyond interpolation.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Vec<Vector3<f64>>,
