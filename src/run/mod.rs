@@ -20,6 +20,7 @@ mod segments;
 pub(crate) mod state_block;
 mod table_geometry;
 mod table_log;
+mod uniform;
 mod whole;
 mod write;
 
