@@ -107,10 +107,10 @@ impl ClosedForm {
     /// # Errors
     /// [`CalibrationError`] where the run is not the one of the closed form.
     pub fn quality(&self, run: &Run) -> Result<Quality, CalibrationError> {
-        let dwells = match run.imu.continuous {
-            true => run.dwells(),
+        let dwells = match self.reference {
             // Nothing is known of what lies between sections.
-            false => labelled_positions(run),
+            Reference::Labels if !run.imu.continuous => labelled_positions(run),
+            _ => run.dwells(),
         };
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
             let at = Linearisation {

@@ -4,12 +4,15 @@
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
 mod axes;
+mod clock;
 mod csv_file;
 mod dwells;
 mod error;
+mod faults;
 mod fields;
 mod imu_log;
 mod instrument;
+mod log_facts;
 mod quantity;
 mod read;
 pub mod record;
@@ -17,11 +20,14 @@ mod segments;
 pub(crate) mod state_block;
 mod table_geometry;
 mod table_log;
+mod uniform;
 mod whole;
 mod write;
 
 pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
+pub use faults::{Bridge, Fault, FaultKind};
+pub use log_facts::{ColumnFacts, LogFacts, TemperatureFacts};
 pub(crate) use quantity::unit_scale;
 pub use read::SET_BY_HAND;
 pub use record::CalibrationRecord;
@@ -77,7 +83,7 @@ pub struct Run {
     pub segment_sigma: f64,
     /// The files that it was read from; none if it was made.
     pub files: Vec<PathBuf>,
-    /// What the files say that has no effect yet, a sentence each.
+    /// What is wrong with the files and was mended, and what they say without effect, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -115,7 +121,7 @@ pub struct ImuRecord {
     pub start: f64,
     /// Length of every sample, s.
     pub period: f64,
-    /// Whether each sample begins where the one before ended.
+    /// Whether each sample begins where the one before ended, and none is lost beyond interpolation.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Vec<Vector3<f64>>,
@@ -123,6 +129,12 @@ pub struct ImuRecord {
     pub accel: Vec<Vector3<f64>>,
     /// Size of one pulse, rad and m/s, where samples are whole pulses; zero otherwise.
     pub pulse: PerSensor<f64>,
+    /// What was wrong with the file's samples, in order of kind, axis and time.
+    pub faults: Vec<Fault>,
+    /// Interpolated samples, in order of triad, axis and time; those of one axis do not overlap.
+    pub bridges: Vec<Bridge>,
+    /// The file that the samples are from; none if they were made.
+    pub log: Option<LogFacts>,
 }
 
 impl ImuRecord {

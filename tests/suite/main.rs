@@ -10,6 +10,7 @@ mod cli;
 mod compare;
 mod door;
 mod export;
+mod faults;
 mod fuzz;
 mod navigate;
 mod navigation;

@@ -16,7 +16,7 @@ pub(super) fn by_gravity(
     form: InstallationForm,
 ) -> Result<ClosedForm, CalibrationError> {
     if !run.imu.continuous {
-        return Err(CalibrationError::NotContinuous);
+        return Err(CalibrationError::not_continuous(&run.imu));
     }
     let ByGravity { estimate, misfit } = coarse::by_gravity(run, dwells, form)?;
     let mut warnings = unobserved(run, &estimate, Reference::Gravity);
