@@ -125,6 +125,9 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
                 gyro: 0.1 * ARCSEC,
                 accel: 1e-4,
             },
+            faults: Vec::new(),
+            bridges: Vec::new(),
+            log: None,
         },
         noise: PerSensor {
             gyro: Noise {

@@ -115,6 +115,9 @@ impl ImuLog<'_> {
             gyro: samples.gyro,
             accel: samples.accel,
             pulse,
+            faults: Vec::new(),
+            bridges: Vec::new(),
+            log: None,
         })
     }
 

@@ -7,9 +7,11 @@ mod axes;
 mod csv_file;
 mod dwells;
 mod error;
+mod faults;
 mod fields;
 mod imu_log;
 mod instrument;
+mod log_facts;
 mod quantity;
 mod read;
 pub mod record;
@@ -22,6 +24,8 @@ mod write;
 
 pub use dwells::{Dwell, MeanOutput, Position};
 pub use error::{Place, RunError};
+pub use faults::{Bridge, Fault, FaultKind};
+pub use log_facts::{ColumnFacts, LogFacts, TemperatureFacts};
 pub(crate) use quantity::unit_scale;
 pub use record::CalibrationRecord;
 pub use state_block::StateBlock;
@@ -119,6 +123,12 @@ pub struct ImuRecord {
     pub accel: Vec<Vector3<f64>>,
     /// Size of one pulse, rad and m/s, where samples are whole pulses; zero otherwise.
     pub pulse: PerSensor<f64>,
+    /// What was wrong with the file's samples, in order of kind, axis and time.
+    pub faults: Vec<Fault>,
+    /// Interpolated samples, in order of triad, axis and time; those of one axis do not overlap.
+    pub bridges: Vec<Bridge>,
+    /// The file that the samples are from; none if they were made.
+    pub log: Option<LogFacts>,
 }
 
 impl ImuRecord {

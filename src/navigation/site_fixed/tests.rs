@@ -22,6 +22,9 @@ fn record() -> ImuRecord {
             .map(|k| Vector3::new(1.0, -2.0 * t(k), 9.6) * PERIOD)
             .collect(),
         pulse: PerSensor::default(),
+        faults: Vec::new(),
+        bridges: Vec::new(),
+        log: None,
     }
 }
 

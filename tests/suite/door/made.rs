@@ -19,6 +19,9 @@ pub fn made_run(name: &str) -> Run {
             .map(|k| Vector3::new(0.1, -0.02, 9.8) / 128.0 * (1.0 + 1e-3 * f64::from(k)))
             .collect(),
         pulse: PerSensor::default(),
+        faults: Vec::new(),
+        bridges: Vec::new(),
+        log: None,
     };
     let prior = Prior {
         scale_sigma: Vector3::new(1e-3, 2e-3, 3e-3),
