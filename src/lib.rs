@@ -14,6 +14,7 @@
 
 pub mod attitude;
 pub mod calibration;
+pub mod draft;
 pub mod earth;
 pub mod export;
 pub mod imu;

@@ -7,6 +7,7 @@ mod calibrate;
 mod compare;
 mod demo;
 mod export;
+mod init;
 mod names;
 mod navigate;
 mod noise;
@@ -41,6 +42,7 @@ enum Command {
     Apply(apply::Apply),
     Export(export::Export),
     Study(study::Study),
+    Init(init::Init),
     Allan(allan::Allan),
     Noise(noise::Noise),
 }
@@ -57,6 +59,7 @@ impl Cli {
             Command::Apply(apply) => apply.run(),
             Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
+            Command::Init(init) => init.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
         }

@@ -16,6 +16,7 @@ mod quantity;
 mod read;
 pub mod record;
 mod segments;
+mod sheet;
 pub(crate) mod state_block;
 mod table_geometry;
 mod table_log;
@@ -28,6 +29,7 @@ pub use faults::{Bridge, Fault, FaultKind};
 pub use log_facts::{ColumnFacts, LogFacts, TemperatureFacts};
 pub(crate) use quantity::unit_scale;
 pub use record::CalibrationRecord;
+pub(crate) use sheet::Sheet;
 pub use state_block::StateBlock;
 pub use table_geometry::{
     AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,
