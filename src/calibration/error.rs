@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::imu::Sensor;
-use crate::run::StateBlock;
+use crate::run::{ImuRecord, StateBlock};
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
 /// and what to do.
@@ -33,6 +33,16 @@ pub enum CalibrationError {
          beginning to its end; use --method six-position, or give one unbroken record"
     )]
     NotContinuous,
+    /// A gap in the record, or an axis lost for a while, beyond interpolation.
+    #[error(
+        "{lost}: what the instrument did there is not known well enough to go on navigating, and the \
+         filter navigates from beginning to end; use --method six-position, or cut the record so \
+         that this part is left out"
+    )]
+    Unbridged {
+        /// What is missing, where.
+        lost: String,
+    },
     /// A prior of σ zero or an estimate that went astray.
     #[error(
         "the sensitivity matrix K·C of the {} became singular: the data and [imu.prior.{0}] \
@@ -72,6 +82,14 @@ pub enum CalibrationError {
         /// Time in the record, s.
         time: f64,
     },
+}
+
+impl CalibrationError {
+    /// Why a record that is not continuous is not.
+    pub(crate) fn not_continuous(imu: &ImuRecord) -> Self {
+        imu.unbridged()
+            .map_or(Self::NotContinuous, |lost| Self::Unbridged { lost })
+    }
 }
 
 /// Why calibrations cannot be compared.

@@ -50,7 +50,7 @@ pub fn estimate(
     progress: Progress,
 ) -> Result<Outcome, CalibrationError> {
     if !run.imu.continuous {
-        return Err(CalibrationError::NotContinuous);
+        return Err(CalibrationError::not_continuous(&run.imu));
     }
     let dwells = run.dwells();
     let schedule = Schedule::new(run, &dwells)?;

@@ -173,14 +173,14 @@ impl Moments {
         self.add_further(attitude, responses, &force, duration);
     }
 
-    /// The block of these integrals. `random_walk` are the noise densities of both triads, rad/√s
-    /// and (m/s)/√s.
+    /// The block of these integrals. `noise` is the covariance, in `n`, that white noise of each triad
+    /// adds to the integral of its input over the stretch, rad² and (m/s)².
     pub(super) fn block(
         &self,
         state: State,
         earth_rate: &Vector3<f64>,
         responses: PerSensor<&CorrectedResponse>,
-        random_walk: &PerSensor<f64>,
+        noise: &PerSensor<Matrix3<f64>>,
     ) -> Block {
         let t = self.duration;
         let force = skew(self.force);
@@ -245,23 +245,21 @@ impl Moments {
             navigation,
             parameters,
             further: further.collect(),
-            noise: self.noise(random_walk),
+            noise: self.noise(noise),
         }
     }
 
     /// White noise through the chain attitude → velocity → position over the stretch, with the mean
     /// specific force (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).
-    fn noise(&self, random_walk: &PerSensor<f64>) -> BlockMatrix {
+    fn noise(&self, PerSensor { gyro, accel }: &PerSensor<Matrix3<f64>>) -> BlockMatrix {
         let t = self.duration;
         let mut noise = BlockMatrix::zeros();
         if t == 0.0 {
             return noise;
         }
         let force = skew(self.force / t);
-        let force2 = force * force.transpose();
-        let identity = Matrix3::identity();
-        let gyro = random_walk.gyro.powi(2);
-        let accel = random_walk.accel.powi(2);
+        let tilting = force * gyro;
+        let both = tilting * force.transpose();
         let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
             noise
                 .fixed_view_mut::<3, 3>(3 * row, 3 * column)
@@ -272,21 +270,13 @@ impl Moments {
                     .copy_from(&m.transpose());
             }
         };
-        let (t2, t3) = (t * t, t * t * t);
-        set(0, 0, identity * (gyro * t));
-        set(1, 0, force * (gyro * t2 / 2.0));
-        set(2, 0, force * (gyro * t3 / 6.0));
-        set(1, 1, identity * (accel * t) + force2 * (gyro * t3 / 3.0));
-        set(
-            2,
-            1,
-            identity * (accel * t2 / 2.0) + force2 * (gyro * t3 * t / 8.0),
-        );
-        set(
-            2,
-            2,
-            identity * (accel * t3 / 3.0) + force2 * (gyro * t3 * t2 / 20.0),
-        );
+        let t2 = t * t;
+        set(0, 0, *gyro);
+        set(1, 0, tilting * (t / 2.0));
+        set(2, 0, tilting * (t2 / 6.0));
+        set(1, 1, accel + both * (t2 / 3.0));
+        set(2, 1, accel * (t / 2.0) + both * (t2 * t / 8.0));
+        set(2, 2, accel * (t2 / 3.0) + both * (t2 * t2 / 20.0));
         noise
     }
 }

@@ -141,7 +141,7 @@ impl<'a> Navigator<'a> {
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let period = self.imu.period;
         let mut moments = Moments::with_further(&self.further.on);
-        self.navigate(samples, |navigator, step| {
+        self.navigate(samples.clone(), |navigator, step| {
             let middle = (step.before + step.after) * 0.5;
             moments.add(&middle, &step.increments, &step.change, period);
             if let Some(sensed) = &step.sensed {
@@ -149,7 +149,7 @@ impl<'a> Navigator<'a> {
                 moments.add_further(&middle, &responses, &step.change, period);
             }
         });
-        self.block(&moments)
+        self.block(&samples, &moments)
     }
 
     /// The same where the table stands. What the instrument senses there is known, so the error
@@ -157,7 +157,7 @@ impl<'a> Navigator<'a> {
     /// innovations and the sensitivity to scale factors, and the two together look like information.
     pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
-        self.navigate(samples, |_, _| {});
+        self.navigate(samples.clone(), |_, _| {});
         let attitude = self.state.attitude;
         let force = -self.gravity;
         let mut moments = Moments::standing(&attitude, &self.earth_rate, &force, duration);
@@ -171,7 +171,7 @@ impl<'a> Navigator<'a> {
             let responses = self.responses(&sensed);
             moments.stand_further(&self.further.on, &attitude, &responses);
         }
-        self.block(&moments)
+        self.block(&samples, &moments)
     }
 
     /// Navigates through samples and tells `each` of every one.
@@ -214,9 +214,24 @@ impl<'a> Navigator<'a> {
         self.state = state;
     }
 
-    fn block(&self, moments: &Moments) -> Block {
+    fn block(&self, samples: &Range<usize>, moments: &Moments) -> Block {
         let responses = PerSensor::from_fn(|sensor| &self.instrument.get(sensor).response);
-        moments.block(self.state, &self.earth_rate, responses, &self.random_walk)
+        let noise = self.noise(samples);
+        moments.block(self.state, &self.earth_rate, responses, &noise)
+    }
+
+    /// Covariance in `n` that noise and interpolation add to the integrals of both triads' input.
+    fn noise(&self, samples: &Range<usize>) -> PerSensor<Matrix3<f64>> {
+        let duration = samples.len() as f64 * self.imu.period;
+        let mut noise = PerSensor::from_fn(|sensor| {
+            Matrix3::from_diagonal_element(self.random_walk.get(sensor).powi(2) * duration)
+        });
+        for (bridge, part) in self.imu.bridged(samples) {
+            let correction = &self.instrument.get(bridge.sensor).correction;
+            let error = self.state.attitude * correction.column(bridge.axis);
+            *noise.get_mut(bridge.sensor) += error * error.transpose() * (bridge.variance * part);
+        }
+        noise
     }
 }
 

@@ -30,6 +30,15 @@ impl BodyAxes {
         }
     }
 
+    /// Right, front or up, whichever an axis of the file lies along.
+    pub fn body_axis(self, of_file: usize) -> usize {
+        let along = |(axis, _)| axis == of_file;
+        self.sources()
+            .into_iter()
+            .position(along)
+            .unwrap_or(of_file)
+    }
+
     /// A vector along the file's axes, along right-front-up.
     pub fn vector(self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::from(self.sources().map(|(axis, sign)| sign * v[axis]))

@@ -173,24 +173,6 @@ impl CsvFile {
             .ok_or_else(|| self.not(column, "a finite number"))
     }
 
-    /// The time in a column of the row, which must be later than that of the row before.
-    pub fn time(&self, column: usize, before: Option<f64>) -> Result<f64, RunError> {
-        let time = self.number(column)?;
-        match before {
-            Some(before) if time == before => Err(self.error_here(
-                format_args!("time {time} s again, a duplicate of the row before"),
-                "a later time",
-                "Remove the duplicate row, or print times with more digits.",
-            )),
-            Some(before) if time < before => Err(self.error_here(
-                format_args!("time going back from {before} s to {time} s"),
-                "times that increase",
-                "Put the rows in order, or split the file where the clock was set.",
-            )),
-            _ => Ok(time),
-        }
-    }
-
     /// The text in a column of the row, not empty.
     pub fn text(&self, column: usize) -> Result<&str, RunError> {
         std::str::from_utf8(self.bytes(column))

@@ -35,6 +35,8 @@ pub struct Position {
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
+/// Shortest dwell worth a name, s.
+const SHORTEST: f64 = 0.5;
 /// Gyros that integrate to less than this have not turned, rad …
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 /// … beyond their noise …
@@ -63,6 +65,11 @@ impl Run {
                 _ => dwells.push(dwell),
             }
         }
+        let unbridged = || self.imu.faults.iter().filter(|fault| !fault.bridged);
+        dwells.retain_mut(|dwell| {
+            unbridged().for_each(|fault| dwell.leave_out(&fault.samples));
+            dwell.samples.len() as f64 * self.imu.period >= SHORTEST
+        });
         dwells
     }
 
@@ -119,6 +126,20 @@ impl Dwell {
             variance: run.noise.get(sensor).random_walk.powi(2) / duration
                 + run.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration),
         }
+    }
+
+    /// Keeps the longer of the parts before and after these samples.
+    fn leave_out(&mut self, lost: &Range<usize>) {
+        let Range { start, end } = self.samples;
+        if lost.start >= end || lost.end <= start {
+            return;
+        }
+        let (before, after) = (start..lost.start.max(start), lost.end.min(end)..end);
+        self.samples = if before.len() >= after.len() {
+            before
+        } else {
+            after
+        };
     }
 
     /// The first seconds of it; the attitude is that of all its readings.

@@ -1,13 +1,15 @@
 //! The instrument's samples.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
+use super::clock::{Clock, Stamp, Stamps, Uniform};
 use super::csv_file::CsvFile;
-use super::error::{Place, RunError};
-use super::{ImuRecord, nanoseconds};
+use super::error::RunError;
+use super::faults::{Repaired, Rows};
+use super::{ColumnFacts, ImuRecord, LogFacts, TemperatureFacts};
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
@@ -42,49 +44,138 @@ impl TimeStamp {
 /// What `run.toml` says of the file.
 pub(super) struct ImuLog<'a> {
     pub file: PathBuf,
-    pub time: &'a str,
+    pub clock: Clock<'a>,
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<&'a str>,
     pub output: Output,
     pub axes: BodyAxes,
     pub stamp: TimeStamp,
-    pub period: Option<f64>,
     pub continuous: bool,
     /// Along right-front-up.
     pub nominal: PerSensor<Nominal>,
+    /// Largest magnitude of a row's value.
+    pub full_scale: PerSensor<Option<f64>>,
+}
+
+/// What the file holds.
+struct Content {
+    stamps: Vec<(f64, u64)>,
+    /// Gyro x, y, z and accelerometer x, y, z as they stand.
+    columns: [Vec<f64>; 6],
+    /// Rows before each duplicate, and its line.
+    duplicates: Vec<(usize, u64)>,
+    temperature: Option<TemperatureFacts>,
 }
 
 impl ImuLog<'_> {
-    /// Reads the samples.
+    /// Reads the samples, finds what is wrong with them, and bridges it.
     pub fn read(&self) -> Result<ImuRecord, RunError> {
+        let Content {
+            stamps,
+            columns,
+            duplicates,
+            temperature,
+        } = self.content()?;
+        let clock = Uniform::new(&self.file, &stamps, self.clock.period)?;
+        let period = clock.period;
+        let seconds = match self.output {
+            Output::Pulse | Output::Increment => 1.0,
+            Output::Rate => period,
+        };
+        let body_axes = std::array::from_fn(|column| self.axes.body_axis(column % 3));
+        let sensor = |column: usize| Sensor::ALL[column / 3];
+        let names = [self.triads.gyro, self.triads.accel].concat();
+        let facts = std::array::from_fn(|k| ColumnFacts::of(names[k], &columns[k]));
+        let rows = Rows {
+            columns,
+            facts: &facts,
+            full_scale: std::array::from_fn(|k| *self.full_scale.get(sensor(k))),
+            body_axes,
+            units: std::array::from_fn(|k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]]),
+            lines: stamps.iter().map(|&(_, line)| line).collect(),
+            numbers: clock.numbers,
+            period,
+            duplicates,
+        };
+        let count = stamps.len() + rows.duplicates.len();
+        let Repaired {
+            columns,
+            faults,
+            bridges,
+        } = rows.repair();
+
+        let samples = PerSensor::from_fn(|sensor| {
+            let nominal = self.nominal.get(sensor).0;
+            let [x, y, z] = std::array::from_fn(|axis| &columns[3 * sensor as usize + axis]);
+            let rows = x.iter().zip(y).zip(z);
+            let sample = |((&x, &y), &z)| {
+                let row = self.axes.vector(Vector3::new(x, y, z));
+                (row * seconds).component_div(&nominal)
+            };
+            rows.map(sample).collect::<Vec<_>>()
+        });
+        let pulse = PerSensor::from_fn(|sensor| match self.output {
+            Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
+            Output::Increment | Output::Rate => 0.0,
+        });
+        let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
+        for (k, facts) in facts.into_iter().enumerate() {
+            of_axes.get_mut(sensor(k))[body_axes[k]] = facts;
+        }
+        Ok(ImuRecord {
+            start: clock.first - self.stamp.lag() * period,
+            period,
+            continuous: self.continuous && faults.iter().all(|fault| fault.bridged),
+            gyro: samples.gyro,
+            accel: samples.accel,
+            pulse,
+            faults,
+            bridges,
+            log: Some(LogFacts {
+                rows: count,
+                jitter_rms: clock.jitter_rms,
+                jitter_max: clock.jitter_max,
+                columns: of_axes,
+                temperature,
+            }),
+        })
+    }
+
+    fn content(&self) -> Result<Content, RunError> {
         let mut csv = CsvFile::open(&self.file)?;
-        let time = csv.column(self.time)?;
-        let mut triads = PerSensor::from_fn(|_| [0; 3]);
-        for sensor in Sensor::ALL {
-            for (index, name) in triads
-                .get_mut(sensor)
-                .iter_mut()
-                .zip(self.triads.get(sensor))
-            {
-                *index = csv.column(name)?;
-            }
+        let mut stamps = self.clock.start(&mut csv)?;
+        let mut places = [0; 6];
+        let names = [self.triads.gyro, self.triads.accel];
+        for (place, name) in places.iter_mut().zip(names.as_flattened()) {
+            *place = csv.column(name)?;
         }
         let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
 
-        let mut stamps = Vec::new();
-        let mut samples = PerSensor::from_fn(|_| Vec::new());
+        let mut columns = [const { Vec::new() }; 6];
+        let mut duplicates = Vec::new();
+        let mut temperatures = Vec::new();
+        let mut before = [f64::NAN; 6];
         while csv.advance()? {
-            let before = stamps.last().map(|&(stamp, _)| stamp);
-            stamps.push((csv.time(time, before)?, csv.line()));
-            for sensor in Sensor::ALL {
-                samples
-                    .get_mut(sensor)
-                    .push(self.sample(&csv, triads.get(sensor))?);
+            let mut row = [0.0; 6];
+            for (value, &place) in row.iter_mut().zip(&places) {
+                *value = self.value(&csv, place)?;
             }
-            if let Some(column) = temperature {
-                csv.number(column)?;
+            match stamps.look(&csv)? {
+                Stamp::Same if row == before => {
+                    duplicates.push((stamps.of_rows.len(), csv.line()));
+                    continue;
+                }
+                Stamp::Same => return Err(Stamps::same(&csv)),
+                Stamp::Later => before = row,
+            }
+            for (column, value) in columns.iter_mut().zip(row) {
+                column.push(value);
+            }
+            if let Some(place) = temperature {
+                temperatures.push(csv.number(place)?);
             }
         }
+        let stamps = stamps.of_rows;
         if stamps.len() < FEWEST_SAMPLES {
             return Err(csv.error(
                 format_args!("{} samples", stamps.len()),
@@ -92,106 +183,23 @@ impl ImuLog<'_> {
                 "Record a run with dwells and turns.",
             ));
         }
-
-        let (first, period) = uniform_time(&self.file, &stamps, self.period)?;
-        let seconds = match self.output {
-            Output::Pulse | Output::Increment => 1.0,
-            Output::Rate => period,
-        };
-        for sensor in Sensor::ALL {
-            let nominal = self.nominal.get(sensor).0;
-            for sample in samples.get_mut(sensor) {
-                *sample = (*sample * seconds).component_div(&nominal);
-            }
-        }
-        let pulse = PerSensor::from_fn(|sensor| match self.output {
-            Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
-            Output::Increment | Output::Rate => 0.0,
-        });
-        Ok(ImuRecord {
-            start: first - self.stamp.lag() * period,
-            period,
-            continuous: self.continuous,
-            gyro: samples.gyro,
-            accel: samples.accel,
-            pulse,
-            faults: Vec::new(),
-            bridges: Vec::new(),
-            log: None,
+        Ok(Content {
+            stamps,
+            columns,
+            duplicates,
+            temperature: TemperatureFacts::of(&temperatures),
         })
     }
 
-    /// A triad's numbers in a row, as they stand but along right-front-up.
-    fn sample(&self, csv: &CsvFile, columns: &[usize; 3]) -> Result<Vector3<f64>, RunError> {
-        let mut sample = Vector3::zeros();
-        for (entry, &column) in sample.iter_mut().zip(columns) {
-            *entry = csv.number(column)?;
-            if self.output == Output::Pulse && entry.fract() != 0.0 {
-                return Err(csv.not(
-                    column,
-                    "a whole number of pulses, or output = \"increment\" in run.toml",
-                ));
-            }
+    /// A number of a row as it stands.
+    fn value(&self, csv: &CsvFile, column: usize) -> Result<f64, RunError> {
+        let value = csv.number(column)?;
+        if self.output == Output::Pulse && value.fract() != 0.0 {
+            return Err(csv.not(
+                column,
+                "a whole number of pulses, or output = \"increment\" in run.toml",
+            ));
         }
-        Ok(self.axes.vector(sample))
+        Ok(value)
     }
-}
-
-/// The first stamp and the period of increasing stamps that are printed rounded but belong to samples of equal
-/// length. There must be at least two.
-fn uniform_time(
-    file: &Path,
-    stamps: &[(f64, u64)],
-    given: Option<f64>,
-) -> Result<(f64, f64), RunError> {
-    let error = |line, found: String, expected: String, advice: &str| {
-        Err(RunError::new(
-            file,
-            Place::Line(line),
-            found,
-            expected,
-            advice,
-        ))
-    };
-    let steps = || stamps.windows(2).map(|w| (w[0], w[1], w[1].0 - w[0].0));
-    let first = stamps[0];
-    let last = stamps[stamps.len() - 1].0;
-    let mut sorted: Vec<f64> = steps().map(|(_, _, step)| step).collect();
-    let middle = sorted.len() / 2;
-    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    if let Some(period) = given
-        && (median - period).abs() > 0.5 * period
-    {
-        return error(
-            first.1,
-            format!("steps of {} s from row to row", nanoseconds(median)),
-            format!("sample_period_s = {period} as in run.toml"),
-            "Correct sample_period_s or the time column.",
-        );
-    }
-    let step_limit = 1.5 * given.unwrap_or(median);
-    for ((before, _), (time, line), step) in steps() {
-        if step > step_limit {
-            return error(
-                line,
-                format!("a gap in time from {before} s to {time} s"),
-                format!("a step of {} s", nanoseconds(step_limit / 1.5)),
-                "Only uniform sampling can be integrated: fill the gap or split the record there.",
-            );
-        }
-    }
-    // Without gaps the mean step is free of the rounding that the median of printed steps keeps.
-    let period = given.unwrap_or((last - first.0) / (stamps.len() - 1) as f64);
-    for (k, &(time, line)) in stamps.iter().enumerate() {
-        let due = first.0 + k as f64 * period;
-        if (time - due).abs() > 0.5 * period {
-            return error(
-                line,
-                format!("time {time} s at sample {}", k + 1),
-                format!("{} s at {period} s a sample", nanoseconds(due)),
-                "Correct sample_period_s, or resample the record to a uniform clock.",
-            );
-        }
-    }
-    Ok((first.0, period))
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
+use super::clock::Clock;
 use super::error::RunError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
@@ -37,6 +38,9 @@ impl<'a> Instrument<'a> {
                 "output",
                 "gyro_unit",
                 "accel_unit",
+                "gyro_full_scale",
+                "accel_full_scale",
+                "time_unit",
                 "sample_period_s",
                 "time_stamp",
                 "continuous",
@@ -68,6 +72,17 @@ impl<'a> Instrument<'a> {
             None => None,
         };
 
+        let clock = Clock::of_fields(&fields, &columns)?;
+        let follow = clock.period.is_some() && top.get("turntable").is_none();
+        if clock.column.is_none() && !follow {
+            return Err(columns.missing(
+                "time",
+                "the name of a column; rows may follow one another without it if sample_period_s is \
+                 given and there is no [turntable]",
+            ));
+        }
+        let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
+
         let priors = fields.need_table(
             "prior",
             &["gyro", "accel"],
@@ -78,7 +93,7 @@ impl<'a> Instrument<'a> {
         Ok(Self {
             log: ImuLog {
                 file: directory.join(fields.need("file", "a file name")?.text()?),
-                time: columns.need("time", "the name of a column")?.text()?,
+                clock,
                 triads: PerSensor {
                     gyro: columns
                         .need("gyro", "the names of three columns")?
@@ -93,10 +108,6 @@ impl<'a> Instrument<'a> {
                 stamp: fields
                     .need("time_stamp", "which moment of a sample its time names")?
                     .choice(&TimeStamp::WORDS)?,
-                period: fields
-                    .get("sample_period_s")
-                    .map(|field| field.positive())
-                    .transpose()?,
                 continuous: match fields.get("continuous") {
                     Some(field) => field.flag()?,
                     None => true,
@@ -104,6 +115,10 @@ impl<'a> Instrument<'a> {
                 nominal: PerSensor {
                     gyro: gyro.nominal,
                     accel: accel.nominal,
+                },
+                full_scale: PerSensor {
+                    gyro: full_scale("gyro_full_scale")?,
+                    accel: full_scale("accel_full_scale")?,
                 },
             },
             noise: noise(&fields)?,

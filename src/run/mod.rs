@@ -4,6 +4,7 @@
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
 mod axes;
+mod clock;
 mod csv_file;
 mod dwells;
 mod error;

@@ -7,7 +7,7 @@ use super::error::RunError;
 use super::fields::{Document, Fields};
 use super::instrument::Instrument;
 use super::table_log::TableLog;
-use super::{Run, Standstill, segments};
+use super::{Run, Standstill, faults, segments};
 use crate::earth::Site;
 use crate::units::DEGREE;
 
@@ -74,6 +74,7 @@ impl Run {
         files.extend(table_log.as_ref().map(|log| log.file.clone()));
         files.extend(segments_file.clone());
         let imu = instrument.log.read()?;
+        notes.extend(faults::notes(&imu));
         let table = table_log.map(|log| log.read(&imu)).transpose()?;
         let segments = match segments_file {
             Some(file) => segments::read(&file, &imu)?,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
+use super::clock::{Clock, Stamp, Stamps};
 use super::csv_file::CsvFile;
 use super::error::RunError;
 use super::fields::Fields;
@@ -138,7 +139,7 @@ impl AttitudeColumns<usize> {
 /// What `run.toml` says of the file.
 pub(super) struct TableLog<'a> {
     pub file: PathBuf,
-    pub time: &'a str,
+    pub clock: Clock<'a>,
     pub attitude: AttitudeColumns<&'a str>,
     /// rad
     pub position_sigma: f64,
@@ -158,6 +159,8 @@ impl<'a> TableLog<'a> {
         let known = [
             "file",
             "columns",
+            "time_unit",
+            "sample_period_s",
             "axes",
             "position_sigma_arcsec",
             "reading_sigma_arcsec",
@@ -174,6 +177,8 @@ impl<'a> TableLog<'a> {
             &["time", "quaternion", "angles", "axes"],
             "the names of the columns",
         )?;
+        columns.need("time", "the name of a column")?;
+        let clock = Clock::of_fields(&fields, &columns)?;
         let attitude = AttitudeColumns::of_fields(&fields, &columns)?;
         if let Some(field) = fields.get("time_sigma_ms") {
             field.positive()?;
@@ -207,7 +212,7 @@ impl<'a> TableLog<'a> {
         };
         Ok(Some(Self {
             file: directory.join(fields.need("file", "a file name")?.text()?),
-            time: columns.need("time", "the name of a column")?.text()?,
+            clock,
             attitude,
             position_sigma: sigma("position_sigma_arcsec")?,
             reading_sigma: sigma("reading_sigma_arcsec")?,
@@ -218,17 +223,22 @@ impl<'a> TableLog<'a> {
     /// Reads the log of a run with these samples.
     pub fn read(&self, imu: &ImuRecord) -> Result<TableRecord, RunError> {
         let mut csv = CsvFile::open(&self.file)?;
-        let time_column = csv.column(self.time)?;
+        let mut stamps = self.clock.start(&mut csv)?;
         let columns = self.attitude.find(&mut csv)?;
 
-        let mut time: Vec<f64> = Vec::new();
-        let mut attitude = Vec::new();
+        let mut attitude: Vec<Matrix3<f64>> = Vec::new();
         let mut tilts = Vec::new();
         while csv.advance()? {
-            time.push(csv.time(time_column, time.last().copied())?);
-            attitude.push(columns.reading(&csv)?);
+            let reading = columns.reading(&csv)?;
+            match stamps.look(&csv)? {
+                // A row twice says nothing new.
+                Stamp::Same if attitude.last() == Some(&reading) => continue,
+                Stamp::Same => return Err(Stamps::same(&csv)),
+                Stamp::Later => attitude.push(reading),
+            }
             tilts.extend(columns.tilts(&csv)?);
         }
+        let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();
         let (first, last) = match time.as_slice() {
             [first, .., last] => (*first, *last),
             _ => {

@@ -2,12 +2,10 @@
 
 use std::ops::Range;
 
-use super::{Dwell, Position, STANDING_ANGLE, STANDING_SIGMAS};
+use super::{Dwell, Position, SHORTEST, STANDING_ANGLE, STANDING_SIGMAS};
 use crate::attitude::{log, mean};
 use crate::run::{Run, TableRecord};
 
-/// Shortest dwell worth a name, s.
-const SHORTEST: f64 = 0.5;
 /// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and one that stops still rings.
 const MARGIN: f64 = 0.2;

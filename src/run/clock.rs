@@ -1,0 +1,330 @@
+//! The clock of a log: stamps in any unit, and the uniform clock behind rounded and jittery ones.
+
+use std::path::Path;
+
+use super::csv_file::CsvFile;
+use super::error::{Place, RunError};
+use super::fields::Fields;
+use super::nanoseconds;
+
+/// What the numbers of a time column are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum TimeUnit {
+    /// This many of them are a second.
+    PerSecond(f64),
+    /// Samples are counted.
+    Count,
+}
+
+impl TimeUnit {
+    /// The words for it in `run.toml`.
+    pub const WORDS: [(&'static str, Self); 5] = [
+        ("s", Self::PerSecond(1.0)),
+        ("ms", Self::PerSecond(1e3)),
+        ("us", Self::PerSecond(1e6)),
+        ("ns", Self::PerSecond(1e9)),
+        ("count", Self::Count),
+    ];
+}
+
+/// What `run.toml` says of a log's time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clock<'a> {
+    /// None where rows just follow one another.
+    pub column: Option<&'a str>,
+    pub unit: TimeUnit,
+    /// s
+    pub period: Option<f64>,
+}
+
+impl<'a> Clock<'a> {
+    /// Reads `time_unit` and `sample_period_s` of a log's table, and `time` of its columns.
+    pub fn of_fields(fields: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, RunError> {
+        let unit = match fields.get("time_unit") {
+            Some(field) => field.choice(&TimeUnit::WORDS)?,
+            None => TimeUnit::PerSecond(1.0),
+        };
+        let period = fields.get("sample_period_s");
+        if unit == TimeUnit::Count && period.is_none() {
+            return Err(fields.missing("sample_period_s", "what a count lasts"));
+        }
+        Ok(Self {
+            column: columns.get("time").map(|field| field.text()).transpose()?,
+            unit,
+            period: period.map(|field| field.positive()).transpose()?,
+        })
+    }
+
+    /// Begins to read a file.
+    pub fn start(&self, csv: &mut CsvFile) -> Result<Stamps, RunError> {
+        Ok(Stamps {
+            column: self.column.map(|name| csv.column(name)).transpose()?,
+            unit: self.unit,
+            period: self.period.unwrap_or(1.0),
+            number: None,
+            unwrapped: 0.0,
+            of_rows: Vec::new(),
+        })
+    }
+}
+
+/// A row's stamp against that of the row before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stamp {
+    Later,
+    Same,
+}
+
+/// The stamps of a file so far.
+pub(super) struct Stamps {
+    column: Option<usize>,
+    unit: TimeUnit,
+    /// s a count
+    period: f64,
+    /// The number in the row before.
+    number: Option<f64>,
+    /// What wraps of a counter add up to.
+    unwrapped: f64,
+    /// Time in s and line of each row taken.
+    pub of_rows: Vec<(f64, u64)>,
+}
+
+impl Stamps {
+    /// Looks at the stamp of the row, which must not be before that of the row before; a later one is
+    /// taken.
+    pub fn look(&mut self, csv: &CsvFile) -> Result<Stamp, RunError> {
+        let Some(column) = self.column else {
+            let time = self.of_rows.len() as f64 * self.period;
+            self.of_rows.push((time, csv.line()));
+            return Ok(Stamp::Later);
+        };
+        let number = csv.number(column)?;
+        if self.unit == TimeUnit::Count && number.fract() != 0.0 {
+            return Err(csv.not(column, "a whole number of samples"));
+        }
+        let step = number - self.number.unwrap_or(f64::NEG_INFINITY);
+        if step == 0.0 {
+            return Ok(Stamp::Same);
+        }
+        if step < 0.0 {
+            let wrap = match self.unit {
+                TimeUnit::Count => wrap(step),
+                TimeUnit::PerSecond(_) => None,
+            };
+            let Some(wrap) = wrap else {
+                return Err(csv.error_here(
+                    format_args!("time going back from {} to {number}", number - step),
+                    "times that increase",
+                    "Put the rows in order, or split the file where the clock was set.",
+                ));
+            };
+            self.unwrapped += wrap;
+        }
+        self.number = Some(number);
+        let time = match self.unit {
+            TimeUnit::PerSecond(many) => number / many,
+            TimeUnit::Count => (number + self.unwrapped) * self.period,
+        };
+        self.of_rows.push((time, csv.line()));
+        Ok(Stamp::Later)
+    }
+
+    /// The error of a row that has the stamp of the row before, but other values.
+    pub fn same(csv: &CsvFile) -> RunError {
+        csv.error_here(
+            "the time of the row before again, a duplicate with other values",
+            "a later time",
+            "Remove the wrong one of both rows, or print times with more digits.",
+        )
+    }
+}
+
+/// The size of a counter that wrapped: the smallest that makes the step forward a small one.
+fn wrap(step: f64) -> Option<f64> {
+    let sizes = [8, 16, 24, 32].map(|bits| 2f64.powi(bits));
+    sizes
+        .into_iter()
+        .find(|size| (0.0..=0.25 * size).contains(&(size + step)) && step + size > 0.0)
+}
+
+/// The uniform clock of increasing stamps.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Uniform {
+    /// Due time of the first sample, s.
+    pub first: f64,
+    /// s
+    pub period: f64,
+    /// The number of each row's sample; the first is 0.
+    pub numbers: Vec<usize>,
+    /// Stamps against due times, s.
+    pub jitter_rms: f64,
+    pub jitter_max: f64,
+}
+
+/// Part of a stamp's difference by which the phase of the clock follows it: little, so that jitter
+/// averages out …
+const PHASE: f64 = 0.02;
+/// … and its period, which makes the loop well damped.
+const PERIOD: f64 = 0.5 * PHASE * PHASE;
+/// Stamps that give the first phase.
+const FIRST: usize = 50;
+
+impl Uniform {
+    /// Finds the number of each sample, and the clock that all stamps share within half a period.
+    /// There must be at least two stamps.
+    pub fn new(file: &Path, stamps: &[(f64, u64)], given: Option<f64>) -> Result<Self, RunError> {
+        let error = |line, found: String, expected: String, advice: &str| {
+            let place = Place::Line(line);
+            Err(RunError::new(file, place, found, expected, advice))
+        };
+        let steps = || stamps.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        let mut sorted: Vec<f64> = steps().collect();
+        let middle = sorted.len() / 2;
+        let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let first = stamps[0];
+        if let Some(period) = given
+            && (median - period).abs() > 0.5 * period
+        {
+            return error(
+                first.1,
+                format!("steps of {} s from row to row", nanoseconds(median)),
+                format!("sample_period_s = {period} as in run.toml"),
+                "Correct sample_period_s or the time column.",
+            );
+        }
+        let about = given.unwrap_or_else(|| {
+            // The mean is free of the rounding that the median of printed steps keeps.
+            let near = |step: &f64| (step - median).abs() <= 0.5 * median;
+            let (count, sum) = steps()
+                .filter(near)
+                .fold((0.0, 0.0), |(count, sum), step| (count + 1.0, sum + step));
+            sum / f64::max(count, 1.0)
+        });
+
+        let most = 2 * stamps.len();
+        let mut numbers = Vec::with_capacity(stamps.len());
+        numbers.push(0);
+        let (mut number, mut period) = (0, about);
+        let mut due = first.0 + phase(stamps, about);
+        for pair in stamps.windows(2) {
+            let ((before, _), (time, line)) = (pair[0], pair[1]);
+            let step = ((time - due) / period).round().max(1.0);
+            if number as f64 + step > most as f64 {
+                return error(
+                    line,
+                    format!("a gap in time from {before} s to {time} s"),
+                    "fewer rows missing than there are".to_owned(),
+                    "Split the record there.",
+                );
+            }
+            number += step as usize;
+            numbers.push(number);
+            due += step * period;
+            let off = time - due;
+            due += PHASE * off;
+            if given.is_none() {
+                period += PERIOD * off / step;
+            }
+        }
+
+        let (first, period) = fit(stamps, &numbers, about, given.is_some());
+        let (mut squares, mut largest) = (0.0, 0.0f64);
+        for (&(time, line), &number) in stamps.iter().zip(&numbers) {
+            let due = first + number as f64 * period;
+            let off = (time - due).abs();
+            if off > 0.5 * period {
+                return error(
+                    line,
+                    format!("time {time} s at sample {}", number + 1),
+                    format!("{} s at {period} s a sample", nanoseconds(due)),
+                    "Correct sample_period_s, or resample the record to a uniform clock.",
+                );
+            }
+            squares += off * off;
+            largest = largest.max(off);
+        }
+        Ok(Self {
+            first,
+            period,
+            numbers,
+            jitter_rms: (squares / stamps.len() as f64).sqrt(),
+            jitter_max: largest,
+        })
+    }
+}
+
+/// From the first stamp to its due time by the circular mean of the first stamps' phases, which gaps
+/// do not disturb.
+fn phase(stamps: &[(f64, u64)], period: f64) -> f64 {
+    let turn = std::f64::consts::TAU / period;
+    let (sin, cos) = stamps
+        .iter()
+        .take(FIRST)
+        .map(|&(time, _)| ((time - stamps[0].0) * turn).sin_cos())
+        .fold((0.0, 0.0), |(s, c), (sin, cos)| (s + sin, c + cos));
+    f64::atan2(sin, cos) / turn
+}
+
+/// First due time and period by least squares of stamps on sample numbers; with a given period the
+/// first alone.
+fn fit(stamps: &[(f64, u64)], numbers: &[usize], about: f64, given: bool) -> (f64, f64) {
+    let origin = stamps[0].0;
+    let count = stamps.len() as f64;
+    let mean = numbers.iter().map(|&n| n as f64).sum::<f64>() / count;
+    let off = |time: f64, number: usize| time - origin - number as f64 * about;
+    let (mut level, mut slope, mut spread) = (0.0, 0.0, 0.0);
+    for (&(time, _), &number) in stamps.iter().zip(numbers) {
+        let from_mean = number as f64 - mean;
+        level += off(time, number) / count;
+        slope += off(time, number) * from_mean;
+        spread += from_mean * from_mean;
+    }
+    let correction = if given { 0.0 } else { slope / spread };
+    (origin + level - correction * mean, about + correction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uniform(times: impl IntoIterator<Item = f64>) -> Uniform {
+        let stamps: Vec<_> = times.into_iter().zip(2..).collect();
+        Uniform::new(Path::new("imu.csv"), &stamps, None).unwrap()
+    }
+
+    /// An even spread of fractions without a pattern.
+    fn scatter(k: usize) -> f64 {
+        (k as f64 * 0.618_033_988_749_895).fract()
+    }
+
+    #[test]
+    fn stamps_rounded_to_milliseconds_keep_their_rate() {
+        let period = 1.0 / 204.8;
+        let clock = uniform((0..20_000).map(|k| (f64::from(k) * period * 1e3).round() / 1e3));
+        assert_eq!(clock.numbers, (0..20_000).collect::<Vec<_>>());
+        assert!((clock.period / period - 1.0).abs() < 1e-6);
+        assert!((clock.jitter_rms - 1e-3 / 12f64.sqrt()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn rows_are_missing_where_stamps_say_so_in_spite_of_jitter() {
+        let there = |k: &usize| !(k % 37 == 5 || (700..900).contains(k));
+        let kept: Vec<usize> = (0..5000).filter(there).collect();
+        let jitter = |k: usize| 0.9 * (scatter(k) - 0.5);
+        let clock = uniform(kept.iter().map(|&k| 7.0 + 0.01 * (k as f64 + jitter(k))));
+        assert_eq!(clock.numbers, kept);
+        assert!((clock.period - 0.01).abs() < 1e-6, "{}", clock.period);
+        assert!((clock.first - 7.0).abs() < 2e-4, "{}", clock.first);
+    }
+
+    #[test]
+    fn a_counter_wraps_at_the_smallest_size_that_makes_a_small_step() {
+        assert_eq!(wrap(-255.0), Some(256.0));
+        assert_eq!(wrap(-250.0), Some(256.0));
+        assert_eq!(wrap(-65535.0), Some(65536.0));
+        assert_eq!(wrap(-65530.0), Some(65536.0));
+        assert_eq!(wrap(3.0 - 4_294_967_295.0), Some(4_294_967_296.0));
+        assert_eq!(wrap(-256.0), None, "the same count");
+        assert_eq!(wrap(-50.0), None, "rows out of order");
+    }
+}

@@ -1,0 +1,172 @@
+//! Axes that stand still while others go on.
+
+use std::ops::Range;
+
+/// A run by chance may be this probable.
+const CHANCE: f64 = 1e-9;
+/// How often an axis changes is seen in this many rows on either side.
+const AROUND: usize = 500;
+/// Where all axes repeat in more than this part of the rows, noise is not seen and a standing table
+/// looks as a stuck axis does.
+const NOISE_FREE: f64 = 0.1;
+/// An axis that leaves its value by no more than this many steps of its grid may stand on it.
+const QUIET_STEPS: f64 = 1.5;
+/// What it does elsewhere says nothing of that, only rows within this many steps do …
+const SAME_LEVEL_STEPS: f64 = 3.5;
+/// … if they are at least this many.
+const FEWEST: usize = 50;
+
+/// For each column the rows that repeat the one before them so long that it is no chance, the first
+/// of equal values left out. `steps` are those of the columns' grids.
+pub(super) fn stuck(columns: &[&[f64]; 6], steps: &[Option<f64>; 6]) -> [Vec<Range<usize>>; 6] {
+    let mut found = [const { Vec::new() }; 6];
+    let rows = columns[0].len();
+    let frozen = (1..rows).filter(|&k| columns.iter().all(|x| x[k] == x[k - 1]));
+    if frozen.count() as f64 > NOISE_FREE * rows as f64 {
+        return found;
+    }
+    for (axis, column) in columns.iter().enumerate() {
+        let changes = |k: usize| columns.iter().any(|x| x[k] != x[k - 1]);
+        for run in runs(column) {
+            let repeats = run.len();
+            // The least that can be too long where nothing repeats in all rows around.
+            if repeats >= 3 && is_stuck(column, &run, steps[axis]) && run.clone().any(changes) {
+                found[axis].push(run);
+            }
+        }
+    }
+    found
+}
+
+/// Stretches of rows each equal to the one before.
+fn runs(column: &[f64]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut start = 1;
+    for k in 1..=column.len() {
+        if k == column.len() || column[k] != column[k - 1] {
+            if k > start {
+                runs.push(start..k);
+            }
+            start = k + 1;
+        }
+    }
+    runs
+}
+
+fn is_stuck(column: &[f64], run: &Range<usize>, step: Option<f64>) -> bool {
+    let value = column[run.start];
+    let leaves = |k: Option<usize>| {
+        k.and_then(|k| column.get(k))
+            .map_or(0.0, |other| (other - value).abs())
+    };
+    // The row before the run has its value.
+    let before = leaves(run.start.checked_sub(2));
+    let after = leaves(Some(run.end));
+    let around = |k: usize| k.abs_diff(run.start).min(k.abs_diff(run.end)) <= AROUND;
+    let same_level = step.filter(|step| before.max(after) <= QUIET_STEPS * step);
+    let near = |k: &usize| {
+        around(*k)
+            && same_level.is_none_or(|step| (column[*k] - value).abs() <= SAME_LEVEL_STEPS * step)
+    };
+    let mut seen = Seen::default();
+    // Outwards from the run, in pairs of a row and the one before it.
+    let earlier = (1..run.start).rev().take_while(near);
+    seen.add(earlier.map(|k| column[k] == column[k - 1]));
+    let later = (run.end + 1..column.len()).take_while(near);
+    seen.add(later.map(|k| column[k] == column[k - 1]));
+    if same_level.is_some() && seen.pairs < FEWEST {
+        return false;
+    }
+    seen.chance(run.len()) < CHANCE
+}
+
+/// How often rows repeat the one before.
+#[derive(Debug, Default)]
+struct Seen {
+    pairs: usize,
+    repeats: usize,
+    /// Repeats next to a repeat.
+    again: usize,
+}
+
+impl Seen {
+    fn add(&mut self, repeats: impl Iterator<Item = bool>) {
+        let mut before = false;
+        for repeat in repeats {
+            self.pairs += 1;
+            self.repeats += usize::from(repeat);
+            self.again += usize::from(repeat && before);
+            before = repeat;
+        }
+    }
+
+    /// Of a run with so many repeats. A repeat may make the next more probable, as where a table
+    /// stands and noise is below the grid.
+    fn chance(&self, repeats: usize) -> f64 {
+        let once = (self.repeats as f64 + 1.0) / (self.pairs as f64 + 2.0);
+        let again = (self.again as f64 + once) / (self.repeats as f64 + 1.0);
+        once * once.max(again).powf(repeats as f64 - 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Six columns of noise on a grid of one, with this σ.
+    fn noise(sigma: f64) -> Vec<Vec<f64>> {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut column = || {
+            let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+            (0..20_000)
+                .map(|_| (sigma * normal() + 0.3).round())
+                .collect()
+        };
+        (0..6).map(|_| column()).collect()
+    }
+
+    fn find(columns: &[Vec<f64>]) -> [Vec<Range<usize>>; 6] {
+        let columns = std::array::from_fn(|k| columns[k].as_slice());
+        stuck(&columns, &[Some(1.0); 6])
+    }
+
+    #[test]
+    fn an_axis_that_stands_still_is_found_and_no_other() {
+        for sigma in [0.5, 1.0, 10.0] {
+            let mut columns = noise(sigma);
+            assert!(find(&columns).iter().all(Vec::is_empty), "σ {sigma}");
+            let held = columns[2][7000];
+            columns[2][7000..7100].fill(held);
+            let found = find(&columns);
+            let [run] = found[2].as_slice() else {
+                panic!("σ {sigma}: {found:?}");
+            };
+            assert!(run.start <= 7001 && (7100..7110).contains(&run.end));
+            assert_eq!(found.iter().map(Vec::len).sum::<usize>(), 1);
+        }
+    }
+
+    #[test]
+    fn a_grid_that_is_coarser_than_noise_is_no_fault() {
+        for sigma in [0.05, 0.2] {
+            assert!(find(&noise(sigma)).iter().all(Vec::is_empty), "σ {sigma}");
+        }
+    }
+
+    #[test]
+    fn a_quiet_dwell_between_turns_is_no_fault() {
+        // A turn, a dwell so near the middle of a step that nothing is seen of noise, and a turn.
+        let mut columns = noise(1.0);
+        for (k, value) in columns[0].iter_mut().enumerate() {
+            let turned = 9800.0 - k as f64;
+            *value = match k {
+                0..9800 => turned.round(),
+                9800..10_200 => 0.0,
+                _ => (turned + 400.0).round(),
+            };
+        }
+        assert!(find(&columns).iter().all(Vec::is_empty));
+    }
+}
