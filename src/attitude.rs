@@ -86,6 +86,17 @@ pub fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
     across.try_normalize(0.0).unwrap_or(Vector3::x()) * angle
 }
 
+/// Some attitude `C_b_n` in which this unit vector along body axes is up.
+pub fn level(up: &Vector3<f64>) -> Matrix3<f64> {
+    let across = Vector3::ith(up.iamin(), 1.0);
+    let east = across.cross(up).normalize();
+    Matrix3::from_rows(&[
+        east.transpose(),
+        up.cross(&east).transpose(),
+        up.transpose(),
+    ])
+}
+
 /// The rotation by a tilt about East and North and then by a heading about Up, the components of an
 /// attitude error φ in rad. While both are small it is `exp([φ×])`; but a heading is no error of what
 /// gravity shows, and here however large a heading leaves the tilt what it is.

@@ -19,6 +19,8 @@ pub const PPM: f64 = 1e-6;
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 /// One micro-g in m/s².
 pub const MICRO_G: f64 = 1e-6 * STANDARD_GRAVITY;
+/// One milli-g in m/s².
+pub const MILLI_G: f64 = 1e-3 * STANDARD_GRAVITY;
 /// One milligal, the unit of gravimetry, in m/s².
 pub const MILLIGAL: f64 = 1e-5;
 /// One micro-g per root hertz (velocity random walk) in (m/s)/√s.

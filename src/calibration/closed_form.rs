@@ -1,93 +1,143 @@
 //! The closed form: static positions with known attitude (Zhao, Jiang, Li 2016, Eqs. 14 and 15; the
-//! second line of the printed Eq. 15 says `N_g` where the accelerometer is meant).
+//! second line of the printed Eq. 15 says `N_g` where the accelerometer is meant), and what takes its
+//! place without a table.
+
+mod gravity;
+mod labels;
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 use super::error::CalibrationError;
-use super::outcome::Estimate;
-use super::states::{ParameterMatrix, parameter};
+use super::outcome::{Estimate, OBSERVED_BELOW, parameter_name};
+use super::states::{ParameterMatrix, parameter, sensor_and_parameter};
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
+use crate::run::record::BodyFrame;
 use crate::run::{Dwell, MeanOutput, Run};
 
-/// The mean output of a triad at one position.
+/// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
-    /// Input along body axes that the table's attitude gives, rad/s or m/s².
+    /// Mean input along body axes, rad/s or m/s².
     pub input: Vector3<f64>,
     /// Mean normalised output, rad/s or m/s².
     pub output: Vector3<f64>,
     /// Variance of each output axis, (rad/s)² or (m/s²)².
     pub variance: Vector3<f64>,
+    /// The same, by which it is weighted: the variance itself unless that would trust it too much.
+    pub weighted: Vector3<f64>,
+}
+
+/// Where the inputs of a closed form are known from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reference {
+    /// Attitudes of the table's log.
+    Table,
+    /// Labels of sections: an axis up, a turn about an axis by an angle.
+    Labels,
+    /// Gravity alone: its size at rest, its direction before and after each turn.
+    Gravity,
+}
+
+impl Reference {
+    /// What fixes the body axes.
+    pub fn body_frame(self) -> BodyFrame {
+        match self {
+            Self::Table | Self::Labels => BodyFrame::Table,
+            Self::Gravity => BodyFrame::Accelerometer,
+        }
+    }
 }
 
 /// A closed-form calibration of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosedForm {
-    /// The estimate; its σ follow from random walk, pulses and the table's position error.
+    /// The estimate; its σ follow from random walk, pulses and how well the inputs are known.
     pub estimate: Estimate,
-    /// Dwells used for each triad.
+    /// Where the inputs are known from.
+    pub reference: Reference,
+    /// Dwells or labelled positions used for each triad.
     pub positions: PerSensor<usize>,
+    /// Turns used for the gyros.
+    pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
+    /// What a calibration engineer must know before using the figures.
+    pub warnings: Vec<String>,
 }
 
 /// A reference vector within this cosine of a body axis makes a position of the six.
 const ALONG_AXIS: f64 = 0.9998;
 
+/// Least eigenvalue of the correlations of a row's unknowns.
+const SMALLEST_EIGENVALUE: f64 = 1e-4;
+
 /// Relative σ of an output for which no noise is stated.
 const NOISELESS: f64 = 1e-9;
 
-/// Calibrates both triads from the dwells of a run.
+/// Calibrates both triads of a run without a filter.
 ///
-/// Where the dwells hold the paper's six positions of a triad (Earth rate or gravity along each body
-/// axis, both ways) those are used, else all dwells. Least squares over them is the paper's half
-/// sums and half differences where positions are exactly opposite.
+/// With a table's log, from its dwells: where they hold the paper's six positions of a triad (Earth
+/// rate or gravity along each body axis, both ways) from those, else from all. Without, from labelled
+/// sections; without those, from every dwell and turn by gravity alone. Least squares over six
+/// positions is the paper's half sums and half differences where they are exactly opposite.
 ///
 /// # Errors
-/// [`CalibrationError`] without a table, or if the positions do not determine the twelve numbers of
-/// a triad.
+/// [`CalibrationError`] if the positions do not determine the twelve numbers of a triad.
 pub fn six_position(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
-    six_position_of(run, &run.dwells(), form)
+    let reference = if run.table.is_some() {
+        Reference::Table
+    } else if run.segments.iter().any(|s| s.motion.is_some()) {
+        Reference::Labels
+    } else {
+        Reference::Gravity
+    };
+    six_position_by(reference, run, &run.dwells(), form)
 }
 
-/// The same from some dwells, or parts of them.
+/// The same by what the inputs are to be known from; labels need no dwells.
+pub(super) fn six_position_by(
+    reference: Reference,
+    run: &Run,
+    dwells: &[Dwell],
+    form: InstallationForm,
+) -> Result<ClosedForm, CalibrationError> {
+    match reference {
+        Reference::Table => six_position_of(run, dwells, form),
+        Reference::Labels => labels::by_labels(run, form),
+        Reference::Gravity => gravity::by_gravity(run, dwells, form),
+    }
+}
+
+/// The same from some dwells with attitudes of a table, or parts of them.
 ///
 /// # Errors
-/// As [`six_position`].
+/// As [`six_position`], and without a table.
 pub fn six_position_of(
     run: &Run,
     dwells: &[Dwell],
     form: InstallationForm,
 ) -> Result<ClosedForm, CalibrationError> {
-    let mut covariance = ParameterMatrix::zeros();
-    let mut positions = PerSensor::default();
+    let mut chosen = PerSensor::<Vec<Position>>::default();
     let mut used = vec![false; dwells.len()];
-    let mut triads = PerSensor::from_fn(|_| Triad::ideal(form));
     for sensor in Sensor::ALL {
         let all: Vec<Position> = dwells
             .iter()
             .map(|dwell| position(run, dwell, sensor))
             .collect::<Option<_>>()
             .ok_or(CalibrationError::NoTable)?;
-        let chosen = six_of(&all);
-        let chosen_positions: Vec<Position> = chosen.iter().map(|&k| all[k]).collect();
-        let (triad, of_triad) =
-            six_position_triad(&chosen_positions, form).ok_or(CalibrationError::Degenerate {
-                sensor,
-                dwells: chosen.len(),
-            })?;
-        chosen.iter().for_each(|&k| used[k] = true);
-        *triads.get_mut(sensor) = triad;
-        *positions.get_mut(sensor) = chosen.len();
-        let first = parameter(sensor, 0);
-        covariance
-            .fixed_view_mut::<PER_TRIAD, PER_TRIAD>(first, first)
-            .copy_from(&of_triad);
+        let of_six = six_of(&all);
+        of_six.iter().for_each(|&k| used[k] = true);
+        *chosen.get_mut(sensor) = of_six.iter().map(|&k| all[k]).collect();
     }
+    let degenerate = |sensor| CalibrationError::Degenerate {
+        sensor,
+        dwells: chosen.get(sensor).len(),
+    };
+    let estimate = both_triads(&chosen, form).map_err(degenerate)?;
     let standing_time = dwells
         .iter()
         .zip(used)
@@ -95,10 +145,59 @@ pub fn six_position_of(
         .map(|(dwell, _)| dwell.samples.len() as f64 * run.imu.period)
         .sum();
     Ok(ClosedForm {
-        estimate: Estimate { triads, covariance },
-        positions,
+        warnings: unobserved(run, &estimate, Reference::Table),
+        estimate,
+        reference: Reference::Table,
+        positions: PerSensor::from_fn(|sensor| chosen.get(sensor).len()),
+        turns: 0,
         standing_time,
     })
+}
+
+/// Both triads from positions; the triad that they do not determine if they fail.
+fn both_triads(
+    positions: &PerSensor<Vec<Position>>,
+    form: InstallationForm,
+) -> Result<Estimate, Sensor> {
+    let mut covariance = ParameterMatrix::zeros();
+    let mut triads = PerSensor::from_fn(|_| Triad::ideal(form));
+    for sensor in Sensor::ALL {
+        let (triad, of_triad) = six_position_triad(positions.get(sensor), form).ok_or(sensor)?;
+        *triads.get_mut(sensor) = triad;
+        let first = parameter(sensor, 0);
+        covariance
+            .fixed_view_mut::<PER_TRIAD, PER_TRIAD>(first, first)
+            .copy_from(&of_triad);
+    }
+    Ok(Estimate { triads, covariance })
+}
+
+/// A sentence that names the parameters that are hardly better known than before, if there are any.
+fn unobserved(run: &Run, estimate: &Estimate, reference: Reference) -> Vec<String> {
+    let prior = run.prior_sigma(estimate.form());
+    let sigma = estimate.sigma();
+    let hidden = |&index: &usize| {
+        let (sensor, of_triad) = sensor_and_parameter(index);
+        let prior = prior.get(sensor)[of_triad];
+        prior > 0.0 && sigma[index] > OBSERVED_BELOW * prior
+    };
+    let names: Vec<String> = estimate
+        .estimated()
+        .filter(hidden)
+        .filter_map(|index| parameter_name(estimate.form(), index))
+        .collect();
+    if names.is_empty() {
+        return Vec::new();
+    }
+    let what = match reference {
+        Reference::Table => "these positions",
+        Reference::Labels => "these sections",
+        Reference::Gravity => "these dwells and turns",
+    };
+    vec![format!(
+        "Not observed by {what}, σ not even half of the prior's: {}.",
+        names.join(", ")
+    )]
 }
 
 /// One triad from positions: least squares for `A = K C` and `D` row by row, then the form's split.
@@ -116,8 +215,10 @@ pub fn six_position_triad(
     let mut bias = Vector3::zeros();
     // Of the rows of A and of D, four numbers a row.
     let mut covariance = [Matrix4::zeros(); 3];
+    // A size for the inputs, so that columns are of one size.
+    let unscale = Matrix4::from_diagonal(&Vector4::new(1.0 / size, 1.0 / size, 1.0 / size, 1.0));
     for axis in 0..3 {
-        let sigma = |p: &Position| p.variance[axis].sqrt().max(NOISELESS * size);
+        let sigma = |p: &Position| p.weighted[axis].sqrt().max(NOISELESS * size);
         let design = Mat::from_fn(positions.len(), 4, |i, j| {
             let p = &positions[i];
             (if j < 3 { p.input[j] / size } else { 1.0 }) / sigma(p)
@@ -130,9 +231,15 @@ pub fn six_position_triad(
                 .map(|k| design[(k, i)] * design[(k, j)])
                 .sum()
         });
-        // Positions in a plane leave an eigenvalue of nothing but rounding and table error.
-        let eigenvalues = information.symmetric_eigenvalues();
-        if eigenvalues.min() < 1e-4 * eigenvalues.max() {
+        // Positions in a plane leave an eigenvalue of nothing but rounding and table error, whatever the
+        // weights.
+        let weight = information.diagonal().map(|v: f64| v.sqrt().recip());
+        let weight = Matrix4::from_diagonal(&weight);
+        let smallest = (weight * information * weight)
+            .symmetric_eigenvalues()
+            .min();
+        // Not a number where an input is never there.
+        if !(smallest > SMALLEST_EIGENVALUE) {
             return None;
         }
         let solution = design.qr().solve_lstsq(&outputs);
@@ -140,13 +247,13 @@ pub fn six_position_triad(
             a[(axis, column)] = solution[(column, 0)] / size;
         }
         bias[axis] = solution[(3, 0)];
-        let unscale = Matrix4::from_diagonal(&nalgebra::Vector4::new(
-            1.0 / size,
-            1.0 / size,
-            1.0 / size,
-            1.0,
-        ));
-        covariance[axis] = unscale * information.try_inverse()? * unscale;
+        // By weights that need not be the inverse variances.
+        let inverse = unscale * information.try_inverse()?;
+        for (k, position) in positions.iter().enumerate() {
+            let of_output = inverse * Vector4::from_fn(|j, _| design[(k, j)]) / sigma(position);
+            let variance = position.variance[axis].max((NOISELESS * size).powi(2));
+            covariance[axis] += of_output * variance * of_output.transpose();
+        }
     }
     let triad = Triad::from_sensitivity(form, &a, bias);
     triad.correction()?;
@@ -196,14 +303,20 @@ fn position(run: &Run, dwell: &Dwell, sensor: Sensor) -> Option<Position> {
     let input = position.attitude.tr_mul(&known);
     let attitude =
         table.position_sigma.powi(2) + table.reading_sigma.powi(2) / position.readings.len() as f64;
+    // A wrong attitude turns the other two components of the input into a third.
+    let variance = Vector3::repeat(noise) + across(&input) * attitude;
     Some(Position {
         input,
         output,
-        // A wrong attitude turns the other two components of the input into this one.
-        variance: Vector3::from_fn(|i, _| {
-            noise + attitude * (input.norm_squared() - input[i].powi(2))
-        }),
+        variance,
+        weighted: variance,
     })
+}
+
+/// How much of a small turn about any axis each component of an input sees, squared: the size of the
+/// other two components.
+fn across(input: &Vector3<f64>) -> Vector3<f64> {
+    input.map(|component| input.norm_squared() - component.powi(2))
 }
 
 /// The positions whose input lies along a body axis, if all six are there, else all.

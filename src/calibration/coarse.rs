@@ -12,13 +12,14 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::error::CalibrationError;
 use super::linearisation::{Linearisation, singular};
-use super::outcome::{from_vector, to_vector};
+use super::outcome::{Estimate, from_vector, to_vector};
 use super::schedule::first_reading;
 use crate::attitude::exp;
 use crate::imu::{FurtherVector, InstallationForm, PerSensor, Triad};
 use crate::run::{Dwell, Run, TableRecord};
 use crate::units::{ARCSEC, DEGREE};
 use equations::Equations;
+use turns::Turned;
 
 /// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
 const STEPS: usize = 6;
@@ -113,12 +114,7 @@ pub fn coarse_start(
     dwells: &[Dwell],
     form: InstallationForm,
 ) -> Result<CoarseStart, CalibrationError> {
-    if let [] | [_] = dwells {
-        return Err(CalibrationError::TooFewDwells {
-            found: dwells.len(),
-            needed: 2,
-        });
-    }
+    enough(dwells)?;
     match (&run.table, first_reading(run, dwells)) {
         (Some(table), Some(initial_attitude)) => Ok(CoarseStart {
             at: Linearisation {
@@ -131,13 +127,50 @@ pub fn coarse_start(
         }),
         _ => {
             let triads = gravity::accelerometers(run, dwells, &run.prior_mean(form))?;
-            let (at, heading_sigma) = turns::gyros_and_attitude(run, dwells, &triads)?;
+            let Turned {
+                at, heading_sigma, ..
+            } = turns::triads_and_attitude(run, dwells, &triads)?;
             Ok(CoarseStart {
                 at,
                 attitude: AttitudePrior::of_alignment(at.initial_attitude, heading_sigma),
                 hidden: HEADING_SIGMAS * heading_sigma > HIDDEN,
             })
         }
+    }
+}
+
+/// Both triads by gravity alone, as a result of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ByGravity {
+    pub estimate: Estimate,
+    /// Mean square of the residuals, each over its σ; one if nothing but noise is left.
+    pub misfit: f64,
+}
+
+/// The coarse start without a table, with its covariance.
+pub(super) fn by_gravity(
+    run: &Run,
+    dwells: &[Dwell],
+    form: InstallationForm,
+) -> Result<ByGravity, CalibrationError> {
+    enough(dwells)?;
+    let triads = gravity::accelerometers(run, dwells, &run.prior_mean(form))?;
+    let Turned { at, equations, .. } = turns::triads_and_attitude(run, dwells, &triads)?;
+    let triads = at.triads;
+    let covariance = equations.covariance().ok_or_else(|| singular(&triads))?;
+    Ok(ByGravity {
+        estimate: Estimate { triads, covariance },
+        misfit: equations.misfit(),
+    })
+}
+
+fn enough(dwells: &[Dwell]) -> Result<(), CalibrationError> {
+    match dwells {
+        [] | [_] => Err(CalibrationError::TooFewDwells {
+            found: dwells.len(),
+            needed: 2,
+        }),
+        _ => Ok(()),
     }
 }
 

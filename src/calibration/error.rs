@@ -29,8 +29,8 @@ pub enum CalibrationError {
     },
     /// Sections laid end to end.
     #[error(
-        "the record is not continuous (continuous = false), but the filter navigates from its \
-         beginning to its end; use --method six-position, or give one unbroken record"
+        "the record is not continuous (continuous = false), but turns are navigated from dwell to dwell; \
+         use --method six-position with labelled sections, or give one unbroken record"
     )]
     NotContinuous,
     /// A gap in the record, or an axis lost for a while, beyond interpolation.
@@ -64,6 +64,18 @@ pub enum CalibrationError {
         /// Dwells used.
         dwells: usize,
     },
+    /// Labelled sections that do not tell what is to be found.
+    #[error(
+        "the sections {} do not determine the twelve numbers of the {}: needed are {}; add such sections \
+         to [segments], or leave [segments] out and let every dwell and turn count",
+        quoted(.labels), .sensor.name(), needed(*.sensor)
+    )]
+    TooFewSections {
+        /// Which triad.
+        sensor: Sensor,
+        /// Labels of the sections.
+        labels: Vec<String>,
+    },
     /// A block of states that batch least squares does not have.
     #[error(
         "the run switches {} on, which batch least squares does not know; switch it off in run and \
@@ -89,6 +101,18 @@ impl CalibrationError {
     pub(crate) fn not_continuous(imu: &ImuRecord) -> Self {
         imu.unbridged()
             .map_or(Self::NotContinuous, |lost| Self::Unbridged { lost })
+    }
+}
+
+fn quoted(labels: &[String]) -> String {
+    let quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
+    quoted.join(", ")
+}
+
+fn needed(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "a position and a turn about each axis, such as `z_up`, `rot_x+360`",
+        Sensor::Accel => "each axis up and down, such as `x_up`, `x_down`",
     }
 }
 

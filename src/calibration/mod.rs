@@ -24,6 +24,7 @@ mod observability;
 pub mod outcome;
 mod pass;
 mod problem;
+mod quality;
 mod record;
 mod scatter;
 mod schedule;
@@ -33,7 +34,9 @@ pub mod states;
 pub use batch::batch_estimate;
 pub use block_effect::{BlockEffect, block_effects};
 pub use bound::{Bound, bound};
-pub use closed_form::{ClosedForm, Position, six_position, six_position_of, six_position_triad};
+pub use closed_form::{
+    ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
+};
 pub use coarse::{AttitudePrior, CoarseStart, coarse_start};
 pub use comparison::{Comparison, Named, Side, compare};
 pub use consistency::mean_square_interval;
@@ -47,5 +50,6 @@ pub use linearisation::Linearisation;
 pub use nees::{Nees, nees};
 pub use observability::{AttitudePart, Direction, Observability, Part};
 pub use outcome::{Estimate, Outcome};
+pub use quality::{Measures, Quality, Spread};
 pub use record::{triads_of, truth_record};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};

@@ -5,15 +5,18 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::block_effect::BlockEffect;
+use super::closed_form::ClosedForm;
 use super::further::{Further, constant_name};
 use super::observability::Direction;
 use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
+use super::quality::{Measures, Quality, Spread};
 use super::states::{PARAMETERS, sensor_and_parameter};
 use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::Run;
 use crate::run::record::{
     Aiding, BlockRecord, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord,
-    EQUATION, EQUATION_WITH_TERMS, Method, NisRecord, TermRecord, TestVector, TriadRecord,
+    EQUATION, EQUATION_WITH_TERMS, MeasuresRecord, Method, NisRecord, QualityRecord, SpreadRecord,
+    TermRecord, TestVector, TriadRecord,
 };
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -24,9 +27,16 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// The record of this calibration of a run, with what blocks of states did to it.
-    pub fn record(&self, run: &Run, effects: &[BlockEffect]) -> CalibrationRecord {
+    /// The record of this calibration of a run, with what blocks of states did to it and what it leaves
+    /// of gravity and turns.
+    pub fn record(
+        &self,
+        run: &Run,
+        effects: &[BlockEffect],
+        quality: &Quality,
+    ) -> CalibrationRecord {
         CalibrationRecord {
+            quality: Some(quality_record(quality)),
             method: Some(Method::Ekf),
             blocks: effects.iter().map(BlockRecord::from).collect(),
             aiding: Some(match run.body_frame() {
@@ -42,6 +52,19 @@ impl Outcome {
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
             observability: direction_records(self),
+            warnings: self.warnings.clone(),
+            ..self.estimate.record(run)
+        }
+    }
+}
+
+impl ClosedForm {
+    /// The record of this calibration of a run, with what it leaves of gravity and turns.
+    pub fn record(&self, run: &Run, quality: &Quality) -> CalibrationRecord {
+        CalibrationRecord {
+            quality: Some(quality_record(quality)),
+            method: Some(Method::SixPosition),
+            body_frame: self.reference.body_frame(),
             warnings: self.warnings.clone(),
             ..self.estimate.record(run)
         }
@@ -85,7 +108,6 @@ impl Estimate {
             Some(rows(&sensitivity.try_inverse()?))
         };
         CalibrationRecord {
-            method: Some(Method::SixPosition),
             installation_form: Some(form),
             body_frame: run.body_frame(),
             unit: Some(run.unit.clone()),
@@ -224,6 +246,23 @@ impl From<&BlockEffect> for BlockRecord {
             nis_without: effect.without,
             nis_with: effect.with,
         }
+    }
+}
+
+fn quality_record(quality: &Quality) -> QualityRecord {
+    let spread = |spread: &Spread| SpreadRecord {
+        count: spread.count,
+        rms: spread.rms,
+        largest: spread.largest,
+    };
+    let measures = |measures: &Measures| MeasuresRecord {
+        gravity_m_s2: spread(&measures.gravity),
+        direction_rad: spread(&measures.direction),
+        turns_rad: spread(&measures.turns),
+    };
+    QualityRecord {
+        all: measures(&quality.all),
+        held_out: quality.held_out.as_ref().map(measures),
     }
 }
 

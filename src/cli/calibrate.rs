@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
 use turncal::calibration::{
-    self, CalibrationError, ClosedForm, Outcome, block_effects, in_body_frame, triads_of,
+    self, BlockEffect, CalibrationError, ClosedForm, Outcome, Quality, Reference, block_effects,
+    in_body_frame, triads_of,
 };
 use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};
@@ -43,7 +43,7 @@ pub struct Calibrate {
     /// How installation angles make the installation matrix
     #[arg(long, value_enum, default_value_t = Installation::General)]
     installation: Installation,
-    /// What the filter observes [default: table if the run has its log, else velocity]
+    /// What is observed [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
     /// Blocks of states to estimate, beside those that the run switches on
@@ -63,7 +63,7 @@ pub struct Calibrate {
 enum Method {
     /// Extended Kalman filter over the whole run
     Ekf,
-    /// Closed form from the static positions
+    /// Closed form: from the table's positions, else from labelled sections, else from gravity
     SixPosition,
 }
 
@@ -103,13 +103,54 @@ enum Result {
     ClosedForm(Box<ClosedForm>),
 }
 
+impl Result {
+    fn outcome(&self) -> Option<&Outcome> {
+        match self {
+            Self::Filter(outcome) => Some(outcome),
+            Self::ClosedForm(_) => None,
+        }
+    }
+
+    fn closed_form(&self) -> Option<&ClosedForm> {
+        match self {
+            Self::Filter(_) => None,
+            Self::ClosedForm(closed_form) => Some(closed_form),
+        }
+    }
+
+    fn method(&self) -> (&'static str, &Estimate) {
+        match self {
+            Self::Filter(outcome) => ("EKF", &outcome.estimate),
+            Self::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
+        }
+    }
+
+    fn note(&self) -> String {
+        self.closed_form().map(note).unwrap_or_default()
+    }
+
+    fn effects(&self, run: &Run) -> std::result::Result<Vec<BlockEffect>, CalibrationError> {
+        let effects = self.outcome().map(|outcome| block_effects(run, outcome));
+        effects.unwrap_or(Ok(Vec::new()))
+    }
+
+    fn quality(&self, run: &Run) -> std::result::Result<Quality, CalibrationError> {
+        match self {
+            Self::Filter(outcome) => outcome.quality(run),
+            Self::ClosedForm(closed_form) => closed_form.quality(run),
+        }
+    }
+
+    fn record(&self, run: &Run, effects: &[BlockEffect], quality: &Quality) -> CalibrationRecord {
+        match self {
+            Self::Filter(outcome) => outcome.record(run, effects, quality),
+            Self::ClosedForm(closed_form) => closed_form.record(run, quality),
+        }
+    }
+}
+
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
-        if let (Method::SixPosition, Some(Aiding::Velocity)) = (self.method, self.aiding) {
-            let message = "--method six-position takes attitudes from the table's log and observes no \
-                           velocity; leave out --aiding velocity, or use --method ekf\n";
-            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-        }
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let mut run = Run::read(&self.run)?;
         match self.aiding {
@@ -160,43 +201,30 @@ impl Calibrate {
                 Result::ClosedForm(Box::new(closed_form))
             }
         };
-        let method = match &result {
-            Result::Filter(outcome) => ("EKF", &outcome.estimate),
-            Result::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
-        };
-        let (effects, navigation) = rayon::join(
-            || match &result {
-                Result::Filter(outcome) => block_effects(&run, outcome),
-                Result::ClosedForm(_) => Ok(Vec::new()),
+        let (effects, (quality, navigation)) = rayon::join(
+            || result.effects(&run),
+            || {
+                let quality = result.quality(&run);
+                (quality, navigate(&run, &[result.method()], truth.as_ref()))
             },
-            || navigate(&run, &[method], truth.as_ref()),
         );
-        let effects = effects?;
-        let record = match &result {
-            Result::Filter(outcome) => outcome.record(&run, &effects),
-            Result::ClosedForm(closed_form) => closed_form.estimate.record(&run),
-        };
-        let note = match &result {
-            Result::Filter(_) => String::new(),
-            Result::ClosedForm(closed_form) => note(closed_form),
-        };
+        let (effects, quality) = (effects?, quality?);
+        let record = result.record(&run, &effects, &quality);
+        let note = result.note();
         let dwells = dwell_times(&run);
         let report = Report {
             title: &run.name,
             run: &run,
-            outcome: match &result {
-                Result::Filter(outcome) => Some(outcome),
-                Result::ClosedForm(_) => None,
-            },
+            body_frame: record.body_frame,
+            outcome: result.outcome(),
             effects: &effects,
+            quality: Some(&quality),
             true_terms: &true_terms,
-            closed_form: match &result {
-                Result::Filter(_) => None,
-                Result::ClosedForm(closed_form) => Some(report::ClosedForm {
-                    estimate: &closed_form.estimate,
-                    note: &note,
-                }),
-            },
+            closed_form: result.closed_form().map(|closed_form| report::ClosedForm {
+                estimate: &closed_form.estimate,
+                note: &note,
+                warnings: &closed_form.warnings,
+            }),
             truth: truth_in_form.as_ref(),
             dwells: &dwells,
             navigation: navigation.as_deref(),
@@ -233,12 +261,20 @@ pub fn filter(run: &Run, form: InstallationForm, activity: &Activity) -> anyhow:
 
 /// What a closed form was made of, in a few words.
 pub fn note(closed_form: &ClosedForm) -> String {
-    format!(
-        "{} positions for the gyros, {} for the accelerometers, {:.0} min of standing",
-        closed_form.positions.gyro,
-        closed_form.positions.accel,
-        closed_form.standing_time / 60.0
-    )
+    let PerSensor { gyro, accel } = closed_form.positions;
+    let turns = closed_form.turns;
+    let from = match closed_form.reference {
+        Reference::Table => {
+            format!("{gyro} positions for the gyros, {accel} for the accelerometers")
+        }
+        Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
+        Reference::Gravity => {
+            format!("gravity in {accel} dwells and its direction over {turns} turns")
+        }
+    };
+    let minutes = closed_form.standing_time / 60.0;
+    let digits = usize::from(minutes < 10.0);
+    format!("{from}, {minutes:.digits$} min of standing")
 }
 
 /// Navigates 40 h standing level at the run's site by the calibration of each method.

@@ -57,20 +57,26 @@ impl Demo {
             ("closed form", &closed_form.estimate),
             ("EKF", &outcome.estimate),
         ];
-        let (effects, navigation) = rayon::join(
+        let (effects, (quality, navigation)) = rayon::join(
             || calibration::block_effects(run, &outcome),
-            || navigate(run, &methods, Some(&turning.truth)),
+            || {
+                let quality = outcome.quality(run);
+                (quality, navigate(run, &methods, Some(&turning.truth)))
+            },
         );
-        let effects = effects?;
+        let (effects, quality) = (effects?, quality?);
         let report = Report {
             title: "turncal demo",
             run,
+            body_frame: run.body_frame(),
             outcome: Some(&outcome),
             effects: &effects,
+            quality: Some(&quality),
             true_terms: &BTreeMap::new(),
             closed_form: Some(report::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
+                warnings: &closed_form.warnings,
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
@@ -87,9 +93,9 @@ impl Demo {
         };
         let (filtered, closed) = (method("ekf")?, method("six-position")?);
         write(&standing, &closed)?;
-        let record = outcome.record(run, &effects);
+        let record = outcome.record(run, &effects, &quality);
         record.write(&filtered.join("calibration.json"), false)?;
-        let record = closed_form.estimate.record(&standing.run);
+        let record = closed_form.record(&standing.run, &closed_form.quality(&standing.run)?);
         record.write(&closed.join("calibration.json"), false)?;
         write_report(&report, &root.join("report"))?;
         directory.commit()?;

@@ -134,12 +134,7 @@ impl Stretch {
     }
 
     fn of_segment(run: &Run, segment: &Segment, which: &str) -> Self {
-        let imu = &run.imu;
-        let at = |time: f64| {
-            let sample = (time - imu.start) / imu.period;
-            (sample.round().max(0.0) as usize).min(imu.len())
-        };
-        let samples = at(segment.start)..at(segment.end);
+        let samples = segment.samples.clone();
         let needed = STANDING * samples.len() as f64;
         let stands = run.dwells().iter().any(|dwell| {
             let begin = samples.start.max(dwell.samples.start);

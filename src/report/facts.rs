@@ -122,7 +122,7 @@ pub(super) fn model(report: &Report) -> Markup {
     if let Some(estimate) = report.estimate() {
         rows.push(("installation form", estimate.form().name().to_owned()));
     }
-    rows.push(("body frame", report.run.body_frame().words().to_owned()));
+    rows.push(("body frame", report.body_frame.words().to_owned()));
     if let Some(outcome) = report.outcome {
         let held = outcome.passes.iter().filter(|pass| !pass.live).count();
         let passes = if held < outcome.passes.len() {

@@ -22,6 +22,7 @@ mod number;
 mod page;
 mod panel;
 mod path;
+mod quality;
 pub mod side_by_side;
 mod sigma;
 mod study;
@@ -38,12 +39,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::calibration::BlockEffect;
 use crate::calibration::outcome::{Estimate, Outcome, to_vector};
 use crate::calibration::states::ParameterVector;
+use crate::calibration::{BlockEffect, Quality};
 use crate::imu::{PerSensor, Triad};
 use crate::run::Run;
-use crate::run::record::TermRecord;
+use crate::run::record::{BodyFrame, TermRecord};
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the
@@ -54,6 +55,8 @@ pub struct Report<'a> {
     pub title: &'a str,
     /// The record.
     pub run: &'a Run,
+    /// What fixes the body axes.
+    pub body_frame: BodyFrame,
     /// The filter's result, if it ran.
     pub outcome: Option<&'a Outcome>,
     /// What blocks of states did to it, or would do.
@@ -64,6 +67,8 @@ pub struct Report<'a> {
     pub truth: Option<&'a PerSensor<Triad>>,
     /// True constants beside them by name, as far as they are known.
     pub true_terms: &'a BTreeMap<String, TermRecord>,
+    /// What the calibration leaves of gravity and turns.
+    pub quality: Option<&'a Quality>,
     /// Intervals during which the table stands, s.
     pub dwells: &'a [Range<f64>],
     /// What the calibrations are worth in navigation, the closed form first; or why that cannot be
@@ -87,6 +92,8 @@ pub struct ClosedForm<'a> {
     pub estimate: &'a Estimate,
     /// What it was made of, such as `six positions, 60 min of its own`.
     pub note: &'a str,
+    /// What must be known before using it.
+    pub warnings: &'a [String],
 }
 
 /// A report that could not be written.

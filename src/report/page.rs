@@ -24,6 +24,7 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
         @if let Some(estimate) = report.estimate() {
             section { h2 { "Parameters" } (tables::estimates(report, estimate)) }
         }
+        @if let Some(left) = report.quality_table() { (tables::section(&left)) }
         @if let Some(outcome) = report.outcome {
             section { h2 { "Consistency" } (tables::consistency(outcome))
                 p.note {

@@ -19,7 +19,7 @@ use crate::calibration::{Direction, Linearisation, Observability, Part};
 use crate::earth::Site;
 use crate::imu::*;
 use crate::run::record::TermRecord;
-use crate::run::{ImuRecord, Run, Standstill, TableRecord};
+use crate::run::{ImuRecord, Run, SET_BY_HAND, Standstill, TableRecord};
 use crate::study::navigation::Mission;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G};
 
@@ -48,12 +48,15 @@ impl Synthetic {
         Report {
             title: "Calibration of a made-up instrument",
             run: &self.run,
+            body_frame: self.run.body_frame(),
             outcome: Some(&self.outcome),
             effects: &[],
+            quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {
                 estimate: &self.closed,
                 note: "six positions for each triad, 60 min of its own",
+                warnings: &[],
             }),
             truth: Some(&self.truth),
             dwells: &self.dwells,
@@ -160,6 +163,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         files: Vec::new(),
         notes: Vec::new(),
         segments: Vec::new(),
+        segment_sigma: SET_BY_HAND,
     }
 }
 

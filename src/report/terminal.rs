@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
-use super::{Report, blocks, further, navigation, side_by_side};
+use super::{Report, blocks, further, navigation, quality, side_by_side};
 use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
@@ -22,6 +22,9 @@ impl Report<'_> {
         if let Some(line) = navigation::outlook::line(self.navigation.unwrap_or_default()) {
             let _ = writeln!(text, "\n{line}");
         }
+        if let Some(left) = self.quality_table() {
+            let _ = write!(text, "\n{}\n{}", left.title, columns(&left));
+        }
         for of_blocks in blocks::tables(self.effects) {
             let _ = write!(text, "\n{}\n{}", of_blocks.title, columns(&of_blocks));
         }
@@ -31,10 +34,16 @@ impl Report<'_> {
         text
     }
 
+    /// What the calibration leaves of gravity and turns.
+    pub(super) fn quality_table(&self) -> Option<side_by_side::Table> {
+        quality::table(self.quality?, self.run)
+    }
+
     /// What a calibration engineer must know before using the figures.
     pub(super) fn warnings(&self) -> Vec<String> {
+        let of_closed_form = self.closed_form.map_or(&[][..], |closed| closed.warnings);
         let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.warnings);
-        let mut warnings = of_outcome.to_vec();
+        let mut warnings = [of_closed_form, of_outcome].concat();
         warnings.extend(blocks::advice(self.effects));
         warnings
     }
@@ -52,7 +61,7 @@ impl Report<'_> {
         if let Some(estimate) = self.estimate() {
             let _ = write!(text, "; {} installation", estimate.form().name());
         }
-        let _ = writeln!(text, "; body frame: {}", self.run.body_frame().words());
+        let _ = writeln!(text, "; body frame: {}", self.body_frame.words());
         if let Some(outcome) = self.outcome {
             let _ = writeln!(text, "{}", passes(outcome));
         } else if let Some(closed_form) = self.closed_form {

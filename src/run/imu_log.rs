@@ -32,7 +32,7 @@ impl TimeStamp {
     ];
 
     /// From the begin of a sample to its stamp, in samples.
-    fn lag(self) -> f64 {
+    pub fn lag(self) -> f64 {
         match self {
             Self::Start => 0.0,
             Self::Middle => 0.5,

@@ -29,7 +29,9 @@ pub use error::{Place, RunError};
 pub use faults::{Bridge, Fault, FaultKind};
 pub use log_facts::{ColumnFacts, LogFacts, TemperatureFacts};
 pub(crate) use quantity::unit_scale;
+pub use read::SET_BY_HAND;
 pub use record::CalibrationRecord;
+pub use segments::{LabelledMotion, Segment};
 pub(crate) use sheet::Sheet;
 pub use state_block::StateBlock;
 pub use table_geometry::{
@@ -78,6 +80,8 @@ pub struct Run {
     pub table: Option<TableRecord>,
     /// Labelled sections, if there are any.
     pub segments: Vec<Segment>,
+    /// 1σ per axis of the attitude of a labelled position, and of where a labelled turn ends, rad.
+    pub segment_sigma: f64,
     /// The files that it was read from; none if it was made.
     pub files: Vec<PathBuf>,
     /// What the files say that has no effect yet, a sentence each.
@@ -192,17 +196,6 @@ impl Default for Standstill {
             position_sigma: 1.0,
         }
     }
-}
-
-/// A labelled section of the record.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Segment {
-    /// Begin, s.
-    pub start: f64,
-    /// End, s.
-    pub end: f64,
-    /// `x_up` … `z_down`, `rot_x+360` and the like.
-    pub label: String,
 }
 
 /// A time rounded to 1 ns, so that it prints short.

@@ -1,7 +1,7 @@
 //! `run.toml` and the files that it names, as one [`Run`].
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::RunError;
 use super::fields::{Document, Fields};
@@ -13,6 +13,9 @@ use crate::units::DEGREE;
 
 /// The version of the format of `run.toml`.
 pub(super) const FORMAT: &str = "turncal-run/1";
+
+/// 1σ per axis of a position that is set by hand, rad.
+pub const SET_BY_HAND: f64 = DEGREE;
 
 /// Fields of `[meta]`.
 pub(super) const META: [&str; 8] = [
@@ -64,10 +67,7 @@ impl Run {
         let instrument = Instrument::of_fields(&top, directory, &mut notes)?;
         let standstill = standstill(&top)?;
         let table_log = TableLog::of_fields(&top, directory, &mut notes)?;
-        let segments_file = match top.table("segments", &["file"])? {
-            Some(fields) => Some(directory.join(fields.need("file", "a file name")?.text()?)),
-            None => None,
-        };
+        let (segments_file, segment_sigma) = labels(&top, directory)?.unzip();
 
         // The small files' fields are checked before the large files are read.
         let mut files = vec![path.to_owned(), instrument.log.file.clone()];
@@ -77,7 +77,11 @@ impl Run {
         notes.extend(faults::notes(&imu));
         let table = table_log.map(|log| log.read(&imu)).transpose()?;
         let segments = match segments_file {
-            Some(file) => segments::read(&file, &imu)?,
+            Some(file) => {
+                let log = &instrument.log;
+                let first_stamp = imu.start + log.stamp.lag() * imu.period;
+                segments::read(&file, &imu, first_stamp, log.axes)?
+            }
             None => Vec::new(),
         };
         Ok(Self {
@@ -93,6 +97,7 @@ impl Run {
             standstill,
             table,
             segments,
+            segment_sigma: segment_sigma.unwrap_or(SET_BY_HAND),
             files,
             notes,
         })
@@ -145,6 +150,19 @@ fn meta(top: &Fields) -> Result<BTreeMap<String, String>, RunError> {
             .collect(),
         None => Ok(BTreeMap::new()),
     }
+}
+
+/// The file of labelled sections and how well they are set.
+fn labels(top: &Fields, directory: &Path) -> Result<Option<(PathBuf, f64)>, RunError> {
+    let Some(fields) = top.table("segments", &["file", "position_sigma_deg"])? else {
+        return Ok(None);
+    };
+    let file = directory.join(fields.need("file", "a file name")?.text()?);
+    let sigma = match fields.get("position_sigma_deg") {
+        Some(field) => field.positive()? * DEGREE,
+        None => SET_BY_HAND,
+    };
+    Ok(Some((file, sigma)))
 }
 
 fn standstill(top: &Fields) -> Result<Standstill, RunError> {

@@ -70,6 +70,9 @@ pub struct CalibrationRecord {
     /// Whether the innovations agree with their covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyRecord>,
+    /// What it leaves of gravity and turns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<QualityRecord>,
     /// What blocks of states beside the triads' parameters did, or would do.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
@@ -130,7 +133,7 @@ pub enum Aiding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyFrame {
-    /// The table's mounting face.
+    /// The mounting face, of the table or of labelled positions.
     #[default]
     Table,
     /// Accelerometer x along body x, accelerometer y in the xy plane.
@@ -141,7 +144,7 @@ impl BodyFrame {
     /// In a few words.
     pub fn words(self) -> &'static str {
         match self {
-            Self::Table => "mounting face of the turntable",
+            Self::Table => "mounting face",
             Self::Accelerometer => {
                 "x along accelerometer x, y in the plane of accelerometers x and y"
             }
@@ -181,6 +184,38 @@ pub struct NisRecord {
     pub nis: f64,
     /// 95 % interval (χ²).
     pub nis_interval: [f64; 2],
+}
+
+/// What a calibration leaves of what is known without a truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct QualityRecord {
+    /// Over the whole record.
+    pub all: MeasuresRecord,
+    /// In dwells whose observations a calibration did without, and over the turns that end in them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<MeasuresRecord>,
+}
+
+/// Departures from gravity and from known turns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeasuresRecord {
+    /// Size of specific force at rest less gravity.
+    pub gravity_m_s2: SpreadRecord,
+    /// Angle between up as gyros carry it over a turn and as accelerometers see it after.
+    pub direction_rad: SpreadRecord,
+    /// Angle between a turn as gyros see it and as table or label say.
+    pub turns_rad: SpreadRecord,
+}
+
+/// Several departures.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SpreadRecord {
+    /// How many; the rest is zero if none.
+    pub count: usize,
+    /// Root mean square.
+    pub rms: f64,
+    /// The largest.
+    pub largest: f64,
 }
 
 /// A block of states against the same run without it.
@@ -244,6 +279,7 @@ impl CalibrationRecord {
             passes: None,
             converged: None,
             consistency: None,
+            quality: None,
             blocks: Vec::new(),
             observability: Vec::new(),
             warnings: Vec::new(),

@@ -257,10 +257,15 @@ reading_sigma_arcsec = {reading:?}    # white, each reading
         }
     }
     if !run.segments.is_empty() {
-        sections.push(
-            "\n# labelled sections of the record, in s\n[segments]\nfile = \"segments.csv\"\n"
-                .to_owned(),
-        );
+        sections.push(format!(
+            r#"
+# labelled sections of the record, in s
+[segments]
+file = "segments.csv"
+position_sigma_deg = {:?}
+"#,
+            short(run.segment_sigma / DEGREE)
+        ));
     }
     sections.concat()
 }

@@ -17,7 +17,8 @@ pub use scenario::{Given, Scenario};
 use crate::attitude::exp;
 use crate::imu::{FurtherVector, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
 use crate::run::{
-    ImuRecord, Run, Standstill, TABLE_GEOMETRY, TableGeometry, TableRecord, Tilts, across, tilts,
+    ImuRecord, Run, SET_BY_HAND, Standstill, TABLE_GEOMETRY, TableGeometry, TableRecord, Tilts,
+    across, tilts,
 };
 use crate::turntable::{Imperfection, Motion, Moves, TableError};
 
@@ -148,6 +149,7 @@ impl Scenario {
             files: Vec::new(),
             notes: Vec::new(),
             segments: Vec::new(),
+            segment_sigma: SET_BY_HAND,
         };
         Ok(Simulated {
             run,

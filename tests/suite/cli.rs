@@ -140,14 +140,6 @@ fn wrong_usage_is_status_two_and_names_the_way() {
     for arguments in [
         &["calibrate"][..],
         &["calibrate", "run.toml", "--installation", "four-angle"],
-        &[
-            "calibrate",
-            "r.toml",
-            "--method",
-            "six-position",
-            "--aiding",
-            "velocity",
-        ],
         &["simulate", "demo"],
         &["dance"],
         &["demo", "--seed", "many"],

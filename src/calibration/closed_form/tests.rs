@@ -24,6 +24,7 @@ fn six(truth: &Triad, size: f64) -> Vec<Position> {
                 input,
                 output: truth.output(&input),
                 variance: Vector3::repeat(1e-12),
+                weighted: Vector3::repeat(1e-12),
             }
         })
         .collect()

@@ -2,10 +2,10 @@
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::outcome::to_vector;
-use super::super::states::{ParameterVector, parameter};
+use super::super::states::{ParameterMatrix, ParameterVector, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::Block;
 use crate::run::Run;
@@ -47,12 +47,14 @@ impl Equations {
         equations
     }
 
-    /// An equation `error = row δθ` of one triad's parameters, its error of this variance.
-    pub(super) fn add(&mut self, sensor: Sensor, row: &TriadVector, error: f64, variance: f64) {
+    /// An equation `error = Σ row δθ` of triads' parameters, its error of this variance.
+    pub(super) fn add(&mut self, rows: &[(Sensor, TriadVector)], error: f64, variance: f64) {
         let mut whole = ParameterVector::zeros();
-        whole
-            .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
-            .copy_from(row);
+        for (sensor, row) in rows {
+            whole
+                .fixed_rows_mut::<PER_TRIAD>(parameter(*sensor, 0))
+                .copy_from(row);
+        }
         self.add_row(whole, error, variance);
     }
 
@@ -77,6 +79,30 @@ impl Equations {
     fn add_row(&mut self, row: ParameterVector, error: f64, variance: f64) {
         let weight = 1.0 / (variance + ROUNDING.powi(2)).sqrt();
         self.rows.push((row * weight, error * weight));
+    }
+
+    /// Covariance of the unknown parameters; zero for all others. `None` if they are not determined.
+    pub(super) fn covariance(&self) -> Option<ParameterMatrix> {
+        let n = self.unknown.len();
+        let information = DMatrix::from_fn(n, n, |i, j| {
+            let (i, j) = (self.unknown[i], self.unknown[j]);
+            self.rows.iter().map(|(row, _)| row[i] * row[j]).sum()
+        });
+        let inverse = information.cholesky()?.inverse();
+        let mut covariance = ParameterMatrix::zeros();
+        for (i, &row) in self.unknown.iter().enumerate() {
+            for (j, &column) in self.unknown.iter().enumerate() {
+                covariance[(row, column)] = inverse[(i, j)];
+            }
+        }
+        Some(covariance)
+    }
+
+    /// Mean square of the errors, each over its σ and the prior's included; one if nothing but noise is
+    /// left.
+    pub(super) fn misfit(&self) -> f64 {
+        let sum: f64 = self.rows.iter().map(|(_, error)| error.powi(2)).sum();
+        sum / (self.rows.len() - self.unknown.len()) as f64
     }
 
     /// The step δθ of least squares.

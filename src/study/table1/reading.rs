@@ -71,6 +71,7 @@ impl Reading {
                     input,
                     output: truth.output(&input),
                     variance: Vector3::zeros(),
+                    weighted: Vector3::zeros(),
                 }
             })
             .collect();

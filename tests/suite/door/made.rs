@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
 use turncal::imu::{Instability, Noise, Nominal, PerSensor, Prior, Sensor};
-use turncal::run::{ImuRecord, Run, Segment, Standstill, TableRecord};
+use turncal::run::{ImuRecord, LabelledMotion, Run, Segment, Standstill, TableRecord};
+use turncal::units::DEGREE;
 
 /// A run that turns and stands, with every optional part.
 pub fn made_run(name: &str) -> Run {
@@ -79,8 +80,14 @@ pub fn made_run(name: &str) -> Run {
         segments: vec![Segment {
             start: 3.5,
             end: 4.25,
+            samples: 31..127,
             label: "rot_x+360".to_owned(),
+            motion: Some(LabelledMotion::Turns {
+                axis: Vector3::x(),
+                angle: 360.0 * DEGREE,
+            }),
         }],
+        segment_sigma: 2.0 * DEGREE,
         files: Vec::new(),
         notes: Vec::new(),
     }
