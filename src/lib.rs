@@ -25,5 +25,6 @@ pub mod report;
 pub mod run;
 pub mod simulation;
 pub mod study;
+pub mod survey;
 pub mod turntable;
 pub mod units;

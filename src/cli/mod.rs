@@ -4,6 +4,7 @@ mod allan;
 mod apply;
 mod block;
 mod calibrate;
+mod check;
 mod compare;
 mod demo;
 mod export;
@@ -43,6 +44,7 @@ enum Command {
     Export(export::Export),
     Study(study::Study),
     Init(init::Init),
+    Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
 }
@@ -60,6 +62,7 @@ impl Cli {
             Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
             Command::Init(init) => init.run(),
+            Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
         }

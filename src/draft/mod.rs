@@ -7,6 +7,7 @@ mod name;
 mod noise;
 mod text;
 mod time;
+mod turns;
 mod units;
 
 use std::path::Path;

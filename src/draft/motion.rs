@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
+use super::turns;
 use crate::imu::PerSensor;
 use crate::units::DEGREE;
 
@@ -16,14 +17,6 @@ const SIGMAS: f64 = 6.0;
 const PART: f64 = 1e-3;
 /// σ of a normal distribution over the median of its absolute deviations.
 const SIGMA_OF_MEDIAN: f64 = 1.482_602;
-/// Length of the windows over which gravity's direction is followed, s.
-const STEP: f64 = 0.08;
-/// Specific force within this part of gravity shows its direction.
-const NEAR_GRAVITY: f64 = 0.1;
-/// Turns in all that tell the unit of the gyros, rad.
-const ENOUGH: f64 = 20.0 * DEGREE;
-/// How well gravity's direction must follow the gyros.
-const CORRELATION: f64 = 0.9;
 /// Samples on either side of a cut …
 const BESIDE: usize = 8;
 /// … between which gravity's direction changes by this much at once, rad …
@@ -60,11 +53,11 @@ pub(super) fn median(values: &mut [f64]) -> Option<f64> {
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
+pub(super) fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
     samples.iter().sum::<Vector3<f64>>() / samples.len().max(1) as f64
 }
 
-fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
+pub(super) fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
     samples.chunks_exact(length).map(mean).collect()
 }
 
@@ -118,13 +111,22 @@ impl Motion {
             .max_by_key(|stretch| stretch.len())
             .cloned()
             .unwrap_or(0..0);
+        // At its ends a rest is already or still a motion.
+        let settled: Vec<Range<usize>> = stretches
+            .iter()
+            .filter(|stretch| stretch.len() > 3)
+            .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
+            .collect();
+        let cuts = cuts(&samples.accel);
         Self {
             longest_rest: longest.start * length..longest.end * length,
             gravity: median(&mut sizes).unwrap_or(usual),
             rest,
-            angle: angle(samples, rest, usual, period),
-            cuts: cuts(&samples.accel),
-            sum_variance: sum_variance(samples, &stretches, length),
+            angle: (cuts == 0)
+                .then(|| turns::angle(samples, &settled, rest, usual, period))
+                .flatten(),
+            cuts,
+            sum_variance: sum_variance(samples, &settled),
         }
     }
 }
@@ -142,36 +144,6 @@ fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
     found
 }
 
-/// By least squares of `ḟ = f × ω` over short steps, wherever |f| is that of gravity.
-fn angle(
-    samples: &PerSensor<Vec<Vector3<f64>>>,
-    rest: Vector3<f64>,
-    gravity: f64,
-    period: f64,
-) -> Option<f64> {
-    let length = ((STEP / period).round() as usize).max(1);
-    let gyro = means(&samples.gyro, length);
-    let accel = means(&samples.accel, length);
-    let (mut both, mut turned, mut seen) = (0.0, 0.0, 0.0);
-    for (rate, force) in gyro.windows(3).zip(accel.windows(3)) {
-        let near = |f: &Vector3<f64>| (f.norm() / gravity - 1.0).abs() < NEAR_GRAVITY;
-        if !force.iter().all(near) {
-            continue;
-        }
-        let angle = (0.5 * (rate[0] + rate[2]) + rate[1] - 2.0 * rest) * length as f64;
-        let expected = force[1].normalize().cross(&angle);
-        let change = force[2].normalize() - force[0].normalize();
-        // What changes more is no turn but a border between sections.
-        if change.norm() < 0.5 {
-            both += expected.dot(&change);
-            turned += expected.norm_squared();
-            seen += change.norm_squared();
-        }
-    }
-    let correlation = both / (turned * seen).sqrt();
-    (seen.sqrt() > 0.1 * ENOUGH && correlation.abs() > CORRELATION).then(|| both / turned)
-}
-
 fn cuts(accel: &[Vector3<f64>]) -> usize {
     let (mut cuts, mut next) = (0, 2 * BESIDE);
     while next + 2 * BESIDE <= accel.len() {
@@ -186,17 +158,13 @@ fn cuts(accel: &[Vector3<f64>]) -> usize {
     cuts
 }
 
-fn sum_variance(
-    samples: &PerSensor<Vec<Vector3<f64>>>,
-    stretches: &[Range<usize>],
-    length: usize,
-) -> Option<f64> {
+fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
     let mut least: Option<f64> = None;
     for triad in [&samples.gyro, &samples.accel] {
         for axis in 0..3 {
             let (mut of_sums, mut of_one, mut count) = (0.0, 0.0, 0.0);
-            for stretch in stretches {
-                let values: Vec<f64> = triad[stretch.start * length..stretch.end * length]
+            for stretch in settled {
+                let values: Vec<f64> = triad[stretch.clone()]
                     .iter()
                     .map(|sample| sample[axis])
                     .collect();

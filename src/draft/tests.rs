@@ -129,7 +129,7 @@ fn unsigned_registers_have_their_zero_in_the_middle_and_a_data_sheets_scale() {
             "time_unit = \"count\"",
             "# sample_period_s =  # TODO",
             "bias = 32768.0",
-            "scale = 417.6718", // 4096 counts for one g
+            "scale = 417.6758  # 4096 counts for one g",
         ],
     );
 }
@@ -166,7 +166,7 @@ fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
             "output = \"pulse\"",
             "gyro_unit = \"count\"",
             "accel_unit = \"count\"",
-            "scale = 2",
+            "scale = 1997",
         ],
     );
 }

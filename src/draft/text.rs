@@ -244,7 +244,12 @@ impl Draft {
         let is_count = unit.word.is_none_or(|word| word == "count");
         let scale = self.quantities.scale(sensor);
         match (&unit.scale, is_count) {
-            (Some(scale), _) => line(text, "scale", &seven(scale.value).to_string(), &scale.why),
+            (Some(scale), _) => line(
+                text,
+                "scale",
+                &format!("{:?}", seven(scale.value)),
+                &scale.why,
+            ),
             (None, true) => todo(
                 text,
                 "scale",

@@ -226,7 +226,9 @@ impl Quantities {
         let by_name = known.iter().find(|(word, _)| Some(*word) == named);
         let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
         // Counts per second for one rad/s: rows add up to the angle.
-        let measured = angle.map(|angle| row / angle).filter(|scale| scale.is_finite());
+        let measured = angle
+            .map(|angle| row / angle)
+            .filter(|scale| scale.is_finite());
         let mut unit = Unit::default();
         match (by_name, by_turn) {
             (Some(&(word, value)), _) => {
