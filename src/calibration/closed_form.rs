@@ -233,13 +233,13 @@ pub fn six_position_triad(
         });
         // Positions in a plane leave an eigenvalue of nothing but rounding and table error, whatever the
         // weights.
-        let weight = information.diagonal().map(|v: f64| v.sqrt().recip());
-        let weight = Matrix4::from_diagonal(&weight);
-        let smallest = (weight * information * weight)
-            .symmetric_eigenvalues()
-            .min();
-        // Not a number where an input is never there.
-        if !(smallest > SMALLEST_EIGENVALUE) {
+        let diagonal = information.diagonal();
+        if diagonal.min() <= 0.0 {
+            return None;
+        }
+        let weight = Matrix4::from_diagonal(&diagonal.map(|v: f64| v.sqrt().recip()));
+        let correlations = weight * information * weight;
+        if correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE {
             return None;
         }
         let solution = design.qr().solve_lstsq(&outputs);

@@ -112,7 +112,8 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
         .run;
     let equation = |run: &turncal::run::Run| {
         let outcome = estimate(run, FORM, &|_| {}).unwrap();
-        outcome.record(run, &[]).equation.unwrap()
+        let quality = outcome.quality(run).unwrap();
+        outcome.record(run, &[], &quality).equation.unwrap()
     };
     // Errors of the table are none of the instrument.
     assert_eq!(equation(&run), EQUATION);

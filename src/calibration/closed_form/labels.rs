@@ -18,6 +18,7 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
     let mut positions = PerSensor::<Vec<Position>>::default();
     let mut turns = 0;
     let mut standing_time = 0.0;
+    let sigma = run.segment_sigma;
     for segment in &run.segments {
         let Some(motion) = segment.motion.filter(|_| !segment.samples.is_empty()) else {
             continue;
@@ -34,27 +35,24 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
                 let of_accel = section.mean(Sensor::Accel, run);
                 let white = Vector3::repeat(of_accel.variance);
                 let force = up * run.site.gravity;
-                positions.accel.push(Position {
-                    // As if nothing were known of how gravity falls on the other two axes: so the bias
-                    // of each comes from its own two positions, as in half sums.
-                    weighted: white + across(&force),
-                    ..set_by_hand(run, force, of_accel.output, white)
-                });
+                positions
+                    .accel
+                    .push(force_by_hand(sigma, force, of_accel.output, white));
                 // Which way is north is not known, so what is level of Earth rate is noise.
                 let earth_rate = run.site.earth_rate_n();
                 let level = across(&up) * (0.5 * earth_rate.y.powi(2));
                 let rate = up * earth_rate.z;
-                let gyro = set_by_hand(run, rate, of_gyro.output, noise + level);
+                let gyro = set_by_hand(sigma, rate, of_gyro.output, noise + level);
                 positions.gyro.push(gyro);
                 standing_time += duration;
             }
             LabelledMotion::Turns { axis, angle } => {
                 let rate = axis * (angle / duration);
-                let end = (run.segment_sigma / duration).powi(2) + ROTATION_RATE.powi(2);
+                let end = (sigma / duration).powi(2) + ROTATION_RATE.powi(2);
                 let noise = noise.add_scalar(end);
                 positions
                     .gyro
-                    .push(set_by_hand(run, rate, of_gyro.output, noise));
+                    .push(set_by_hand(sigma, rate, of_gyro.output, noise));
                 turns += 1;
             }
         }
@@ -77,17 +75,31 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
     })
 }
 
+/// Gravity along an axis. It is weighted as if nothing were known of how it falls on the other two axes:
+/// so the bias of each comes from its own two positions, as in half sums.
+fn force_by_hand(
+    sigma: f64,
+    force: Vector3<f64>,
+    output: Vector3<f64>,
+    noise: Vector3<f64>,
+) -> Position {
+    Position {
+        weighted: noise + across(&force),
+        ..set_by_hand(sigma, force, output, noise)
+    }
+}
+
 /// An input along or about an axis that is within a degree or so of where it should be, and this noise.
 ///
 /// To first order that turns the input into the other two axes. Along the axis it takes off the second
 /// order: half the sum of two squared angles, whose mean square is twice the fourth power of one's σ.
 fn set_by_hand(
-    run: &Run,
+    sigma: f64,
     input: Vector3<f64>,
     output: Vector3<f64>,
     noise: Vector3<f64>,
 ) -> Position {
-    let turn = run.segment_sigma.powi(2);
+    let turn = sigma.powi(2);
     let along = input.map(|component| 2.0 * (component * turn).powi(2));
     let variance = noise + across(&input) * turn + along;
     Position {
@@ -95,5 +107,104 @@ fn set_by_hand(
         output,
         variance,
         weighted: variance,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::SVector;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::super::six_position_triad;
+    use super::*;
+    use crate::attitude::exp;
+    use crate::calibration::mean_square_interval;
+    use crate::imu::{ParameterKind, Triad, TriadVector};
+    use crate::units::DEGREE;
+
+    /// Squared errors over variances of scale factors, installation and biases, from this many sets of
+    /// positions that are each off by random tilts.
+    fn mean_squares(
+        sets: usize,
+        make: impl Fn(&mut dyn FnMut(f64) -> Vector3<f64>, &Triad) -> Vec<Position>,
+    ) -> [f64; 3] {
+        let form = InstallationForm::General;
+        let v = [
+            1.02, 0.97, 1.01, 0.02, -0.03, 0.01, 0.02, -0.01, 0.03, 0.5, -0.2, 0.1,
+        ];
+        let truth = Triad::from_vector(form, &TriadVector::from(v));
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut sums = [0.0; 3];
+        for _ in 0..sets {
+            let mut draw = |sigma: f64| {
+                let v: SVector<f64, 3> = SVector::from_fn(|_, _| StandardNormal.sample(&mut rng));
+                v * sigma
+            };
+            let positions = make(&mut draw, &truth);
+            let (found, covariance) = six_position_triad(&positions, form).unwrap();
+            let error = found.to_vector() - truth.to_vector();
+            for (k, e) in error.iter().enumerate() {
+                let place = match Triad::kind(k) {
+                    ParameterKind::Scale => 0,
+                    ParameterKind::Installation => 1,
+                    ParameterKind::Bias => 2,
+                };
+                let of_kind = [3.0, 6.0, 3.0][place] * sets as f64;
+                sums[place] += e.powi(2) / covariance[(k, k)] / of_kind;
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn positions_that_a_hand_tilts_are_as_wrong_as_their_sigma_says() {
+        const SETS: usize = 400;
+        let (tilt, noise) = (2.0 * DEGREE, 2e-3);
+        let squares = mean_squares(SETS, |draw, truth| {
+            let axes = (0..6).map(|k| Vector3::ith(k / 2, if k % 2 == 0 { 9.8 } else { -9.8 }));
+            axes.map(|force| {
+                let sensed = truth.output(&(exp(draw(tilt)) * force)) + draw(noise);
+                force_by_hand(tilt, force, sensed, Vector3::repeat(noise.powi(2)))
+            })
+            .collect()
+        });
+        println!("{squares:?}");
+        // Of first order in the tilts, and so as normal as they are.
+        let (low, high) = mean_square_interval(6 * SETS, 1e-3);
+        assert!((low..=high).contains(&squares[1]));
+        // Of second order: squares of squares, whose mean is as stated but spreads widely.
+        assert!((0.5..1.5).contains(&squares[0]), "scale {}", squares[0]);
+        assert!((0.5..1.5).contains(&squares[2]), "bias {}", squares[2]);
+    }
+
+    #[test]
+    fn turns_about_tilted_axes_are_as_wrong_as_their_sigma_says() {
+        const SETS: usize = 400;
+        let (tilt, noise, duration) = (2.0 * DEGREE, 1e-4, 4.0);
+        let end = tilt / duration;
+        let squares = mean_squares(SETS, |draw, truth| {
+            let turns = (0..3).map(|k| Vector3::ith(k, std::f64::consts::TAU / duration));
+            let turns: Vec<_> = turns
+                .map(|rate| {
+                    let turned = exp(draw(tilt)) * rate + draw(end);
+                    let output = truth.output(&turned) + draw(noise);
+                    let variance = Vector3::repeat(noise.powi(2) + end.powi(2));
+                    set_by_hand(tilt, rate, output, variance)
+                })
+                .collect();
+            let rests = (0..6).map(|_| {
+                let output = truth.output(&Vector3::zeros()) + draw(noise);
+                let variance = Vector3::repeat(noise.powi(2));
+                set_by_hand(tilt, Vector3::zeros(), output, variance)
+            });
+            rests.chain(turns).collect()
+        });
+        println!("{squares:?}");
+        for (squares, of_kind) in squares.into_iter().zip([3, 6, 3]) {
+            let (low, high) = mean_square_interval(of_kind * SETS, 1e-3);
+            assert!((low..=high).contains(&squares), "{squares} {low} {high}");
+        }
     }
 }

@@ -1,0 +1,317 @@
+//! Spoilt files of every format: an answer or an error that names the file, never a panic.
+//!
+//! `PROPTEST_CASES=1000000 cargo test --release --test suite fuzz` goes on for a million inputs a format.
+
+use std::fs;
+use std::path::Path;
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::sample::{Index, select};
+use proptest::test_runner::{Config, TestRunner};
+use tempfile::TempDir;
+use turncal::calibration::{Correction, estimate, six_position};
+use turncal::imu::{InstallationForm, Output};
+use turncal::models;
+use turncal::noise::Stretch;
+use turncal::noise::conventions::convert;
+use turncal::run::{CalibrationRecord, Run, write_run};
+use turncal::simulation::Scenario;
+
+/// Cases of each format where `PROPTEST_CASES` says nothing.
+const CASES: u32 = 500;
+
+/// What numbers are replaced by.
+const NUMBERS: [&str; 22] = [
+    "",
+    "0",
+    "-0",
+    "1",
+    "-1",
+    "2.5",
+    "1e-3",
+    "1e3",
+    "1e9",
+    "-1e12",
+    "1e308",
+    "-1e308",
+    "1e400",
+    "5e-324",
+    "nan",
+    "inf",
+    "-inf",
+    "9007199254740993",
+    "18446744073709551616",
+    "0x7f",
+    "1_0",
+    "1,5",
+];
+
+/// One thing that happens to a file.
+#[derive(Debug, Clone)]
+enum Spoil {
+    Bytes(Index, usize, Vec<u8>),
+    Number(Index, &'static str),
+    CopyLine(Index, Index),
+    RemoveLines(Index, usize),
+    CutAt(Index),
+}
+
+impl Spoil {
+    fn any() -> impl Strategy<Value = Self> {
+        prop_oneof![
+            2 => (any::<Index>(), 0..4usize, vec(any::<u8>(), 0..4))
+                .prop_map(|(at, removed, bytes)| Self::Bytes(at, removed, bytes)),
+            6 => (any::<Index>(), select(&NUMBERS[..])).prop_map(|(at, with)| Self::Number(at, with)),
+            1 => (any::<Index>(), any::<Index>()).prop_map(|(from, to)| Self::CopyLine(from, to)),
+            1 => (any::<Index>(), 1..30usize).prop_map(|(at, count)| Self::RemoveLines(at, count)),
+            1 => any::<Index>().prop_map(Self::CutAt),
+        ]
+    }
+
+    fn apply(&self, content: &mut Vec<u8>) {
+        if content.is_empty() {
+            return;
+        }
+        match self {
+            Self::Bytes(at, removed, bytes) => {
+                let at = at.index(content.len());
+                let end = (at + removed).min(content.len());
+                content.splice(at..end, bytes.iter().copied());
+            }
+            Self::Number(at, with) => {
+                let numbers = numbers(content);
+                if !numbers.is_empty() {
+                    let number = numbers[at.index(numbers.len())].clone();
+                    content.splice(number, with.bytes());
+                }
+            }
+            Self::CopyLine(from, to) => {
+                let mut lines = lines(content);
+                let line = lines[from.index(lines.len())].to_vec();
+                lines.insert(to.index(lines.len()), &line);
+                *content = lines.concat();
+            }
+            Self::RemoveLines(at, count) => {
+                let mut lines = lines(content);
+                let at = at.index(lines.len());
+                let end = (at + count).min(lines.len());
+                lines.drain(at..end);
+                *content = lines.concat();
+            }
+            Self::CutAt(at) => content.truncate(at.index(content.len())),
+        }
+    }
+}
+
+fn lines(content: &[u8]) -> Vec<&[u8]> {
+    content.split_inclusive(|&byte| byte == b'\n').collect()
+}
+
+/// Where numbers stand.
+fn numbers(content: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let of_number = |byte: &u8| byte.is_ascii_digit() || b"+-.".contains(byte);
+    let mut numbers = Vec::new();
+    let mut start = 0;
+    for run in content.chunk_by(|a, b| of_number(a) == of_number(b)) {
+        let end = start + run.len();
+        if run.iter().any(u8::is_ascii_digit) {
+            numbers.push(start..end);
+        }
+        start = end;
+    }
+    numbers
+}
+
+/// Spoils one file of a directory again and again; `read` says what became of it.
+fn fuzz(directory: &TempDir, file: &str, read: impl Fn(&Path) -> Result<(), String>) {
+    let path = directory.path().join(file);
+    let good = fs::read(&path).unwrap();
+    read(directory.path()).unwrap();
+    let config = Config {
+        cases: std::env::var("PROPTEST_CASES").map_or(CASES, |_| Config::default().cases),
+        failure_persistence: None,
+        ..Config::default()
+    };
+    let outcome = TestRunner::new(config).run(&vec(Spoil::any(), 1..5), |spoils| {
+        let mut content = good.clone();
+        spoils.iter().for_each(|spoil| spoil.apply(&mut content));
+        fs::write(&path, &content).unwrap();
+        if let Err(message) = read(directory.path()) {
+            let named = message.contains(directory.path().to_str().unwrap());
+            prop_assert!(named, "no file named: {message}");
+        }
+        Ok(())
+    });
+    if let Err(error) = outcome {
+        panic!("{file}: {error}");
+    }
+    fs::write(&path, good).unwrap();
+}
+
+/// A small run with dwells and turns, a table and labels.
+fn small_run() -> TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let scenario = r#"seed = 1
+[site]
+latitude_deg = 34.0
+[imu]
+model = "industrial-mems"
+installation = "general"
+output = "rate"
+sample_rate_hz = 20.0
+[turntable]
+model = "three-axis"
+path = "path.toml"
+"#;
+    let path = "first_dwell_s = 3.0\n[axes]\nstart_deg = [0, 0, 0]\nrate_deg_per_s = 90.0\n\
+                acceleration_deg_per_s2 = 90.0\ndwell_s = 3.0\nsteps = [\n  { turn_deg = [0, 90, 0] },\n  \
+                { turn_deg = [0, 0, 90] },\n]\n";
+    fs::write(directory.path().join("scenario.toml"), scenario).unwrap();
+    fs::write(directory.path().join("path.toml"), path).unwrap();
+    let scenario =
+        Scenario::load(directory.path().join("scenario.toml").to_str().unwrap()).unwrap();
+    let run = scenario.simulate(1, 0).unwrap().run;
+    write_run(directory.path(), &run, Output::Rate, None).unwrap();
+    // Plain text is spoilt in more ways than what is compressed.
+    let toml = fs::read_to_string(directory.path().join("run.toml")).unwrap();
+    for name in ["imu", "table"] {
+        let packed = fs::File::open(directory.path().join(format!("{name}.csv.gz"))).unwrap();
+        let mut text = String::new();
+        std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(packed), &mut text)
+            .unwrap();
+        fs::write(directory.path().join(format!("{name}.csv")), text).unwrap();
+    }
+    let toml = toml.replace(".csv.gz", ".csv") + "\n[segments]\nfile = \"segments.csv\"\n";
+    fs::write(directory.path().join("run.toml"), toml).unwrap();
+    let labels = "start,end,label\n0.2,2.8,z_up\n3.0,4.0,rot_x+90\n";
+    fs::write(directory.path().join("segments.csv"), labels).unwrap();
+    directory
+}
+
+/// Reads a run and does what needs no filter.
+fn read_run(directory: &Path) -> Result<(), String> {
+    let mut run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
+    let _ = run.dwells();
+    let _ = Stretch::find(&run, None);
+    for without_table in [false, true] {
+        if without_table {
+            run.table = None;
+        }
+        if let Ok(closed_form) = six_position(&run, InstallationForm::General) {
+            let _ = closed_form.quality(&run);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn spoilt_runs() {
+    let run = small_run();
+    for file in ["run.toml", "imu.csv", "table.csv", "segments.csv"] {
+        fuzz(&run, file, read_run);
+    }
+}
+
+#[test]
+fn spoilt_compressed_files() {
+    let run = small_run();
+    let toml = run.path().join("run.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    fs::write(&toml, text.replace("imu.csv", "imu.csv.gz")).unwrap();
+    fuzz(&run, "imu.csv.gz", read_run);
+}
+
+#[test]
+fn runs_whose_figures_make_no_sense_are_calibrated_or_refused() {
+    let run = small_run();
+    let toml = run.path().join("run.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    let terms = "[imu.terms]\naccel-second-order = { sigma = 50.0 }\n[standstill]";
+    fs::write(&toml, text.replace("[standstill]", terms)).unwrap();
+    fuzz(&run, "run.toml", |directory| {
+        let Ok(mut run) = Run::read(&directory.join("run.toml")) else {
+            return Ok(());
+        };
+        for without_table in [false, true] {
+            if without_table {
+                run.table = None;
+            }
+            if let Ok(outcome) = estimate(&run, InstallationForm::General, &|_| {}) {
+                let _ = outcome.quality(&run);
+            }
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn spoilt_models() {
+    let directory = tempfile::tempdir().unwrap();
+    let copy = |from: &str, to: &str| {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("models")
+            .join(from);
+        fs::copy(from, directory.path().join(to)).unwrap();
+    };
+    copy("imu/tactical-fog.toml", "imu.toml");
+    copy("installation/general.toml", "installation.toml");
+    copy("turntable/three-axis-with-errors.toml", "table.toml");
+    copy("path/three-axis.toml", "path.toml");
+    copy("trajectory/flight.toml", "trajectory.toml");
+    let scenario = "seed = 1\n[site]\nlatitude_deg = 34.0\nheight_m = 10.0\n[imu]\nmodel = \"imu.toml\"\n\
+                    installation = \"installation.toml\"\noutput = \"pulse\"\nsample_rate_hz = 100.0\n\
+                    lever_arm_m = [0.05, -0.02, 0.03]\n[turntable]\nmodel = \"table.toml\"\n\
+                    path = \"path.toml\"\n";
+    fs::write(directory.path().join("scenario.toml"), scenario).unwrap();
+    let load = |directory: &Path| {
+        let scenario = directory.join("scenario.toml");
+        let scenario = Scenario::load(scenario.to_str().unwrap()).map_err(|e| e.to_string())?;
+        let _ = scenario.duration();
+        Ok(())
+    };
+    for file in [
+        "scenario.toml",
+        "imu.toml",
+        "installation.toml",
+        "table.toml",
+        "path.toml",
+    ] {
+        fuzz(&directory, file, load);
+    }
+    fuzz(&directory, "trajectory.toml", |directory| {
+        let trajectory = directory.join("trajectory.toml");
+        let place = models::Place::CommandLine;
+        models::trajectory(trajectory.to_str().unwrap(), &place).map_err(|e| e.to_string())?;
+        Ok(())
+    });
+}
+
+#[test]
+fn spoilt_calibrations() {
+    let run = small_run();
+    let read = Run::read(&run.path().join("run.toml")).unwrap();
+    let outcome = estimate(&read, InstallationForm::General, &|_| {}).unwrap();
+    let record = outcome.record(&read, &[], &outcome.quality(&read).unwrap());
+    let path = run.path().join("calibration.json");
+    record.write(&path, false).unwrap();
+    fuzz(&run, "calibration.json", |directory| {
+        let path = directory.join("calibration.json");
+        let record = CalibrationRecord::read(&path).map_err(|error| error.to_string())?;
+        if let Ok(correction) = Correction::for_run(&record, &read) {
+            let _ = correction.samples(&read).last();
+        }
+        Ok(())
+    });
+}
+
+proptest! {
+    #[test]
+    fn units_of_noise_are_converted_or_refused(
+        value in any::<f64>(),
+        unit in "[a-z°µ/()^*√ 0-9-]{0,12}",
+        rate in any::<Option<f64>>(),
+    ) {
+        let _ = convert(value, &unit, rate);
+    }
+}
