@@ -253,7 +253,15 @@ impl Draft {
             (None, true) => todo(
                 text,
                 "scale",
-                "counts per second for one rad/s or m/s², from the data sheet",
+                match sensor {
+                    Sensor::Gyro => {
+                        "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, \
+                         32.8, 16.4"
+                    }
+                    Sensor::Accel => {
+                        "counts for one m/s² by the data sheet: those for one g over 9.80665"
+                    }
+                },
             ),
             (None, false) => {}
         }

@@ -71,15 +71,21 @@ impl CheckReport<'_> {
     fn title(&self) -> String {
         let imu = &self.run.imu;
         format!(
-            "Check of {}: {} s, {} samples at {} Hz, {} dwells, {} turns",
+            "Check of {}: {} s, {} samples at {} Hz, {}, {}",
             self.run.name,
             value(imu.duration(), 10.0),
             count(imu.len()),
             three_digits(imu.period.recip()),
-            self.survey.rests.len(),
-            self.survey.turns.len(),
+            several(self.survey.rests.len(), "dwell"),
+            several(self.survey.turns.len(), "turn"),
         )
     }
+}
+
+/// Such as `3 turns`.
+fn several(count: usize, name: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {name}{plural}")
 }
 
 #[cfg(test)]

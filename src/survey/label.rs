@@ -17,7 +17,7 @@ const OTHER_ANGLE: f64 = 0.1;
 /// A section of a position may move for this part of its time.
 const MOVING: f64 = 0.05;
 /// A section that begins or ends at a faster rate begins or ends within a turn, rad/s.
-const TURNING: f64 = 5.0 * DEGREE;
+const TURNING: f64 = 15.0 * DEGREE;
 /// Length of its ends, s.
 const END: f64 = 0.1;
 

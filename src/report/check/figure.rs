@@ -26,7 +26,8 @@ const ROW: f64 = 15.0;
 pub(super) fn figure(report: &CheckReport) -> Result<Figure, ReportError> {
     let mut caption = "Gyro rates and specific force along body axes by nominal scales, as they stand in the file. \
                        Grey: dwells, numbered as in the table and with the axis that is up; above the rates: turns, by \
-                       axis and angle, where there is room."
+                       axis and angle, or angle alone if about several axes, where there is \
+                       room."
         .to_owned();
     if !report.run.imu.faults.is_empty() {
         caption += " Crosses: faults of the log in the triad's samples, missing and duplicate rows in both.";
@@ -81,11 +82,9 @@ fn triad(report: &CheckReport, area: &Area, sensor: Sensor) -> Result<(), DrawEr
     };
     let mut panel = Panel::new(area, title, MARGINS, axes, x_title, &dwells)?;
     for (axis, points) in lines.iter().enumerate() {
-        let pen = Pen {
-            width: 1.0,
-            ..Pen::axis(axis)
-        };
-        panel.line(points, Pen { dash: None, ..pen })?;
+        // Dashes would be lost in noise.
+        let pen = Pen::nth(axis, 1.0);
+        panel.line(points, pen)?;
         if let Some(last) = points.last() {
             panel.label(last.1, AXES[axis], pen.color);
         }
@@ -97,11 +96,7 @@ fn triad(report: &CheckReport, area: &Area, sensor: Sensor) -> Result<(), DrawEr
     let faults: Vec<(f64, f64)> = of_triad
         .map(|fault| (imu.time(fault.samples.start), low - 0.06 * span))
         .collect();
-    panel.marks(
-        &faults,
-        Mark::Cross,
-        Pen::solid(Pen::nth(1, 1.0).color, 1.5),
-    )?;
+    panel.marks(&faults, Mark::Cross, Pen::solid(INK, 1.5))?;
     panel.finish()?;
     let labels: Vec<(f64, String)> = match sensor {
         Sensor::Gyro => turns(report),

@@ -1,6 +1,6 @@
 //! The log, dwells and turns, labels and methods as tables.
 
-use super::super::number::{count, sigma, three_digits, value};
+use super::super::number::{count, sigma, three_digits, value, whole};
 use super::super::side_by_side::Table;
 use super::CheckReport;
 use super::words::{degrees, direction, of_label, signed, way_up};
@@ -49,9 +49,9 @@ fn columns(report: &CheckReport) -> Option<Table> {
             vec![
                 column.name.clone(),
                 format!("{} {axis}", sensor.name()),
-                three_digits(column.smallest),
+                exactly(column.smallest),
                 count(column.at_smallest),
-                three_digits(column.largest),
+                exactly(column.largest),
                 count(column.at_largest),
                 run.unit.get(sensor).clone(),
                 column.step.map_or(NONE.to_owned(), three_digits),
@@ -77,6 +77,15 @@ fn columns(report: &CheckReport) -> Option<Table> {
         rows.collect(),
         &["Body axes are right, front, up. Step: of the grid on which all values lie."],
     ))
+}
+
+/// A whole number as it is, others to four digits.
+fn exactly(x: f64) -> String {
+    if x.fract() == 0.0 {
+        whole(x)
+    } else {
+        value(x, x.abs() / 100.0)
+    }
 }
 
 fn faults(report: &CheckReport) -> Option<Table> {
@@ -156,8 +165,11 @@ fn moved(turn: &Turn, survey: &crate::survey::Survey) -> [String; 4] {
     };
     [
         about,
-        signed(turn.angle),
-        three_digits(turn.fastest / DEGREE),
+        match turn.single {
+            true => signed(turn.angle),
+            false => degrees(turn.angle.abs()),
+        },
+        value(turn.fastest / DEGREE, 1.0),
         turn.off_gravity(&survey.rests)
             .map_or(NONE.to_owned(), degrees),
     ]
@@ -168,13 +180,14 @@ fn labels(report: &CheckReport) -> Option<Table> {
     let rows = checks.iter().map(|check| {
         let found = match (&check.verdict, check.segment.motion) {
             (Verdict::Unknown | Verdict::Empty, _) => NONE.to_owned(),
-            (Verdict::Position { off, moving }, _) => {
-                format!(
-                    "stands, {}° off, moves for {} s",
+            (Verdict::Position { off, moving }, _) => match *moving > 0.0 {
+                true => format!(
+                    "{}° off, moves for {} s",
                     degrees(*off),
-                    three_digits(*moving)
-                )
-            }
+                    value(*moving, 1.0)
+                ),
+                false => format!("stands, {}° off", degrees(*off)),
+            },
             (Verdict::Turn { angle, off, .. }, Some(LabelledMotion::Turns { .. })) => {
                 format!(
                     "turns by {}°, its axis {}° off",
@@ -227,7 +240,7 @@ fn methods(report: &CheckReport) -> Table {
                 row.extend(expected.sigma.iter().map(shown));
                 if !expected.unobserved.is_empty() {
                     let names = expected.unobserved.join(", ");
-                    notes.push(format!("{words} would not see {names}."));
+                    notes.push(format!("{words} would leave these above half the σ that [imu.prior] states: {names}."));
                 }
             }
             Err(reason) => {

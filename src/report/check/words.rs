@@ -17,6 +17,7 @@ const WRONG_PART: f64 = 0.1;
 const WORTH: f64 = 60.0 * DEGREE;
 /// Parameters of the accelerometers without a table: as many directions of up are needed.
 const DIRECTIONS: usize = 9;
+const MICROSECOND: f64 = 1e-6;
 /// Beyond so many places only their number is said.
 const NAMED: usize = 4;
 
@@ -30,12 +31,12 @@ pub(super) fn way_up(axis: usize, down: bool) -> String {
     format!("{} {}", AXES[axis], if down { "down" } else { "up" })
 }
 
-/// Such as `+360° about x`.
+/// Such as `x +360.0°`; about several axes only how far.
 pub(super) fn turn(turn: &Turn) -> String {
     match turn.body_axis() {
         Some(axis) => format!("{} {}°", AXES[axis], signed(turn.angle)),
         None if turn.single => format!("{} {}°", direction(turn), signed(turn.angle)),
-        None => "several axes".to_owned(),
+        None => format!("{}°", degrees(turn.angle.abs())),
     }
 }
 
@@ -65,10 +66,10 @@ pub(super) fn log(report: &CheckReport) -> String {
     );
     if let Some(log) = &run.imu.log {
         text += &format!(
-            " {} rows; stamps are off the uniform clock by {} ms RMS, {} ms at most.",
+            " {} rows; stamps are off the uniform clock by {} µs RMS, {} µs at most.",
             count(log.rows),
-            three_digits(1e3 * log.jitter_rms),
-            three_digits(1e3 * log.jitter_max)
+            value(log.jitter_rms / MICROSECOND, 1.0),
+            value(log.jitter_max / MICROSECOND, 1.0)
         );
         if let Some(temperature) = log.temperature {
             text += &format!(
@@ -194,7 +195,7 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
         ),
         (Verdict::Position { moving, .. }, _) => format!(
             "moves for {} s of its time: draw its borders closer",
-            three_digits(*moving)
+            value(*moving, 1.0)
         ),
         (Verdict::Turn { cut: true, .. }, _) => {
             "begins or ends within the turn: draw its borders wider, to where it stands".to_owned()
@@ -276,7 +277,8 @@ fn of_methods(survey: &Survey) -> Vec<String> {
     match always.is_empty() {
         true => Vec::new(),
         false => vec![format!(
-            "No method would see {}: they would stay as [imu.prior] has them.",
+            "By every method {} would stay above half the σ that [imu.prior] states: more positions and turns \
+             would show them.",
             always.join(", ")
         )],
     }
