@@ -177,57 +177,38 @@ impl Uniform {
             let place = Place::Line(line);
             Err(RunError::new(file, place, found, expected, advice))
         };
-        let steps = || stamps.windows(2).map(|pair| pair[1].0 - pair[0].0);
-        let mut sorted: Vec<f64> = steps().collect();
-        let middle = sorted.len() / 2;
-        let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
         let first = stamps[0];
+        let found = mean_step(stamps);
         if let Some(period) = given
-            && (median - period).abs() > 0.5 * period
+            && (found - period).abs() > 0.5 * period
         {
             return error(
                 first.1,
-                format!("steps of {} s from row to row", nanoseconds(median)),
+                format!("steps of {} s from row to row", nanoseconds(found)),
                 format!("sample_period_s = {period} as in run.toml"),
                 "Correct sample_period_s or the time column.",
             );
         }
-        let about = given.unwrap_or_else(|| {
-            // The mean is free of the rounding that the median of printed steps keeps.
-            let near = |step: &f64| (step - median).abs() <= 0.5 * median;
-            let (count, sum) = steps()
-                .filter(near)
-                .fold((0.0, 0.0), |(count, sum), step| (count + 1.0, sum + step));
-            sum / f64::max(count, 1.0)
-        });
+        let about = given.unwrap_or(found);
+        let gap = |row: usize| {
+            let ((before, _), (time, line)) = (stamps[row - 1], stamps[row]);
+            RunError::new(
+                file,
+                Place::Line(line),
+                format_args!("a gap in time from {before} s to {time} s"),
+                "fewer rows missing than there are",
+                "Split the record there.",
+            )
+        };
 
-        let most = 2 * stamps.len();
-        let mut numbers = Vec::with_capacity(stamps.len());
-        numbers.push(0);
-        let (mut number, mut period) = (0, about);
-        let mut due = first.0 + phase(stamps, about);
-        for pair in stamps.windows(2) {
-            let ((before, _), (time, line)) = (pair[0], pair[1]);
-            let step = ((time - due) / period).round().max(1.0);
-            if number as f64 + step > most as f64 {
-                return error(
-                    line,
-                    format!("a gap in time from {before} s to {time} s"),
-                    "fewer rows missing than there are".to_owned(),
-                    "Split the record there.",
-                );
-            }
-            number += step as usize;
-            numbers.push(number);
-            due += step * period;
-            let off = time - due;
-            due += PHASE * off;
-            if given.is_none() {
-                period += PERIOD * off / step;
-            }
+        let mut numbers = numbers(stamps, about, given.is_some()).map_err(gap)?;
+        let (mut first, mut period) = fit(stamps, &numbers, about, given.is_some());
+        // A period that jitter and gaps falsified may have lost count once or twice.
+        if given.is_none() {
+            numbers = self::numbers(stamps, period, false).map_err(gap)?;
+            (first, period) = fit(stamps, &numbers, period, false);
         }
 
-        let (first, period) = fit(stamps, &numbers, about, given.is_some());
         let (mut squares, mut largest) = (0.0, 0.0f64);
         for (&(time, line), &number) in stamps.iter().zip(&numbers) {
             let due = first + number as f64 * period;
@@ -251,6 +232,47 @@ impl Uniform {
             jitter_max: largest,
         })
     }
+}
+
+/// Number of each sample by steps from row to row, with a clock that follows the stamps slowly; the row
+/// after a gap longer than all rows together if there is one.
+fn numbers(stamps: &[(f64, u64)], about: f64, given: bool) -> Result<Vec<usize>, usize> {
+    let most = 2 * stamps.len();
+    let mut numbers = Vec::with_capacity(stamps.len());
+    numbers.push(0);
+    let (mut number, mut period) = (0, about);
+    let mut due = stamps[0].0 + phase(stamps, about);
+    for (row, &(time, _)) in stamps.iter().enumerate().skip(1) {
+        let step = ((time - due) / period).round().max(1.0);
+        if number as f64 + step > most as f64 {
+            return Err(row);
+        }
+        number += step as usize;
+        numbers.push(number);
+        due += step * period;
+        let off = time - due;
+        due += PHASE * off;
+        if !given {
+            period += PERIOD * off / step;
+        }
+    }
+    Ok(numbers)
+}
+
+/// Rows over which steps are compared: more hide jitter, fewer are seldom without a gap.
+const SPAN: usize = 8;
+/// Spans without a gap are within this part of their median.
+const NO_GAP: f64 = 0.8 / SPAN as f64;
+
+/// Mean step where no row is missing. It is free of the rounding that a single printed step keeps.
+fn mean_step(stamps: &[(f64, u64)]) -> f64 {
+    let span = SPAN.min(stamps.len() - 1);
+    let steps = |stamps: &[(f64, u64)]| (stamps[span].0 - stamps[0].0) / span as f64;
+    let mut sorted: Vec<f64> = stamps.windows(span + 1).map(steps).collect();
+    let middle = sorted.len() / 2;
+    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+    sorted.retain(|step| (step - median).abs() <= NO_GAP * median);
+    sorted.iter().sum::<f64>() / sorted.len() as f64
 }
 
 /// From the first stamp to its due time by the circular mean of the first stamps' phases, which gaps

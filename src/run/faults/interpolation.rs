@@ -25,9 +25,9 @@ const CANDIDATES: [(usize, usize); 12] = [
 /// The same for a hole at the begin or end of the record.
 const ONE_SIDED: [(usize, usize); 4] = [(0, 1), (0, 4), (0, 16), (0, MOST)];
 /// Intact stretches that are filled as the hole is, on either side at most …
-const TRIALS: usize = 12;
+const TRIALS: usize = 16;
 /// … and on both together at least.
-const FEWEST_TRIALS: usize = 6;
+const FEWEST_TRIALS: usize = 8;
 /// A hole and its neighbours lie within this many times what they span without other holes.
 const REACH: usize = 4;
 /// A change across the hole that is this many times the largest across intact stretches is not known
@@ -62,24 +62,25 @@ pub(super) fn fill(
         let Some(fill) = Fill::new(degree, used.collect(), hole.clone()) else {
             continue;
         };
-        let Some(variance) = fill.measured(axis, sound) else {
+        let Some(variances) = fill.measured(axis, sound) else {
             continue;
         };
         let sum = fill.sum(axis, 0);
         let better = best.as_ref().is_none_or(|best| {
-            variance < best.variance && (sum - best.sum).powi(2) <= AGREE * AGREE * best.variance
+            variances[0] < best.variances[0]
+                && (sum - best.sum).powi(2) <= AGREE * AGREE * best.variances[0]
         });
         if better {
             best = Some(Trial {
                 fill,
                 sum,
-                variance,
+                variances,
             });
         }
     }
     if let Some(best) = best {
         best.fill.apply(axis);
-        return Some(best.variance);
+        return Some(best.variances[1]);
     }
     // Nobody may integrate over these, but what is read there must not be wild.
     let [before, after] = [&sides[0], &sides[1]].map(|side| side.first().map(|&k| axis[k]));
@@ -105,7 +106,9 @@ fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize
 struct Trial {
     fill: Fill,
     sum: f64,
-    variance: f64,
+    /// Mean square of the error, by one half of the intact stretches and by the other: the least of
+    /// many measured with the first is too small by chance, but not with the second.
+    variances: [f64; 2],
 }
 
 /// A polynomial through neighbours by least squares.
@@ -176,8 +179,8 @@ impl Fill {
         }
     }
 
-    /// Mean square of the sum's error over intact stretches near by.
-    fn measured(&self, axis: &[f64], sound: &[bool]) -> Option<f64> {
+    /// Mean square of the sum's error over intact stretches near by, every other and the rest.
+    fn measured(&self, axis: &[f64], sound: &[bool]) -> Option<[f64; 2]> {
         let intact = |shift: isize| {
             let mut needed = self.used.iter().copied().chain(self.hole.clone());
             needed.all(|k| {
@@ -186,7 +189,7 @@ impl Fill {
             })
         };
         let length = self.hole.len();
-        let stride = (length / 4).max(1);
+        let stride = length.div_ceil(2);
         let reach = (6 * (length + self.used.len()) + MOST) as isize;
         let mut errors = Vec::with_capacity(2 * TRIALS);
         let mut largest_change = 0f64;
@@ -204,8 +207,6 @@ impl Fill {
                 largest_change = largest_change.max(self.change(axis, shift).abs());
             }
         }
-        let squares: f64 = errors.iter().map(|error| error * error).sum();
-        let measured = squares / errors.len() as f64;
         // A larger change than any tried may have come at any moment.
         let change = self.change(axis, 0).abs();
         let sudden = if change > UNTRIED * largest_change {
@@ -213,7 +214,12 @@ impl Fill {
         } else {
             0.0
         };
-        (errors.len() >= FEWEST_TRIALS).then_some(measured.max(sudden))
+        let mean_square = |first: usize| {
+            let half = errors.iter().skip(first).step_by(2);
+            let count = half.len() as f64;
+            f64::max(half.map(|error| error * error).sum::<f64>() / count, sudden)
+        };
+        (errors.len() >= FEWEST_TRIALS).then(|| [mean_square(0), mean_square(1)])
     }
 
     /// Mean of the neighbours after less that of those before, `shift` samples later.
@@ -239,7 +245,7 @@ mod tests {
 
     const HOLES: usize = 300;
 
-    /// Mean square of the error over the variance stated, for holes of this length in a signal.
+    /// Mean square of the error over the mean variance stated, for holes of this length in a signal.
     fn consistency(signal: impl Fn(f64) -> f64, sigma: f64, length: usize) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let apart = 10 * length + 500;
@@ -247,26 +253,29 @@ mod tests {
         let truth: Vec<f64> = (0..apart * HOLES)
             .map(|k| signal(k as f64) + sigma * normal())
             .collect();
-        let ratios = (0..HOLES).map(|k| {
+        let (mut squares, mut variances) = (0.0, 0.0);
+        for k in 0..HOLES {
             let hole = apart * k + apart / 2..apart * k + apart / 2 + length;
             let mut axis = truth.clone();
             axis[hole.clone()].fill(f64::NAN);
             let sound: Vec<bool> = axis.iter().map(|value| !value.is_nan()).collect();
             let variance = fill(&mut axis, &sound, &hole, 1000).unwrap();
             let error: f64 = hole.clone().map(|k| axis[k] - truth[k]).sum();
-            error * error / variance
-        });
-        ratios.sum::<f64>() / HOLES as f64
+            squares += error * error;
+            variances += variance;
+        }
+        squares / variances
     }
 
     #[test]
     fn the_error_stated_is_the_error_made() {
-        // 99 % of the means of 300 squares lie within 1 ± 0.21; the variances, too, scatter.
+        // 99 % of the means of 300 squares lie within 1 ± 0.21; the best of many ways is a little worse than
+        // it looks.
         for length in [1, 3, 20] {
             let still = consistency(|_| 7.0, 1.0, length);
-            assert!((0.8..1.35).contains(&still), "{length}: {still}");
+            assert!((0.75..1.35).contains(&still), "{length}: {still}");
             let swings = consistency(|t| 300.0 * (t / 40.0).sin(), 1.0, length);
-            assert!((0.6..1.35).contains(&swings), "{length}: {swings}");
+            assert!((0.75..1.35).contains(&swings), "{length}: {swings}");
         }
     }
 

@@ -10,6 +10,8 @@ use crate::units::DEGREE;
 
 /// Nothing is known of an axis over a longer time, s.
 const LONGEST: f64 = 2.0;
+/// A hole is short against one that is this many times as long.
+const SHORT: usize = 8;
 /// An attitude that may be wrong by more is beyond a linear filter, rad.
 const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
@@ -87,8 +89,16 @@ impl Rows<'_> {
                 sound[fault.samples.clone()].fill(false);
             }
             let longest = (LONGEST / period) as usize;
-            for hole in holes(&sound) {
-                let variance = fill(&mut samples, &sound, &hole, longest);
+            let mut holes = holes(&sound);
+            holes.sort_by_key(Range::len);
+            let mut filled = 0;
+            for (number, hole) in holes.iter().enumerate() {
+                // Beside a long hole short ones, once filled, are as good as sound.
+                while filled < number && SHORT * holes[filled].len() <= hole.len() {
+                    sound[holes[filled].clone()].fill(true);
+                    filled += 1;
+                }
+                let variance = fill(&mut samples, &sound, hole, longest);
                 let variance = variance.map(|variance| variance * self.units[k].powi(2));
                 let linear =
                     |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
@@ -96,7 +106,7 @@ impl Rows<'_> {
                     Some(variance) => bridges.push(Bridge {
                         sensor,
                         axis,
-                        samples: hole,
+                        samples: hole.clone(),
                         variance,
                     }),
                     None => {

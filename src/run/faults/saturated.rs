@@ -12,6 +12,9 @@ const AROUND: usize = 8;
 /// It stands out by more than this many times the largest change from row to row there.
 const STANDS_OUT: f64 = 8.0;
 
+/// Less than this part of the whole range is no change: the last digits of a number.
+const LEAST: f64 = 1e-6;
+
 /// What is known of a column.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Column<'a> {
@@ -90,7 +93,8 @@ impl Column<'_> {
         let largest = changes
             .filter(|pair| pair[0] != end && pair[1] != end)
             .map(|pair| (pair[1] - pair[0]).abs())
-            .fold(self.step.unwrap_or(0.0), f64::max);
+            .fold(self.step.unwrap_or(0.0), f64::max)
+            .max(LEAST * (self.largest - self.smallest));
         let out = (end - last).abs().min((end - first).abs());
         run.len() <= LONGEST_SPIKE && out > STANDS_OUT * largest
     }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::interpolation::fill;
+
 /// A run by chance may be this probable.
 const CHANCE: f64 = 1e-9;
 /// How often an axis changes is seen in this many rows on either side.
@@ -9,12 +11,18 @@ const AROUND: usize = 500;
 /// Where all axes repeat in more than this part of the rows, noise is not seen and a standing table
 /// looks as a stuck axis does.
 const NOISE_FREE: f64 = 0.1;
+/// A rate that drifts through a step of the grid repeats ever longer, then ever shorter: a run by chance
+/// is not longer than this many times the longest of the others.
+const LONGER: usize = 4;
 /// An axis that leaves its value by no more than this many steps of its grid may stand on it.
 const QUIET_STEPS: f64 = 1.5;
-/// What it does elsewhere says nothing of that, only rows within this many steps do …
+/// Its value elsewhere says nothing of that, only rows within this many steps do; and it is stuck only
+/// if what is interpolated from both sides contradicts its sum by more than so many steps, for pulses
+/// that repeat are right to a step or two, …
 const SAME_LEVEL_STEPS: f64 = 3.5;
-/// … if they are at least this many.
-const FEWEST: usize = 50;
+const WRONG_STEPS: f64 = 5.0;
+/// … and by more than so many σ of interpolation.
+const WRONG_SIGMAS: f64 = 5.0;
 
 /// For each column the rows that repeat the one before them so long that it is no chance, the first
 /// of equal values left out. `steps` are those of the columns' grids.
@@ -74,10 +82,24 @@ fn is_stuck(column: &[f64], run: &Range<usize>, step: Option<f64>) -> bool {
     seen.add(earlier.map(|k| column[k] == column[k - 1]));
     let later = (run.end + 1..column.len()).take_while(near);
     seen.add(later.map(|k| column[k] == column[k - 1]));
-    if same_level.is_some() && seen.pairs < FEWEST {
-        return false;
-    }
-    seen.chance(run.len()) < CHANCE
+    run.len() > LONGER * seen.longest
+        && seen.chance(run.len()) < CHANCE
+        && same_level.is_none_or(|step| is_wrong(column, run, step))
+}
+
+/// Whether the rows on both sides contradict the values of a run.
+fn is_wrong(column: &[f64], run: &Range<usize>, step: f64) -> bool {
+    let from = run.start.saturating_sub(AROUND + run.len());
+    let to = column.len().min(run.end + AROUND + run.len());
+    let hole = run.start - from..run.end - from;
+    let mut filled = column[from..to].to_vec();
+    let mut sound = vec![true; filled.len()];
+    sound[hole.clone()].fill(false);
+    let variance = fill(&mut filled, &sound, &hole, hole.len());
+    let difference = filled[hole].iter().sum::<f64>() - column[run.clone()].iter().sum::<f64>();
+    variance.is_some_and(|variance| {
+        difference.abs() > WRONG_STEPS * step + WRONG_SIGMAS * variance.sqrt()
+    })
 }
 
 /// How often rows repeat the one before.
@@ -87,16 +109,19 @@ struct Seen {
     repeats: usize,
     /// Repeats next to a repeat.
     again: usize,
+    /// Most repeats in a row.
+    longest: usize,
 }
 
 impl Seen {
     fn add(&mut self, repeats: impl Iterator<Item = bool>) {
-        let mut before = false;
+        let mut row = 0;
         for repeat in repeats {
             self.pairs += 1;
             self.repeats += usize::from(repeat);
-            self.again += usize::from(repeat && before);
-            before = repeat;
+            self.again += usize::from(repeat && row > 0);
+            row = if repeat { row + 1 } else { 0 };
+            self.longest = self.longest.max(row);
         }
     }
 
@@ -153,6 +178,17 @@ mod tests {
         for sigma in [0.05, 0.2] {
             assert!(find(&noise(sigma)).iter().all(Vec::is_empty), "σ {sigma}");
         }
+    }
+
+    #[test]
+    fn a_rate_that_drifts_through_a_step_is_no_fault() {
+        // Pulses of an angle whose rate passes 10 a row, where they come in tens for a long time.
+        let mut columns = noise(1.0);
+        let angle = |k: usize| 10.0 * k as f64 + 2e-6 * (k as f64 - 10_000.0).powi(2);
+        for (k, value) in columns[0].iter_mut().enumerate() {
+            *value = angle(k + 1).round() - angle(k).round();
+        }
+        assert!(find(&columns).iter().all(Vec::is_empty));
     }
 
     #[test]
