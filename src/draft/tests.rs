@@ -1,5 +1,10 @@
 use std::fs;
 
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
 use super::*;
 
 /// Three quarter turns about each axis in turn with rests between, at 100 Hz; `row` makes a line of time,
@@ -10,6 +15,7 @@ fn draft(header: &str, row: impl Fn(usize, [f64; 6]) -> String) -> String {
     let mut text = header.to_owned();
     let mut up = Vector3::new(0.1, 0.2, 1.0).normalize();
     let mut k = 0;
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
     for turn in 0..9 {
         for step in 0..300 {
             let rate = if step < 200 {
@@ -18,8 +24,7 @@ fn draft(header: &str, row: impl Fn(usize, [f64; 6]) -> String) -> String {
                 std::f64::consts::FRAC_PI_2
             };
             let rate = Vector3::ith(turn % 3, rate);
-            // Alternating noise has no white level, so it is uneven.
-            let noise = f64::from((k * 7919 % 101) as u32) / 50.0 - 1.0;
+            let noise: f64 = StandardNormal.sample(&mut rng);
             up = crate::attitude::exp(-rate * 0.01) * up;
             let (gyro, accel) = (
                 rate.add_scalar(noise * 1e-3),
@@ -33,8 +38,6 @@ fn draft(header: &str, row: impl Fn(usize, [f64; 6]) -> String) -> String {
     fs::write(&path, text).unwrap();
     Draft::of_file(&path).unwrap().to_toml("log.csv")
 }
-
-use nalgebra::Vector3;
 
 fn has(text: &str, lines: &[&str]) {
     for line in lines {
@@ -166,7 +169,7 @@ fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
             "output = \"pulse\"",
             "gyro_unit = \"count\"",
             "accel_unit = \"count\"",
-            "scale = 1997",
+            "scale = 199",
         ],
     );
 }

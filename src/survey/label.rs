@@ -16,8 +16,10 @@ const OTHER_AXIS: f64 = 30.0 * DEGREE;
 const OTHER_ANGLE: f64 = 0.1;
 /// A section of a position may move for this part of its time.
 const MOVING: f64 = 0.05;
-/// A section that begins or ends at a faster rate begins or ends within a turn, rad/s.
+/// A section that begins or ends at a faster rate begins or ends within a turn, rad/s …
 const TURNING: f64 = 15.0 * DEGREE;
+/// … unless hardly more of the turn is beyond, up to the rests around it, rad.
+const LOST: f64 = 3.0 * DEGREE;
 /// Length of its ends, s.
 const END: f64 = 0.1;
 
@@ -99,23 +101,47 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
             let zero = zero(run, rests, samples.start);
             let turn = Turn::of(run, samples.clone(), &zero);
             let length = ((END / run.imu.period).round() as usize).clamp(1, samples.len());
-            let rate = |samples: &[Vector3<f64>]| {
-                let sum: Vector3<f64> = samples.iter().sum();
-                (sum / (samples.len() as f64 * run.imu.period) - zero).norm()
+            let rate = |samples: Range<usize>| {
+                angle(run, samples, &zero).norm() / length as f64 / run.imu.period
             };
-            let section = &run.imu.gyro[samples];
-            let sum = section.iter().sum::<Vector3<f64>>()
-                - zero * (section.len() as f64 * run.imu.period);
+            let ends = [
+                samples.start..samples.start + length,
+                samples.end - length..samples.end,
+            ];
+            let at_ends = ends.into_iter().any(|end| rate(end) > TURNING);
+            // Beyond sections laid end to end lies something else.
+            let whole = if run.imu.continuous {
+                to_rests(rests, &samples)
+            } else {
+                samples.clone()
+            };
+            let within = angle(run, samples, &zero).dot(&axis);
+            let lost = angle(run, whole, &zero).dot(&axis) - within;
             let found = turn.axis * turn.angle.signum();
             let off = found.angle(&axis);
             Verdict::Turn {
-                angle: sum.dot(&axis),
+                angle: within,
                 off: off.min(std::f64::consts::PI - off),
-                cut: rate(&section[..length]) > TURNING
-                    || rate(&section[section.len() - length..]) > TURNING,
+                cut: at_ends && (!run.imu.continuous || lost.abs() > LOST),
             }
         }
     }
+}
+
+/// Sum of the gyros over some samples, rad.
+fn angle(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Vector3<f64> {
+    let section = &run.imu.gyro[samples];
+    section.iter().sum::<Vector3<f64>>() - zero * (section.len() as f64 * run.imu.period)
+}
+
+/// Some samples and those between them and the rests before and after.
+fn to_rests(rests: &[Rest], samples: &Range<usize>) -> Range<usize> {
+    let dwells = || rests.iter().map(|rest| &rest.dwell.samples);
+    let before = dwells().filter(|dwell| dwell.start < samples.start);
+    let after = dwells().filter(|dwell| dwell.end > samples.end);
+    let begin = before.map(|dwell| dwell.end.min(samples.start)).max();
+    let end = after.map(|dwell| dwell.start.max(samples.end)).min();
+    begin.unwrap_or(samples.start)..end.unwrap_or(samples.end)
 }
 
 /// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.

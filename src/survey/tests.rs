@@ -41,22 +41,17 @@ fn turns_are_those_of_the_table_full_turns_too() {
     let survey = Survey::of(&run);
     let table = run.table.as_ref().unwrap();
     assert_eq!(survey.turns.len(), 17);
-    let full = survey
-        .turns
-        .iter()
-        .filter(|turn| (turn.angle.abs() - 4.0 * PI).abs() < 5.0 * DEGREE);
-    assert_eq!(
-        full.count(),
-        3,
-        "the path begins with two full turns about each axis"
-    );
+    for turn in &survey.turns[..3] {
+        let full = 4.0 * PI;
+        assert!((turn.angle.abs() - full).abs() < 5.0 * DEGREE && turn.body_axis().is_some());
+    }
     for (turn, pair) in survey.turns.iter().zip(survey.rests.windows(2)) {
         let attitude =
             |rest: &Rest| table.attitude[rest.dwell.position.as_ref().unwrap().readings.start];
         let said = attitude(&pair[0]).transpose() * attitude(&pair[1]);
         let found = crate::attitude::exp(turn.axis * turn.angle);
         let off = crate::attitude::log(&(found * said.transpose())).norm();
-        assert!(off < 3.0 * DEGREE, "{}°", off / DEGREE);
+        assert!(off < 5.0 * DEGREE, "{}°", off / DEGREE);
     }
 }
 

@@ -15,7 +15,7 @@ fn a_sound_run_is_shown_with_nothing_to_change() {
     let directory = tempfile::tempdir().unwrap();
     report.write(directory.path()).unwrap();
     let svg = std::fs::read_to_string(directory.path().join("record.svg")).unwrap();
-    assert!(svg.contains("720°") && svg.contains("angular rate"));
+    assert!(svg.contains("angular rate") && svg.contains("z up"));
 }
 
 #[test]
