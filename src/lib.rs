@@ -10,7 +10,8 @@
 //! # Rooms
 //! Data flow one way: [`run`] → [`navigation`], [`calibration`] and [`noise`] → [`study`] → [`report`]. [`earth`],
 //! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`], [`export`]
-//! writes what other programs read.
+//! writes what other programs read. [`draft`] looks at a log of which nothing is known, [`survey`] at a run
+//! before it is calibrated.
 
 pub mod attitude;
 pub mod calibration;

@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::motion::median;
 use super::name::Name;
+use super::units::offset;
 use crate::imu::{PerSensor, Sensor};
 use crate::run::Sheet;
 
@@ -152,11 +154,19 @@ fn by_numbers(
 /// Median departure of a triad's size from its median, relative.
 fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
     let rows = 0..sheet.columns[triad[0]].len();
-    let size = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row])).norm();
-    let mut sizes: Vec<f64> = rows.map(size).filter(|size| size.is_finite()).collect();
-    let middle = super::motion::median(&mut sizes).unwrap_or(0.0);
+    let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
+    let samples: Vec<Vector3<f64>> = rows
+        .map(at)
+        .filter(|sample| sample.iter().all(|value| value.is_finite()))
+        .collect();
+    let zero = offset(&samples).unwrap_or_default();
+    let mut sizes: Vec<f64> = samples
+        .iter()
+        .map(|sample| (sample - zero).norm())
+        .collect();
+    let middle = median(&mut sizes).unwrap_or(0.0);
     let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
-    let off = super::motion::median(&mut off).unwrap_or(0.0);
+    let off = median(&mut off).unwrap_or(0.0);
     if middle > 0.0 {
         off / middle
     } else {

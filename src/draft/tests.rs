@@ -173,3 +173,29 @@ fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
         ],
     );
 }
+
+#[test]
+fn registers_without_names_and_time_are_told_by_their_numbers() {
+    let text = draft("", |_, v| {
+        let deg = 180.0 / std::f64::consts::PI;
+        let gyro = |x: f64| (32_768.0 + x * deg * 65.5).round();
+        let accel = |x: f64| (32_768.0 + x / 9.80665 * 4096.0).round();
+        let [gx, gy, gz, ax, ay, az] = v;
+        format!(
+            "{} {} {} {} {} {}",
+            accel(ax),
+            accel(ay),
+            accel(az),
+            gyro(gx),
+            gyro(gy),
+            gyro(gz)
+        )
+    });
+    has(
+        &text,
+        &[
+            "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
+            "# TODO: no column goes forward like a time",
+        ],
+    );
+}

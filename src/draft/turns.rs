@@ -21,6 +21,10 @@ const CORRELATION: f64 = 0.98;
 const FEWEST: usize = 3;
 /// What they may be off by, RMS, rad.
 const NEAR: f64 = 8.0 * DEGREE;
+/// Scales within this factor are the same, and others must be worse by …
+const SAME: f64 = 1.25;
+/// … this factor.
+const RIVAL: f64 = 2.0;
 /// A first guess may be wrong by this factor, for a hand shakes more than it turns.
 const SEARCHED: f64 = 8.0;
 /// Steps of the search in a factor of e.
@@ -119,8 +123,11 @@ fn from_rest_to_rest(
     let reach = (SEARCHED.ln() * FINE) as i32;
     let factors = (-reach..=reach).map(|k| (f64::from(k) / FINE).exp());
     let angles = factors.flat_map(|factor| [first * factor, -first * factor]);
-    let (best, least) = angles
-        .map(|angle| (angle, off(angle)))
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (least < NEAR).then_some(best)
+    let tried: Vec<(f64, f64)> = angles.map(|angle| (angle, off(angle))).collect();
+    let &(best, least) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    // Quarter turns look alike after four more.
+    let other = |angle: f64| !(SAME.recip()..SAME).contains(&(angle / best));
+    let rivals = tried.iter().filter(|(angle, _)| other(*angle));
+    let rival = rivals.map(|(_, off)| *off).fold(f64::INFINITY, f64::min);
+    (least < NEAR && rival > RIVAL * least).then_some(best)
 }

@@ -84,11 +84,7 @@ impl Quantities {
                 .iter()
                 .all(|sample| sample.iter().all(|value| value.fract() == 0.0))
         });
-        found.offset = PerSensor::from_fn(|sensor| {
-            offset(triads.get(sensor))
-                .filter(|_| *whole.get(sensor))
-                .unwrap_or_default()
-        });
+        found.offset = PerSensor::from_fn(|sensor| offset(triads.get(sensor)).unwrap_or_default());
         let shifted = found.offset.accel != Vector3::zeros();
         let (gravity, angle) = match shifted {
             false => (motion.gravity, motion.angle),
@@ -269,9 +265,12 @@ impl Quantities {
     }
 }
 
-/// Half the range of a register whose zero is in its middle, where all values lie about that.
-fn offset(samples: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+/// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.
+pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let values = || samples.iter().flat_map(|sample| sample.iter().copied());
+    if values().any(|value| value.fract() != 0.0) {
+        return None;
+    }
     let (low, high) = values().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| {
         (low.min(v), high.max(v))
     });
