@@ -159,10 +159,10 @@ fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
         .map(at)
         .filter(|sample| sample.iter().all(|value| value.is_finite()))
         .collect();
-    let zero = offset(&samples).unwrap_or_default();
+    let zero = offset(&samples).unwrap_or(0.0);
     let mut sizes: Vec<f64> = samples
         .iter()
-        .map(|sample| (sample - zero).norm())
+        .map(|sample| sample.add_scalar(-zero).norm())
         .collect();
     let middle = median(&mut sizes).unwrap_or(0.0);
     let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();

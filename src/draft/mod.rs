@@ -30,6 +30,8 @@ pub struct Draft {
     columns: Columns,
     clock: Clock,
     quantities: Quantities,
+    /// What a register says at zero, a row.
+    offset: PerSensor<f64>,
     /// White noise in the file's quantity per second and √Hz, where something stands.
     noise: PerSensor<Option<f64>>,
     /// Output of the gyros at rest, the file's quantity a row.
@@ -47,7 +49,8 @@ impl Draft {
         let sheet = Sheet::read(path, FEWEST_ROWS)?;
         let columns = Columns::find(&sheet);
         let clock = Clock::find(&sheet, columns.time);
-        let triads = columns.samples(&sheet);
+        let mut triads = columns.samples(&sheet);
+        let offset = triads.as_mut().map(units::centre).unwrap_or_default();
         let period = clock.period.unwrap_or(USUAL_PERIOD);
         let motion = triads.as_ref().map(|triads| Motion::find(triads, period));
         let quantities =
@@ -59,13 +62,12 @@ impl Draft {
             noise::white_level(&samples[rest], period, quantities.per_second(period))
         });
         Ok(Self {
-            rest: motion
-                .as_ref()
-                .map(|motion| (motion.rest - quantities.offset.gyro).amax()),
+            rest: motion.as_ref().map(|motion| motion.rest.amax()),
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
             columns,
             clock,
             quantities,
+            offset,
             noise,
         })
     }

@@ -2,8 +2,6 @@
 
 use std::fmt::Write;
 
-use nalgebra::Vector3;
-
 use super::Draft;
 use super::units::short;
 use crate::imu::{Output, Sensor};
@@ -271,13 +269,13 @@ impl Draft {
             "installation_sigma_arcsec = {:?}",
             class.installation / ARCSEC
         );
-        let offset = self.quantities.offset.get(sensor);
+        let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        if *offset != Vector3::zeros() {
+        if offset != 0.0 {
             line(
                 text,
                 "bias",
-                &format!("{:?}", offset.x * per_second),
+                &format!("{:?}", offset * per_second),
                 "what an unsigned register says at zero",
             );
         }

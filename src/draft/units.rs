@@ -48,8 +48,6 @@ pub(super) struct Quantities {
     pub output: Output,
     pub output_why: String,
     pub units: PerSensor<Unit>,
-    /// What a register says at zero, a row.
-    pub offset: PerSensor<Vector3<f64>>,
     /// Whether gyros and accelerometers turn opposite ways.
     pub opposed: bool,
 }
@@ -66,7 +64,6 @@ impl Quantities {
             output: Output::Rate,
             output_why: "as most logs have it".to_owned(),
             units: PerSensor::default(),
-            offset: PerSensor::from_fn(|_| Vector3::zeros()),
             opposed: false,
         };
         let (Some(triads), Some(motion)) = (triads, motion) else {
@@ -84,29 +81,13 @@ impl Quantities {
                 .iter()
                 .all(|sample| sample.iter().all(|value| value.fract() == 0.0))
         });
-        found.offset = PerSensor::from_fn(|sensor| offset(triads.get(sensor)).unwrap_or_default());
-        let shifted = found.offset.accel != Vector3::zeros();
-        let (gravity, angle) = match shifted {
-            false => (motion.gravity, motion.angle),
-            true => {
-                let centred = PerSensor::from_fn(|sensor| {
-                    triads
-                        .get(sensor)
-                        .iter()
-                        .map(|sample| sample - found.offset.get(sensor))
-                        .collect()
-                });
-                let motion = Motion::find(&centred, clock.period.unwrap_or(super::USUAL_PERIOD));
-                (motion.gravity, motion.angle)
-            }
-        };
-        found.opposed = angle.is_some_and(|angle| angle < 0.0);
-        let angle = angle.map(f64::abs);
+        found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
+        let angle = motion.angle.map(f64::abs);
         let period = clock.period;
         found.accelerometers(
             named.accel,
             whole.accel,
-            gravity,
+            motion.gravity,
             period,
             motion.sum_variance,
         );
@@ -266,7 +247,7 @@ impl Quantities {
 }
 
 /// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.
-pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     let values = || samples.iter().flat_map(|sample| sample.iter().copied());
     if values().any(|value| value.fract() != 0.0) {
         return None;
@@ -285,7 +266,19 @@ pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     .into_iter()
     .find(|&half| low >= 0.0 && low < half && high > half && high < 2.0 * half)?;
     let mean = values().sum::<f64>() / (3 * samples.len()) as f64;
-    ((mean / half - 1.0).abs() < 0.5).then(|| Vector3::repeat(half))
+    ((mean / half - 1.0).abs() < 0.5).then_some(half)
+}
+
+/// Takes the zero of registers from their samples, and says what it is.
+pub(super) fn centre(triads: &mut PerSensor<Vec<Vector3<f64>>>) -> PerSensor<f64> {
+    PerSensor::from_fn(|sensor| {
+        let samples = triads.get_mut(sensor);
+        let zero = offset(samples).unwrap_or(0.0);
+        samples
+            .iter_mut()
+            .for_each(|sample| sample.add_scalar_mut(-zero));
+        zero
+    })
 }
 
 fn accel_scale(named: Option<&str>, per_g: f64) -> Scale {
