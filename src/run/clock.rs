@@ -112,8 +112,16 @@ impl Stamps {
                 TimeUnit::PerSecond(_) => None,
             };
             let Some(wrap) = wrap else {
+                let of = |number: f64| match self.unit {
+                    TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
+                    TimeUnit::Count => format!("count {number}"),
+                };
                 return Err(csv.error_here(
-                    format_args!("time going back from {} to {number}", number - step),
+                    format_args!(
+                        "time going back from {} to {}",
+                        of(number - step),
+                        of(number)
+                    ),
                     "times that increase",
                     "Put the rows in order, or split the file where the clock was set.",
                 ));
@@ -166,6 +174,8 @@ pub(super) struct Uniform {
 const PHASE: f64 = 0.02;
 /// … and its period, which makes the loop well damped.
 const PERIOD: f64 = 0.5 * PHASE * PHASE;
+/// A first stamp this near its due time is it, s.
+const EXACT: f64 = 1e-9;
 /// Stamps that give the first phase.
 const FIRST: usize = 50;
 
@@ -197,7 +207,7 @@ impl Uniform {
                 Place::Line(line),
                 format_args!("a gap in time from {before} s to {time} s"),
                 "fewer rows missing than there are",
-                "Split the record there.",
+                "Correct the clock, or split the record there.",
             )
         };
 
@@ -209,11 +219,25 @@ impl Uniform {
             (first, period) = fit(stamps, &numbers, period, false);
         }
 
+        // Where nothing is rounded the fit must not be.
+        if (first - stamps[0].0).abs() < EXACT {
+            first = stamps[0].0;
+        }
         let (mut squares, mut largest) = (0.0, 0.0f64);
         for (&(time, line), &number) in stamps.iter().zip(&numbers) {
             let due = first + number as f64 * period;
             let off = (time - due).abs();
             if off > 0.5 * period {
+                let (_, found) = fit(stamps, &numbers, period, false);
+                let drift = (found - period).abs() * numbers.len() as f64;
+                if given.is_some() && drift > 0.5 * period {
+                    return error(
+                        line,
+                        format!("a row every {} s", nanoseconds(found)),
+                        format!("sample_period_s = {period} as in run.toml"),
+                        "Correct sample_period_s, or leave it out.",
+                    );
+                }
                 return error(
                     line,
                     format!("time {time} s at sample {}", number + 1),

@@ -13,6 +13,7 @@ mod door;
 mod export;
 mod fuzz;
 mod init;
+mod faults;
 mod navigate;
 mod navigation;
 mod observability;

@@ -1,6 +1,7 @@
 use super::*;
 use crate::attitude::log;
 use crate::imu::{FURTHER, InstallationForm, PARAMETERS, Term, TriadVector};
+use crate::run::Bridge;
 use approx::assert_relative_eq;
 use nalgebra::SVector;
 
@@ -237,4 +238,49 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
     let second = navigator.advance(SAMPLES / 2..SAMPLES);
     let composed = second.navigation * first.noise * second.navigation.transpose() + second.noise;
     assert_relative_eq!(whole, composed, epsilon = 1e-7);
+}
+
+#[test]
+fn an_interpolated_axis_adds_its_error_along_that_axis() {
+    let site = site();
+    let attitude = start().attitude;
+    let bridge = |sensor, axis, samples| Bridge {
+        sensor,
+        axis,
+        samples,
+        variance: if sensor == Sensor::Gyro { 4e-8 } else { 9e-6 },
+    };
+    let record = ImuRecord {
+        gyro: vec![Vector3::zeros(); SAMPLES],
+        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES],
+        bridges: vec![
+            bridge(Sensor::Gyro, 1, 0..2),
+            bridge(Sensor::Gyro, 1, 3..7),
+            bridge(Sensor::Accel, 2, 4..5),
+        ],
+        ..record()
+    };
+    let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+    let at_rest = State::at_rest(attitude);
+    let of = |samples| {
+        let navigator = Navigator::new(&record, &site, PerSensor::default(), &ideal, at_rest);
+        navigator.unwrap().advance_standing(samples).noise
+    };
+    let along = |axis: usize, variance: f64| {
+        let axis = attitude.column(axis);
+        axis * axis.transpose() * variance
+    };
+    for (samples, gyro, accel) in [
+        (0..SAMPLES, 8e-8, 9e-6),
+        (2..3, 0.0, 0.0),
+        (1..5, 4e-8, 9e-6),
+        (5..SAMPLES, 2e-8, 0.0),
+    ] {
+        let noise = of(samples);
+        let of_attitude = noise.fixed_view::<3, 3>(0, 0).into_owned();
+        assert_relative_eq!(of_attitude, along(1, gyro), epsilon = 1e-12);
+        let of_velocity = noise.fixed_view::<3, 3>(3, 3).into_owned();
+        // Gravity turns tilt into velocity: (9.8 m/s² · 0.1 s)²/3 of it at most.
+        assert_relative_eq!(of_velocity, along(2, accel), epsilon = 0.33 * gyro + 1e-12);
+    }
 }

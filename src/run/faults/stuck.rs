@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::interpolation::fill;
-
 /// A run by chance may be this probable.
 const CHANCE: f64 = 1e-9;
 /// How often an axis changes is seen in this many rows on either side.
@@ -11,18 +9,22 @@ const AROUND: usize = 500;
 /// Where all axes repeat in more than this part of the rows, noise is not seen and a standing table
 /// looks as a stuck axis does.
 const NOISE_FREE: f64 = 0.1;
-/// A rate that drifts through a step of the grid repeats ever longer, then ever shorter: a run by chance
-/// is not longer than this many times the longest of the others.
+/// A run by chance is not longer than this many times the longest of the others around.
 const LONGER: usize = 4;
-/// An axis that leaves its value by no more than this many steps of its grid may stand on it.
+/// The same on a level by which a rate may drift: pulses then repeat ever longer, then ever shorter.
+const LONGER_ON_LEVEL: usize = 12;
+/// Fewer rows on the level tell nothing of that.
+const FEWEST: usize = 50;
+/// An axis that leaves its value by no more than this many steps of its grid may stand on it, or drift
+/// by it: what it does on another level says nothing of that, only rows within so many steps do.
 const QUIET_STEPS: f64 = 1.5;
-/// Its value elsewhere says nothing of that, only rows within this many steps do; and it is stuck only
-/// if what is interpolated from both sides contradicts its sum by more than so many steps, for pulses
-/// that repeat are right to a step or two, …
 const SAME_LEVEL_STEPS: f64 = 3.5;
-const WRONG_STEPS: f64 = 5.0;
-/// … and by more than so many σ of interpolation.
-const WRONG_SIGMAS: f64 = 5.0;
+/// Means of the nearest, so many and over so many of them, …
+const MEANS: usize = 6;
+const MEAN_OF: usize = 16;
+/// … are all on one side of the value of a stuck axis, so far that the sum over the run is wrong by
+/// this many steps. Pulses are right to a few, however long they repeat.
+const WRONG_STEPS: f64 = 8.0;
 
 /// For each column the rows that repeat the one before them so long that it is no chance, the first
 /// of equal values left out. `steps` are those of the columns' grids.
@@ -67,39 +69,54 @@ fn is_stuck(column: &[f64], run: &Range<usize>, step: Option<f64>) -> bool {
         k.and_then(|k| column.get(k))
             .map_or(0.0, |other| (other - value).abs())
     };
-    // The row before the run has its value.
-    let before = leaves(run.start.checked_sub(2));
-    let after = leaves(Some(run.end));
-    let around = |k: usize| k.abs_diff(run.start).min(k.abs_diff(run.end)) <= AROUND;
-    let same_level = step.filter(|step| before.max(after) <= QUIET_STEPS * step);
-    let near = |k: &usize| {
-        around(*k)
-            && same_level.is_none_or(|step| (column[*k] - value).abs() <= SAME_LEVEL_STEPS * step)
-    };
+    // The row before the run has its value. Both sides outwards.
+    let before = run.start.saturating_sub(1 + AROUND)..run.start - 1;
+    let after = run.end..column.len().min(run.end + AROUND);
+    let sides: [Vec<f64>; 2] = [
+        column[before.clone()].iter().rev().copied().collect(),
+        column[after.clone()].to_vec(),
+    ];
+    let step = step.filter(|step| {
+        let left = leaves(before.end.checked_sub(1)).max(leaves(Some(after.start)));
+        left <= QUIET_STEPS * step
+    });
     let mut seen = Seen::default();
-    // Outwards from the run, in pairs of a row and the one before it.
-    let earlier = (1..run.start).rev().take_while(near);
-    seen.add(earlier.map(|k| column[k] == column[k - 1]));
-    let later = (run.end + 1..column.len()).take_while(near);
-    seen.add(later.map(|k| column[k] == column[k - 1]));
-    run.len() > LONGER * seen.longest
-        && seen.chance(run.len()) < CHANCE
-        && same_level.is_none_or(|step| is_wrong(column, run, step))
+    let Some(step) = step else {
+        sides.iter().for_each(|side| seen.add(side));
+        return run.len() > LONGER * seen.longest && seen.chance(run.len()) < CHANCE;
+    };
+    let sides = sides.map(|mut side| {
+        let on_level = |other: &f64| (other - value).abs() <= SAME_LEVEL_STEPS * step;
+        side.truncate(side.iter().take_while(|other| on_level(other)).count());
+        seen.add(&side);
+        side
+    });
+    let by_chance = seen.chance(run.len()) > CHANCE
+        || run.len() < LONGER_ON_LEVEL * seen.longest
+        || seen.pairs < FEWEST;
+    !by_chance || contradicts_its_level(value, run.len(), &sides, step)
 }
 
-/// Whether the rows on both sides contradict the values of a run.
-fn is_wrong(column: &[f64], run: &Range<usize>, step: f64) -> bool {
-    let from = run.start.saturating_sub(AROUND + run.len());
-    let to = column.len().min(run.end + AROUND + run.len());
-    let hole = run.start - from..run.end - from;
-    let mut filled = column[from..to].to_vec();
-    let mut sound = vec![true; filled.len()];
-    sound[hole.clone()].fill(false);
-    let variance = fill(&mut filled, &sound, &hole, hole.len());
-    let difference = filled[hole].iter().sum::<f64>() - column[run.clone()].iter().sum::<f64>();
-    variance.is_some_and(|variance| {
-        difference.abs() > WRONG_STEPS * step + WRONG_SIGMAS * variance.sqrt()
-    })
+/// Whether rows on the level of a value do not stay on it for so many repeats, and have another mean.
+fn contradicts_its_level(value: f64, repeats: usize, levels: &[Vec<f64>; 2], step: f64) -> bool {
+    let (mut stays, mut at_value) = (0.0, 0.0);
+    let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+    for level in levels {
+        for pair in level.windows(2).filter(|pair| pair[0] == value) {
+            at_value += 1.0;
+            stays += f64::from(u8::from(pair[1] == value));
+        }
+        for rows in level.chunks_exact(MEAN_OF).take(MEANS) {
+            let mean = rows.iter().sum::<f64>() / MEAN_OF as f64;
+            lowest = lowest.min(mean);
+            highest = highest.max(mean);
+        }
+    }
+    let again: f64 = (stays + 1.0) / (at_value + 2.0);
+    let off = (value - highest).max(lowest - value);
+    off.is_finite()
+        && off * repeats as f64 > WRONG_STEPS * step
+        && again.powf(repeats as f64) < CHANCE
 }
 
 /// How often rows repeat the one before.
@@ -114,9 +131,10 @@ struct Seen {
 }
 
 impl Seen {
-    fn add(&mut self, repeats: impl Iterator<Item = bool>) {
+    fn add(&mut self, rows: &[f64]) {
         let mut row = 0;
-        for repeat in repeats {
+        for pair in rows.windows(2) {
+            let repeat = pair[0] == pair[1];
             self.pairs += 1;
             self.repeats += usize::from(repeat);
             self.again += usize::from(repeat && row > 0);
@@ -171,6 +189,18 @@ mod tests {
             assert!(run.start <= 7001 && (7100..7110).contains(&run.end));
             assert_eq!(found.iter().map(Vec::len).sum::<usize>(), 1);
         }
+    }
+
+    #[test]
+    fn pulses_that_stop_to_change_while_the_table_stands_are_found() {
+        let mut columns = noise(1.0);
+        for (k, value) in columns[0].iter_mut().enumerate() {
+            let angle = |k: usize| (2.34 * k as f64).round();
+            *value = angle(k + 1) - angle(k);
+        }
+        assert!(find(&columns).iter().all(Vec::is_empty));
+        columns[0][7000..7100].fill(3.0);
+        assert_eq!(find(&columns)[0].len(), 1);
     }
 
     #[test]

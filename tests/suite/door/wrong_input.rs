@@ -301,7 +301,7 @@ fn each_wrong_row_or_column_has_its_message() {
             "\n0.50,1,1,",
             "line 51 & 8 fields & 7",
         ),
-        ("imu.csv", "\n0.50,", "\n0.49,", "line 51 & duplicate"),
+        ("imu.csv", "\n0.50,1,", "\n0.49,2,", "line 51 & duplicate"),
         (
             "imu.csv",
             "\n0.50,",
@@ -309,18 +309,17 @@ fn each_wrong_row_or_column_has_its_message() {
             "line 51 & going back from 0.49 s to 0.35 s",
         ),
         (
-            "imu.csv",
-            "\n0.50,1,-2,3,0,1,9790",
-            "",
-            "line 51 & gap & 0.49 s to 0.51 s & split",
-        ),
-        (
             "table.csv",
             "\n0.5,1,0",
             "\n0.5,1,1",
             "line 7 & norm 1.414214 & w, x, y, z",
         ),
-        ("table.csv", "\n0.5,", "\n0.4,", "line 7 & duplicate"),
+        (
+            "table.csv",
+            "\n0.5,1,0,",
+            "\n0.4,0,1,",
+            "line 7 & duplicate",
+        ),
         ("table.csv", "\n0.5,", "\n0.1,", "line 7 & going back"),
         ("table.csv", "qw,", "q0,", "line 1 & named `qw`"),
         (
@@ -363,6 +362,11 @@ fn each_wrong_file_has_its_message() {
         + &(1..=200)
             .map(|k| format!("{:.4},1,1,1,1,1,1\n", f64::from(k) * 0.0101))
             .collect::<String>();
+    let parted: String = header.to_owned()
+        + &(1..=200)
+            .map(|k| f64::from(k) * 0.01 + if k > 100 { 98.99 } else { 0.0 })
+            .map(|time| format!("{time:.2},1,1,1,1,1,1\n"))
+            .collect::<String>();
     for (file, content, words) in [
         ("imu.csv", "", "an empty file"),
         ("imu.csv", header, "0 samples & at least 100"),
@@ -372,7 +376,12 @@ fn each_wrong_file_has_its_message() {
             &twice_as_slow,
             "steps of 0.02 s & sample_period_s",
         ),
-        ("imu.csv", &drifting, "line 52 & sample_period_s"),
+        (
+            "imu.csv",
+            &drifting,
+            "a row every 0.0101 s & sample_period_s",
+        ),
+        ("imu.csv", &parted, "line 102 & gap & 1 s to 100 s & split"),
         ("table.csv", &table_elsewhere, "90 s to 92 s & overlap"),
         (
             "table.csv",

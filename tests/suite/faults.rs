@@ -1,0 +1,257 @@
+//! Logs as they come: what is wrong with rows is found, bridged with its error counted, or refused.
+
+use std::ops::Range;
+use std::path::Path;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use turncal::calibration::{CalibrationError, Outcome, estimate};
+use turncal::imu::{InstallationForm, Output, Sensor};
+use turncal::run::{FaultKind, Run, write_run};
+use turncal::simulation::Scenario;
+
+use crate::shared::{read, shared};
+
+/// Fixed before the first run was made.
+const SEED: u64 = 606;
+const FULL_SCALE: &str = "32767";
+
+/// The demo's log, a field each, and the directory of its run.
+struct Log {
+    place: tempfile::TempDir,
+    rows: Vec<Vec<String>>,
+    clean: Run,
+}
+
+impl Log {
+    fn new() -> Self {
+        let run = Scenario::load("demo")
+            .unwrap()
+            .simulate(SEED, 0)
+            .unwrap()
+            .run;
+        let place = tempfile::tempdir().unwrap();
+        let directory = place.path().join("run");
+        std::fs::create_dir(&directory).unwrap();
+        write_run(&directory, &run, Output::Pulse, None).unwrap();
+        let clean = read(&directory);
+        let text = flate2::read::GzDecoder::new(
+            std::fs::File::open(directory.join("imu.csv.gz")).unwrap(),
+        );
+        let text = std::io::read_to_string(text).unwrap();
+        let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+        Self {
+            place,
+            rows: text.lines().skip(1).map(fields).collect(),
+            clean,
+        }
+    }
+
+    /// Row, column of the file, what is there instead.
+    fn set(&mut self, row: usize, column: usize, value: &str) {
+        self.rows[row][column] = value.to_owned();
+    }
+
+    fn hold(&mut self, rows: Range<usize>, column: usize) {
+        let held = self.rows[rows.start][column].clone();
+        rows.skip(1).for_each(|row| self.set(row, column, &held));
+    }
+
+    fn read(&self) -> Run {
+        let directory = self.place.path().join("run");
+        let toml = std::fs::read_to_string(directory.join("run.toml")).unwrap();
+        let toml = toml.replace("imu.csv.gz", "imu.csv");
+        std::fs::write(directory.join("run.toml"), toml).unwrap();
+        let rows: String = self.rows.iter().map(|row| row.join(",") + "\n").collect();
+        let text = format!("t,gx,gy,gz,ax,ay,az\n{rows}");
+        std::fs::write(directory.join("imu.csv"), text).unwrap();
+        read(Path::new(&directory))
+    }
+
+    /// Rows of the longest dwell, or of the longest turn.
+    fn longest(&self, turn: bool) -> Range<usize> {
+        let dwells = self.clean.dwells();
+        let stretches: Vec<Range<usize>> = if turn {
+            let pairs = dwells.windows(2);
+            pairs
+                .map(|pair| pair[0].samples.end..pair[1].samples.start)
+                .collect()
+        } else {
+            dwells.iter().map(|dwell| dwell.samples.clone()).collect()
+        };
+        stretches.into_iter().max_by_key(Range::len).unwrap()
+    }
+}
+
+fn calibrated(run: &Run) -> Outcome {
+    let outcome = estimate(run, InstallationForm::General, &|_| {}).unwrap();
+    assert!(outcome.converged);
+    outcome
+}
+
+/// RMS of the difference of two estimates in σ of the second, and the extremes of its σ over the
+/// first's.
+fn against(clean: &Outcome, spoilt: &Outcome) -> (f64, f64, f64) {
+    let (sigma, before) = (spoilt.estimate.sigma(), clean.estimate.sigma());
+    let difference = spoilt.estimate.vector() - clean.estimate.vector();
+    let estimated: Vec<usize> = (0..sigma.len()).filter(|&k| sigma[k] > 0.0).collect();
+    let squares = estimated
+        .iter()
+        .map(|&k| (difference[k] / sigma[k]).powi(2));
+    let ratios = || estimated.iter().map(|&k| sigma[k] / before[k]);
+    (
+        (squares.sum::<f64>() / estimated.len() as f64).sqrt(),
+        ratios().fold(f64::INFINITY, f64::min),
+        ratios().fold(0.0, f64::max),
+    )
+}
+
+#[test]
+fn sound_records_have_no_faults() {
+    assert_eq!(Log::new().clean.imu.faults, []);
+    for name in [
+        "nineteen-position-clean",
+        "nineteen-position-full",
+        "nineteen-position-velocity",
+        "real-mems-raw-sections",
+        "real-mems-six-position",
+        "real-mems-static",
+        "three-axis-counts",
+    ] {
+        let Some(directory) = shared(name) else {
+            continue;
+        };
+        assert_eq!(read(&directory).imu.faults, [], "{name}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
+    let mut log = Log::new();
+    let clean = calibrated(&log.clean);
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let second = (1.0 / log.clean.imu.period).round() as usize;
+
+    // In the middle of a dwell accelerometer y, in that of a turn accelerometer x.
+    let middle = |rows: Range<usize>| rows.start + rows.len() / 2 - second / 2;
+    let stuck = [
+        (middle(log.longest(false)), 5),
+        (middle(log.longest(true)), 4),
+    ];
+    for (start, column) in stuck {
+        log.hold(start..start + second + 1, column);
+    }
+    let count = log.rows.len();
+    let mut saturated: Vec<usize> = (0..10).map(|k| (2 * k + 1) * count / 20).collect();
+    saturated.retain(|row| {
+        stuck
+            .iter()
+            .all(|(start, _)| row.abs_diff(*start) > 2 * second)
+    });
+    for (number, &row) in saturated.iter().enumerate() {
+        let sign = if number % 2 == 0 { "" } else { "-" };
+        log.set(row, 3, &format!("{sign}{FULL_SCALE}"));
+    }
+    let mut kept: Vec<Vec<String>> = Vec::new();
+    let (mut dropped, mut doubled) = (0, 0);
+    for (number, row) in log.rows.iter().enumerate() {
+        let touched = |(start, _): &(usize, usize)| number.abs_diff(*start) <= second + 1;
+        let keep = stuck.iter().any(touched) || saturated.contains(&number);
+        if !keep && number + 1 < count && random.random::<f64>() < 0.01 {
+            dropped += 1;
+            continue;
+        }
+        kept.push(row.clone());
+        if random.random::<f64>() < 0.001 {
+            kept.push(row.clone());
+            doubled += 1;
+        }
+    }
+    log.rows = kept;
+
+    let run = log.read();
+    let of = |kind| {
+        run.imu
+            .faults
+            .iter()
+            .filter(move |fault| fault.kind == kind)
+    };
+    let samples = |kind| of(kind).map(|fault| fault.samples.len()).sum::<usize>();
+    assert_eq!(samples(FaultKind::Missing), dropped);
+    assert_eq!(of(FaultKind::Duplicate).count(), doubled);
+    let found: Vec<usize> = of(FaultKind::Saturated)
+        .map(|fault| fault.samples.start)
+        .collect();
+    assert_eq!(found, saturated);
+    assert!(of(FaultKind::Saturated).all(|fault| fault.axis == Some((Sensor::Gyro, 2))));
+    let axes: Vec<_> = of(FaultKind::Stuck).map(|fault| fault.axis).collect();
+    assert_eq!(axes, [Some((Sensor::Accel, 0)), Some((Sensor::Accel, 1))]);
+    for (fault, (start, _)) in of(FaultKind::Stuck).zip([stuck[1], stuck[0]]) {
+        assert!(fault.samples.start.abs_diff(start) <= 3, "{fault:?}");
+        assert!(fault.samples.len().abs_diff(second) <= 5, "{fault:?}");
+    }
+    assert_eq!(run.imu.len(), log.clean.imu.len());
+    assert_eq!(run.notes.len(), 4, "{:?}", run.notes);
+
+    let spoilt = calibrated(&run);
+    let (rms, least, most) = against(&clean, &spoilt);
+    assert!(rms < 1.2, "{rms}");
+    assert!(least > 0.999, "{least}: lost samples told something");
+    assert!(most > 1.02, "{most}: interpolation is taken for the truth");
+    let velocity = spoilt.consistency.velocity;
+    assert!((velocity.mean - 1.0).abs() < 0.1, "{velocity:?}");
+}
+
+#[test]
+fn what_no_interpolation_bridges_is_refused_with_its_place() {
+    let mut log = Log::new();
+    let turn = log.longest(true);
+    let second = (1.0 / log.clean.imu.period).round() as usize;
+    log.rows.drain(turn.start..turn.start + 5 * second / 2);
+    let run = log.read();
+    let refused = estimate(&run, InstallationForm::General, &|_| {}).unwrap_err();
+    assert!(matches!(refused, CalibrationError::Unbridged { .. }));
+    let line = format!("line {}", turn.start + 1);
+    let words = refused.to_string();
+    assert!(
+        words.contains("missing from") && words.contains(&line),
+        "{words}"
+    );
+    // What stands is as it was.
+    assert_eq!(run.dwells().len(), log.clean.dwells().len());
+}
+
+#[test]
+fn time_comes_in_any_unit_or_not_at_all() {
+    let mut log = Log::new();
+    let clean = log.clean.imu.clone();
+    let directory = log.place.path().join("run");
+    let toml = std::fs::read_to_string(directory.join("run.toml")).unwrap();
+    let stamps: Vec<f64> = log.rows.iter().map(|row| row[0].parse().unwrap()).collect();
+    let texts: [(&str, &dyn Fn(usize) -> String); 4] = [
+        ("ms", &|k| format!("{:.0}", stamps[k] * 1e3)),
+        ("us", &|k| format!("{:.0}", stamps[k] * 1e6)),
+        ("ns", &|k| format!("{:.0}", stamps[k] * 1e9)),
+        ("count", &|k| format!("{}", k % 256)),
+    ];
+    for (unit, text) in texts {
+        for k in 0..stamps.len() {
+            log.rows[k][0] = text(k);
+        }
+        let with_unit = toml.replacen(
+            "time_stamp",
+            &format!("time_unit = \"{unit}\"\ntime_stamp"),
+            1,
+        );
+        std::fs::write(directory.join("run.toml"), with_unit).unwrap();
+        let imu = log.read().imu;
+        assert_eq!((imu.len(), imu.faults.len()), (clean.len(), 0), "{unit}");
+        assert!((imu.start - clean.start).abs() < 1e-6, "{unit}");
+        assert!((imu.period - clean.period).abs() < 1e-12, "{unit}");
+    }
+    let untimed = toml.replace("time = \"t\", gyro", "gyro");
+    let (before, _) = untimed.split_once("[turntable]").unwrap();
+    std::fs::write(directory.join("run.toml"), before).unwrap();
+    let imu = log.read().imu;
+    assert_eq!((imu.len(), imu.start), (clean.len(), 0.0));
+}
