@@ -121,10 +121,12 @@ embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
 pub enum ModelError {
     /// Neither a file nor an embedded name.
     #[error(
-        "no {room} model \"{name}\"{}: it is neither a file nor one of {known}",
+        "{named_in}no {room} model \"{name}\"{}: it is neither a file nor one of {known}",
         nearest.map_or_else(String::new, |nearest| format!(" (did you mean \"{nearest}\"?)"))
     )]
     Unknown {
+        /// The file that names it, with a colon; empty for the command line.
+        named_in: String,
         /// Which folder.
         room: &'static str,
         /// What was asked for.
@@ -170,8 +172,8 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
 pub enum Place {
     /// On the command line: a path from the working directory, or an embedded name.
     CommandLine,
-    /// In a file of this folder: a path from there, or an embedded name.
-    Folder(PathBuf),
+    /// In this file: a path from its folder, or an embedded name.
+    File(PathBuf),
     /// In an embedded model: an embedded name.
     Embedded,
 }
@@ -217,7 +219,7 @@ impl Text {
 pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, ModelError> {
     let path = match named_in {
         Place::CommandLine => Some(PathBuf::from(name_or_path)),
-        Place::Folder(folder) => Some(folder.join(name_or_path)),
+        Place::File(file) => Some(file.with_file_name(name_or_path)),
         Place::Embedded => None,
     };
     if let Some(path) = path.filter(|path| path.is_file()) {
@@ -226,7 +228,7 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
             Ok(text) => Ok(Text {
                 text,
                 file,
-                place: Place::Folder(path.parent().unwrap_or(Path::new("")).into()),
+                place: Place::File(path),
             }),
             Err(source) => Err(ModelError::Unreadable { file, source }),
         };
@@ -247,6 +249,10 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
         .filter(|&(likeness, _)| likeness > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0));
     Err(ModelError::Unknown {
+        named_in: match named_in {
+            Place::File(file) => format!("{}: ", file.display()),
+            Place::CommandLine | Place::Embedded => String::new(),
+        },
         room: room.name(),
         name: name_or_path.into(),
         nearest: nearest.map(|(_, name)| name),
@@ -297,7 +303,7 @@ mod tests {
             "form = \"six-angle\"\nangles_deg = { sigma = 1 }",
         )
         .unwrap();
-        let here = Place::Folder(folder.path().into());
+        let here = Place::File(folder.path().join("scenario.toml"));
         let form = |place: &Place| InstallationModel::load("general", place).unwrap().form;
         assert_eq!(form(&here), crate::imu::InstallationForm::SixAngle);
         assert_eq!(

@@ -11,8 +11,8 @@ use crate::run::{ImuRecord, StateBlock};
 pub enum CalibrationError {
     /// Table aiding without a table.
     #[error(
-        "the run has no [turntable]: table aiding and the six-position method need the table's log; \
-         name it in run.toml, or use --method ekf --aiding velocity"
+        "the run has no [turntable]: attitudes of a table need its log; name it in run.toml, or leave \
+         --aiding table out"
     )]
     NoTable,
     /// Not enough standing positions.

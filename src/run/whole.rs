@@ -67,6 +67,10 @@ impl Stage {
             let advice = "Choose a directory that can be written.";
             RunError::io(&self.target, "put the output in place", &error, advice)
         };
+        // At no moment is there nothing, where the system can do that.
+        if exists && exchange(&self.new_path(), &self.target).is_ok() {
+            return Ok(());
+        }
         if exists {
             fs::rename(&self.target, &old).map_err(refused)?;
         }
@@ -88,6 +92,18 @@ impl Stage {
         }
         Err(refused(error))
     }
+}
+
+/// Lets two things change places at once.
+#[cfg(any(target_os = "linux", target_vendor = "apple"))]
+fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+}
+
+#[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
+fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
 }
 
 fn taken(target: &Path) -> RunError {

@@ -80,7 +80,7 @@ pub fn made_run(name: &str) -> Run {
         segments: vec![Segment {
             start: 3.5,
             end: 4.25,
-            samples: 31..127,
+            samples: 32..128,
             label: "rot_x+360".to_owned(),
             motion: Some(LabelledMotion::Turns {
                 axis: Vector3::x(),

@@ -501,25 +501,3 @@ fn byte_order_mark_spaces_and_other_line_ends_are_not_wrong() {
     fs::write(directory.path().join("imu.csv"), spaced).unwrap();
     assert_eq!(Run::read(&directory.path().join("run.toml")), Ok(good));
 }
-
-proptest::proptest! {
-    #[test]
-    fn no_spoilt_byte_makes_it_panic(
-        file in 0usize..4,
-        place in proptest::prelude::any::<proptest::sample::Index>(),
-        bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..4),
-    ) {
-        let directory = tempfile::tempdir().unwrap();
-        good_run(directory.path());
-        let name = ["run.toml", "imu.csv", "table.csv", "segments.csv"][file];
-        let path = directory.path().join(name);
-        let mut content = fs::read(&path).unwrap();
-        let at = place.index(content.len());
-        content.splice(at..=at, bytes);
-        fs::write(&path, content).unwrap();
-        if let Err(error) = Run::read(&directory.path().join("run.toml")) {
-            let message = error.to_string();
-            proptest::prop_assert!(message.contains(directory.path().to_str().unwrap()));
-        }
-    }
-}
