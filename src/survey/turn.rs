@@ -11,7 +11,7 @@ use crate::run::{LabelledMotion, Run};
 use crate::units::DEGREE;
 
 /// Turns about one axis go along it for this part of their way at least …
-const ALONG: f64 = 0.98;
+const ALONG: f64 = 0.95;
 /// … and what it does is what they do together, within this much more than that part, rad.
 const ONE_AXIS: f64 = 1.0 * DEGREE;
 /// The way is measured in steps this long, s, so that noise adds little to it.
@@ -30,6 +30,8 @@ pub struct Turn {
     pub axis: Vector3<f64>,
     /// rad, right-handed about the axis; over a turn about several axes, of the one that does the same.
     pub angle: f64,
+    /// Integrals of the rates about each body axis, rad.
+    pub sum: Vector3<f64>,
     /// Whether it is about one axis all the way.
     pub single: bool,
     /// Fastest rate about any body axis, rad/s.
@@ -64,6 +66,7 @@ impl Turn {
             samples,
             axis: axis * sign,
             angle: turn.norm() * sign,
+            sum,
             single,
             fastest,
             rotation: attitude,

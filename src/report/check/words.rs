@@ -240,7 +240,7 @@ fn of_motion(report: &CheckReport) -> Vec<String> {
     }
     let unturned: Vec<String> = (0..3)
         .filter(|&axis| {
-            let about = |turn: &Turn| (turn.axis[axis] * turn.angle).abs() > WORTH;
+            let about = |turn: &Turn| turn.sum[axis].abs() > WORTH;
             !survey.turns.iter().any(about)
         })
         .map(|axis| AXES[axis].to_string())
