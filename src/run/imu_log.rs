@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
-use super::clock::{Clock, Stamp, Stamps, Uniform};
+use super::clock::{Clock, Stamp, Stamps};
 use super::csv_file::CsvFile;
 use super::error::RunError;
 use super::faults::{Repaired, Rows};
+use super::uniform::Uniform;
 use super::{ColumnFacts, ImuRecord, LogFacts, TemperatureFacts};
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 

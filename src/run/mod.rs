@@ -21,6 +21,7 @@ mod sheet;
 pub(crate) mod state_block;
 mod table_geometry;
 mod table_log;
+mod uniform;
 mod whole;
 mod write;
 
@@ -84,7 +85,7 @@ pub struct Run {
     pub segment_sigma: f64,
     /// The files that it was read from; none if it was made.
     pub files: Vec<PathBuf>,
-    /// What the files say that has no effect yet, a sentence each.
+    /// What is wrong with the files and was mended, and what they say without effect, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -122,7 +123,7 @@ pub struct ImuRecord {
     pub start: f64,
     /// Length of every sample, s.
     pub period: f64,
-    /// Whether each sample begins where the one before ended.
+    /// Whether each sample begins where the one before ended, and none is lost beyond interpolation.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Vec<Vector3<f64>>,
