@@ -12,8 +12,10 @@ use crate::units::DEGREE;
 
 /// Turns about one axis go along it for this part of their way at least …
 const ALONG: f64 = 0.95;
-/// … and what it does is what they do together, within this much more than that part, rad.
+/// … and do what their integrals do at once, within this, rad …
 const ONE_AXIS: f64 = 1.0 * DEGREE;
+/// … and this part of the way.
+const APART: f64 = 0.02;
 /// The way is measured in steps this long, s, so that noise adds little to it.
 const STEP: f64 = 0.1;
 /// What turns by less has not turned, rad.
@@ -58,7 +60,7 @@ impl Turn {
             fastest = fastest.max(turned.amax() / (step.len() as f64 * period));
         }
         let off = log(&(exp(sum) * attitude.transpose())).norm();
-        let single = sum.norm() > ALONG * way && off < ONE_AXIS + (1.0 - ALONG) * way;
+        let single = sum.norm() > ALONG * way && off < ONE_AXIS + APART * way;
         let turn = if single { sum } else { log(&attitude) };
         let axis = turn.try_normalize(1e-12).unwrap_or(Vector3::z());
         let sign = if axis[axis.iamax()] < 0.0 { -1.0 } else { 1.0 };
