@@ -10,10 +10,12 @@
 //! # Rooms
 //! Data flow one way: [`run`] → [`navigation`], [`calibration`] and [`noise`] → [`study`] → [`report`]. [`earth`],
 //! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`], [`export`]
-//! writes what other programs read.
+//! writes what other programs read. [`draft`] looks at a log of which nothing is known, [`survey`] at a run
+//! before it is calibrated.
 
 pub mod attitude;
 pub mod calibration;
+pub mod draft;
 pub mod earth;
 pub mod export;
 pub mod imu;
@@ -24,5 +26,6 @@ pub mod report;
 pub mod run;
 pub mod simulation;
 pub mod study;
+pub mod survey;
 pub mod turntable;
 pub mod units;

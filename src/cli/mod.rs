@@ -4,9 +4,11 @@ mod allan;
 mod apply;
 mod block;
 mod calibrate;
+mod check;
 mod compare;
 mod demo;
 mod export;
+mod init;
 mod names;
 mod navigate;
 mod noise;
@@ -41,6 +43,8 @@ enum Command {
     Apply(apply::Apply),
     Export(export::Export),
     Study(study::Study),
+    Init(init::Init),
+    Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
 }
@@ -57,6 +61,8 @@ impl Cli {
             Command::Apply(apply) => apply.run(),
             Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
+            Command::Init(init) => init.run(),
+            Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
         }

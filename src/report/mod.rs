@@ -8,6 +8,7 @@ pub mod allan;
 mod axis;
 mod blocks;
 mod canvas;
+pub mod check;
 mod comparison;
 pub mod conversion;
 mod correlation;

@@ -1,19 +1,31 @@
-//! A CSV file with a header, plain or gzipped, read row by row without keeping its text.
+//! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
+
+mod lines;
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use csv::{ByteRecord, ErrorKind, Reader, ReaderBuilder};
 use flate2::read::MultiGzDecoder;
 
 use super::error::{Place, RunError, list, nearest};
+use lines::Lines;
 
-/// A CSV file at one of its rows.
+/// What the names of such files end in, each also with `.gz` behind it.
+const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
+
+/// A file of rows at one of them.
+///
+/// Commas, semicolons, tabs or blanks part the fields, as the first row shows. Lines that begin with `#`, `%`
+/// or `//` are comments. A first row of numbers makes the columns' names `1`, `2`, …; a row of units below the
+/// names is passed over. Numbers may have a decimal comma where commas do not part them.
 pub(super) struct CsvFile {
     file: PathBuf,
-    reader: Reader<Box<dyn Read>>,
+    reader: Reader<Lines>,
     header: Vec<String>,
+    units: Option<Vec<String>>,
+    decimal_comma: bool,
     taken: Vec<usize>,
     row: ByteRecord,
     line: u64,
@@ -22,14 +34,20 @@ pub(super) struct CsvFile {
 impl CsvFile {
     /// Opens a file and reads its header.
     pub fn open(path: &Path) -> Result<Self, RunError> {
-        let name = path.to_string_lossy();
-        let gzipped = name.ends_with(".csv.gz");
-        if !gzipped && !name.ends_with(".csv") {
+        let name = path.to_string_lossy().to_lowercase();
+        let plain = name.strip_suffix(".gz");
+        if !ENDINGS
+            .iter()
+            .any(|end| plain.unwrap_or(&name).ends_with(end))
+        {
             return Err(RunError::new(
                 path,
                 Place::File,
                 "a file of another kind",
-                "a name that ends in .csv or .csv.gz",
+                format_args!(
+                    "a name that ends in {}, or in one of them and .gz",
+                    ENDINGS.join(", ")
+                ),
                 "Rename or convert the file.",
             ));
         }
@@ -42,36 +60,46 @@ impl CsvFile {
             )
         })?;
         let file = BufReader::with_capacity(1 << 16, file);
-        let source: Box<dyn Read> = if gzipped {
-            Box::new(MultiGzDecoder::new(file))
+        let source: Box<dyn BufRead> = if plain.is_some() {
+            Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file)))
         } else {
             Box::new(file)
         };
-        let mut csv = Self {
-            file: path.to_owned(),
-            reader: ReaderBuilder::new()
-                .buffer_capacity(1 << 16)
-                .from_reader(source),
-            header: Vec::new(),
-            taken: Vec::new(),
-            row: ByteRecord::new(),
-            line: 1,
-        };
-        let header = csv.reader.byte_headers().map(|header| {
-            header
-                .iter()
-                .map(|name| String::from_utf8_lossy(name.trim_ascii()).into_owned())
-                .collect()
-        });
-        csv.header = header.map_err(|error| csv.unreadable(&error))?;
-        if csv.header.is_empty() {
-            return Err(csv.error(
+        let (lines, heading) = Lines::open(source).map_err(|error| damaged(path, &error))?;
+        let heading = heading.ok_or_else(|| {
+            RunError::new(
+                path,
+                Place::File,
                 "an empty file",
                 "a line of column names and rows below it",
                 "Record or export the file again.",
-            ));
-        }
-        Ok(csv)
+            )
+        })?;
+        Ok(Self {
+            file: path.to_owned(),
+            reader: ReaderBuilder::new()
+                .buffer_capacity(1 << 16)
+                .has_headers(false)
+                .flexible(true)
+                .delimiter(heading.delimiter.byte())
+                .from_reader(lines),
+            decimal_comma: heading.delimiter.leaves_commas(),
+            header: heading.names,
+            units: heading.units,
+            taken: Vec::new(),
+            row: ByteRecord::new(),
+            line: heading.line,
+        })
+    }
+
+    /// The names of the columns.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// The row of units below the names, if there is one.
+    pub fn units(&self) -> Option<&[String]> {
+        self.units.as_deref()
     }
 
     /// The index of a named column, which nothing else may be.
@@ -110,10 +138,22 @@ impl CsvFile {
     pub fn advance(&mut self) -> Result<bool, RunError> {
         let more = self.reader.read_byte_record(&mut self.row);
         let more = more.map_err(|error| self.unreadable(&error))?;
-        if let Some(position) = self.row.position() {
-            self.line = position.line();
+        if !more {
+            return Ok(false);
         }
-        Ok(more)
+        // The reader has taken the end of the row's line, too.
+        let given = self.reader.position().line() - 1;
+        self.line = self.reader.get_ref().number(given);
+        let (found, expected) = (self.row.len(), self.header.len());
+        let ends_in_delimiter = found == expected + 1 && self.bytes(expected).is_empty();
+        if found != expected && !ends_in_delimiter {
+            return Err(self.error_here(
+                format_args!("{found} fields"),
+                format_args!("{expected}, as in the header"),
+                "Complete or remove the row.",
+            ));
+        }
+        Ok(true)
     }
 
     /// Line of the row.
@@ -125,7 +165,10 @@ impl CsvFile {
     pub fn number(&self, column: usize) -> Result<f64, RunError> {
         std::str::from_utf8(self.bytes(column))
             .ok()
-            .and_then(|text| text.parse().ok())
+            .and_then(|text| match text.parse() {
+                Err(_) if self.decimal_comma => text.replacen(',', ".", 1).parse().ok(),
+                number => number.ok(),
+            })
             .filter(|number: &f64| number.is_finite())
             .ok_or_else(|| self.not(column, "a finite number"))
     }
@@ -185,24 +228,7 @@ impl CsvFile {
 
     fn unreadable(&self, error: &csv::Error) -> RunError {
         match error.kind() {
-            ErrorKind::UnequalLengths {
-                pos,
-                expected_len,
-                len,
-            } => RunError::new(
-                &self.file,
-                pos.as_ref()
-                    .map_or(Place::File, |at| Place::Line(at.line())),
-                format_args!("{len} fields"),
-                format_args!("{expected_len}, as in the header"),
-                "Complete or remove the row.",
-            ),
-            ErrorKind::Io(error) => RunError::io(
-                &self.file,
-                "read on",
-                error,
-                "The file is damaged or cut off; copy or compress it again.",
-            ),
+            ErrorKind::Io(error) => damaged(&self.file, error),
             _ => RunError {
                 file: self.file.clone(),
                 place: Place::Line(self.line),
@@ -211,3 +237,15 @@ impl CsvFile {
         }
     }
 }
+
+fn damaged(file: &Path, error: &std::io::Error) -> RunError {
+    RunError::io(
+        file,
+        "read on",
+        error,
+        "The file is damaged or cut off; copy or compress it again.",
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -17,6 +17,7 @@ mod quantity;
 mod read;
 pub mod record;
 mod segments;
+mod sheet;
 pub(crate) mod state_block;
 mod table_geometry;
 mod table_log;
@@ -32,6 +33,7 @@ pub(crate) use quantity::unit_scale;
 pub use read::SET_BY_HAND;
 pub use record::CalibrationRecord;
 pub use segments::{LabelledMotion, Segment};
+pub(crate) use sheet::Sheet;
 pub use state_block::StateBlock;
 pub use table_geometry::{
     AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,

@@ -11,12 +11,15 @@ use proptest::sample::{Index, select};
 use proptest::test_runner::{Config, TestRunner};
 use tempfile::TempDir;
 use turncal::calibration::{Correction, estimate, six_position};
+use turncal::draft::Draft;
 use turncal::imu::{InstallationForm, Output};
 use turncal::models;
 use turncal::noise::Stretch;
 use turncal::noise::conventions::convert;
+use turncal::report::check::CheckReport;
 use turncal::run::{CalibrationRecord, Run, write_run};
 use turncal::simulation::Scenario;
+use turncal::survey::Survey;
 
 /// Cases of each format where `PROPTEST_CASES` says nothing.
 const CASES: u32 = 500;
@@ -211,6 +214,36 @@ fn spoilt_runs() {
     for file in ["run.toml", "imu.csv", "table.csv", "segments.csv"] {
         fuzz(&run, file, read_run);
     }
+}
+
+#[test]
+fn runs_that_make_no_sense_are_looked_at_all_the_same() {
+    let run = small_run();
+    for file in ["run.toml", "imu.csv", "table.csv", "segments.csv"] {
+        fuzz(&run, file, |directory| {
+            let run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
+            let survey = Survey::of(&run);
+            let report = CheckReport {
+                run: &run,
+                survey: &survey,
+            };
+            let _ = report.summary();
+            serde_json::to_string(&report.document()).unwrap();
+            Ok(())
+        });
+    }
+}
+
+#[test]
+fn spoilt_logs_of_which_nothing_is_known() {
+    let run = small_run();
+    fuzz(&run, "imu.csv", |directory| {
+        let draft =
+            Draft::of_file(&directory.join("imu.csv")).map_err(|error| error.to_string())?;
+        let text = draft.to_toml("imu.csv");
+        assert!(text.parse::<toml::Table>().is_ok(), "{text}");
+        Ok(())
+    });
 }
 
 #[test]

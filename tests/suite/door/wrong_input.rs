@@ -430,8 +430,8 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     fs::write(at("run.toml"), RUN.replace("\"gy\"", "\"gx\"")).unwrap();
     assert_says(&error(), "imu.csv", "`gx` named for two & run.toml");
 
-    fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.txt")).unwrap();
-    assert_says(&error(), "imu.txt", ".csv or .csv.gz");
+    fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.mat")).unwrap();
+    assert_says(&error(), "imu.mat", ".csv & .txt & .gz");
     fs::write(at("run.toml"), [0xff, 0xfe]).unwrap();
     assert_says(&error(), "run.toml", "cannot read");
     fs::remove_file(at("run.toml")).unwrap();

@@ -1,0 +1,49 @@
+//! `turncal check`
+
+use std::path::PathBuf;
+
+use turncal::report::check::CheckReport;
+use turncal::run::Run;
+use turncal::survey::Survey;
+
+use super::output::Delivery;
+use super::progress::Activity;
+
+/// Says what a run holds, and what each method could see of the instrument in it
+///
+/// Reads everything and calibrates nothing: rate, jitter, faults and steps of the log; dwells with the axis
+/// that is up; turns with axis and angle; labelled sections against both; the σ to be expected of each method
+/// and what it would not see; what to change. What it finds wrong is no failure.
+#[derive(Debug, clap::Args)]
+#[command(mut_arg("output", |output| output.help("Directory for a page and a figure of the record")))]
+#[command(after_help = "Examples:
+  turncal check run.toml
+  turncal check run.toml -o check
+  turncal check run.toml --json")]
+pub struct Check {
+    /// The run
+    #[arg(value_name = "RUN.toml")]
+    run: PathBuf,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Check {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let activity = Activity::new("reading");
+        let run = Run::read(&self.run)?;
+        let begun = self.delivery.begin(&[&self.run])?;
+        activity.next("looking at the run");
+        let survey = Survey::of(&run);
+        drop(activity);
+        let report = CheckReport {
+            run: &run,
+            survey: &survey,
+        };
+        begun.deliver(
+            |directory| report.write(directory),
+            || report.document(),
+            || report.summary(),
+        )
+    }
+}

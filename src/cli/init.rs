@@ -1,0 +1,69 @@
+//! `turncal init`
+
+use std::path::{Path, PathBuf};
+
+use turncal::draft::Draft;
+use turncal::run::write_whole;
+
+use super::output::{keep, print};
+use super::progress::Activity;
+
+/// Writes a draft of run.toml for a log that has none
+///
+/// Columns by their names or their numbers, the unit of time, units by gravity at rest and by how far its
+/// direction turns with the gyros, white noise at rest: each guess with its reason. What only a person knows
+/// is marked TODO.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal init imu.csv
+  turncal init imu.csv.gz -o run.toml")]
+pub struct Init {
+    /// Rows of numbers below a line of names, or without one: `.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also
+    /// with `.gz`
+    #[arg(value_name = "IMU.csv")]
+    log: PathBuf,
+    /// File to write [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace the file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+impl Init {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let activity = Activity::new("reading");
+        let draft = Draft::of_file(&self.log)?;
+        drop(activity);
+        let text = draft.to_toml(&self.name());
+        let Some(output) = &self.output else {
+            return print(text.as_bytes());
+        };
+        keep(output, [&self.log])?;
+        write_whole(output, text.as_bytes(), self.force)?;
+        let open = text.matches("TODO:").count();
+        eprintln!(
+            "{}: {open} fields to complete, each marked TODO",
+            output.display()
+        );
+        Ok(())
+    }
+
+    /// The log's name as the new file, which stands beside the log unless told otherwise, says it.
+    fn name(&self) -> String {
+        let directory = |path: &Path| {
+            let parent = path.parent().filter(|parent| *parent != Path::new(""));
+            parent.unwrap_or(Path::new(".")).canonicalize().ok()
+        };
+        let beside = self
+            .output
+            .as_ref()
+            .is_none_or(|output| directory(output) == directory(&self.log));
+        let name = match (self.log.file_name(), self.log.canonicalize()) {
+            (Some(name), _) if beside => PathBuf::from(name),
+            (_, Ok(full)) => full,
+            _ => self.log.clone(),
+        };
+        name.to_string_lossy().into_owned()
+    }
+}

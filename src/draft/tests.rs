@@ -1,0 +1,201 @@
+use std::fs;
+
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+
+/// Three quarter turns about each axis in turn with rests between, at 100 Hz; `row` makes a line of time,
+/// angular rate and specific force.
+fn draft(header: &str, row: impl Fn(usize, [f64; 6]) -> String) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("log.csv");
+    let mut text = header.to_owned();
+    let mut up = Vector3::new(0.1, 0.2, 1.0).normalize();
+    let mut k = 0;
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for turn in 0..9 {
+        for step in 0..300 {
+            let rate = if step < 200 {
+                0.0
+            } else {
+                std::f64::consts::FRAC_PI_2
+            };
+            let rate = Vector3::ith(turn % 3, rate);
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            up = crate::attitude::exp(-rate * 0.01) * up;
+            let (gyro, accel) = (
+                rate.add_scalar(noise * 1e-3),
+                (up * 9.8).add_scalar(noise * 1e-2),
+            );
+            text += &row(k, [gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z]);
+            text.push('\n');
+            k += 1;
+        }
+    }
+    fs::write(&path, text).unwrap();
+    Draft::of_file(&path).unwrap().to_toml("log.csv")
+}
+
+fn has(text: &str, lines: &[&str]) {
+    for line in lines {
+        assert!(
+            text.lines().any(|found| found.starts_with(line)),
+            "no `{line}` in\n{text}"
+        );
+    }
+}
+
+#[test]
+fn si_rates_are_known_by_gravity_and_its_turns() {
+    let text = draft("time,wx,wy,wz,fx,fy,fz\n", |k, v| {
+        format!(
+            "{},{},{},{},{},{},{}",
+            k as f64 * 0.01,
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5]
+        )
+    });
+    has(
+        &text,
+        &[
+            "output = \"rate\"",
+            "gyro_unit = \"rad/s\"",
+            "accel_unit = \"m/s^2\"",
+            "continuous = true",
+            "# sample_period_s = 0.01 ",
+            "columns = { time = \"time\", gyro = [\"wx\", \"wy\", \"wz\"], accel = [\"fx\", \"fy\", \"fz\"] }",
+            "# latitude_deg =  # TODO",
+        ],
+    );
+    assert!(!text.contains("time_unit"), "{text}");
+}
+
+#[test]
+fn a_file_of_numbers_alone_is_told_by_them() {
+    // Milliseconds, temperature-free, accelerometers in g first, gyros in °/s.
+    let text = draft("", |k, v| {
+        let deg = 180.0 / std::f64::consts::PI;
+        let g = 9.80665;
+        let [gx, gy, gz, ax, ay, az] = v;
+        format!(
+            "{} {} {} {} {} {} {}",
+            10 * k,
+            ax / g,
+            ay / g,
+            az / g,
+            gx * deg,
+            gy * deg,
+            gz * deg
+        )
+    });
+    has(
+        &text,
+        &[
+            "gyro_unit = \"deg/s\"",
+            "accel_unit = \"g\"",
+            "time_unit = \"ms\"",
+            "columns = { time = \"1\", gyro = [\"5\", \"6\", \"7\"], accel = [\"2\", \"3\", \"4\"] }",
+        ],
+    );
+}
+
+#[test]
+fn unsigned_registers_have_their_zero_in_the_middle_and_a_data_sheets_scale() {
+    let text = draft("n;AccX;AccY;AccZ;GyrX;GyrY;GyrZ\n", |k, v| {
+        let deg = 180.0 / std::f64::consts::PI;
+        let gyro = |x: f64| (32_768.0 + x * deg * 65.5).round();
+        let accel = |x: f64| (32_768.0 + x / 9.80665 * 4096.0).round();
+        let [gx, gy, gz, ax, ay, az] = v;
+        format!(
+            "{k};{};{};{};{};{};{}",
+            accel(ax),
+            accel(ay),
+            accel(az),
+            gyro(gx),
+            gyro(gy),
+            gyro(gz)
+        )
+    });
+    has(
+        &text,
+        &[
+            "output = \"rate\"",
+            "gyro_unit = \"count\"",
+            "accel_unit = \"count\"",
+            "time_unit = \"count\"",
+            "# sample_period_s =  # TODO",
+            "bias = 32768.0",
+            "scale = 417.6758  # 4096 counts for one g",
+        ],
+    );
+}
+
+#[test]
+fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
+    let text = draft("t,gx,gy,gz,ax,ay,az\n", |k, v| {
+        let row = v.map(|value| (value * 0.01).to_string());
+        format!("{},{}", k as f64 * 0.01, row.join(","))
+    });
+    has(
+        &text,
+        &[
+            "output = \"increment\"",
+            "gyro_unit = \"rad\"",
+            "accel_unit = \"m/s\"",
+        ],
+    );
+    let carried = std::cell::RefCell::new([0.0; 6]);
+    let text = draft("t,gx,gy,gz,ax,ay,az\n", |k, v| {
+        let mut carried = carried.borrow_mut();
+        let mut row = format!("{}", k as f64 * 0.01);
+        for (axis, value) in v.iter().enumerate() {
+            let scale = if axis < 3 { 2e5 } else { 1e3 };
+            let before = carried[axis];
+            carried[axis] += value * 0.01 * scale;
+            row += &format!(",{}", carried[axis].floor() - before.floor());
+        }
+        row
+    });
+    has(
+        &text,
+        &[
+            "output = \"pulse\"",
+            "gyro_unit = \"count\"",
+            "accel_unit = \"count\"",
+            "scale = 199",
+        ],
+    );
+}
+
+#[test]
+fn registers_without_names_and_time_are_told_by_their_numbers() {
+    let text = draft("", |_, v| {
+        let deg = 180.0 / std::f64::consts::PI;
+        let gyro = |x: f64| (32_768.0 + x * deg * 65.5).round();
+        let accel = |x: f64| (32_768.0 + x / 9.80665 * 4096.0).round();
+        let [gx, gy, gz, ax, ay, az] = v;
+        format!(
+            "{} {} {} {} {} {}",
+            accel(ax),
+            accel(ay),
+            accel(az),
+            gyro(gx),
+            gyro(gy),
+            gyro(gz)
+        )
+    });
+    has(
+        &text,
+        &[
+            "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
+            "# TODO: no column goes forward like a time",
+        ],
+    );
+}

@@ -1,0 +1,285 @@
+//! What has to be said of a run before it is calibrated.
+
+use super::super::number::{count, three_digits, value};
+use super::CheckReport;
+use crate::imu::AXES;
+use crate::run::LabelledMotion;
+use crate::survey::{APART, LabelCheck, Survey, Turn, Verdict};
+use crate::units::DEGREE;
+
+/// Specific force at rest further from gravity than this part of it has a wrong unit or scale.
+const WRONG_FORCE: f64 = 0.15;
+/// Turns and directions further off than this have a wrong unit, sign or axis, rad …
+const WRONG_ANGLE: f64 = 5.0 * DEGREE;
+/// … where that is more than this part of the turn.
+const WRONG_PART: f64 = 0.1;
+/// A turn of at least this much about a body axis shows its gyro's scale, rad.
+const WORTH: f64 = 60.0 * DEGREE;
+/// Parameters of the accelerometers without a table: as many directions of up are needed.
+const DIRECTIONS: usize = 9;
+const MICROSECOND: f64 = 1e-6;
+/// Beyond so many places only their number is said.
+const NAMED: usize = 4;
+
+/// A degree sign behind a number.
+pub(super) fn degrees(angle: f64) -> String {
+    value(angle / DEGREE, 1.0)
+}
+
+/// Such as `x up`.
+pub(super) fn way_up(axis: usize, down: bool) -> String {
+    format!("{} {}", AXES[axis], if down { "down" } else { "up" })
+}
+
+/// Such as `x +360.0°`; about several axes only how far.
+pub(super) fn turn(turn: &Turn) -> String {
+    match turn.body_axis() {
+        Some(axis) => format!("{} {}°", AXES[axis], signed(turn.angle)),
+        None if turn.single => format!("{} {}°", direction(turn), signed(turn.angle)),
+        None => format!("{}°", degrees(turn.angle.abs())),
+    }
+}
+
+/// Components of a turn's axis.
+pub(super) fn direction(turn: &Turn) -> String {
+    let parts: Vec<String> = turn.axis.iter().map(|&part| value(part, 0.1)).collect();
+    format!("({})", parts.join(", "))
+}
+
+pub(super) fn signed(angle: f64) -> String {
+    let plus = if angle > 0.0 { "+" } else { "" };
+    format!("{plus}{}", degrees(angle))
+}
+
+/// The log in a sentence or two.
+pub(super) fn log(report: &CheckReport) -> String {
+    let (run, survey) = (report.run, report.survey);
+    let mut text = format!(
+        "Stands for {} s in all, at most {} s at a time; {}.",
+        three_digits(survey.standing.total),
+        three_digits(survey.standing.longest),
+        match (&run.table, run.segments.len()) {
+            (Some(table), _) => format!("table log of {} readings", count(table.time.len())),
+            (None, 0) => "no table log, no labelled sections".to_owned(),
+            (None, labels) => format!("no table log, {labels} labelled sections"),
+        }
+    );
+    if let Some(log) = &run.imu.log {
+        text += &format!(
+            " {} rows; stamps are off the uniform clock by {} µs RMS, {} µs at most.",
+            count(log.rows),
+            value(log.jitter_rms / MICROSECOND, 1.0),
+            value(log.jitter_max / MICROSECOND, 1.0)
+        );
+        if let Some(temperature) = log.temperature {
+            text += &format!(
+                " Temperature column: {} to {}, mean {}.",
+                three_digits(temperature.smallest),
+                three_digits(temperature.largest),
+                three_digits(temperature.mean)
+            );
+        }
+    }
+    text
+}
+
+/// What to look at and what to change, a sentence or two each.
+pub(super) fn findings(report: &CheckReport) -> Vec<String> {
+    let mut findings = report.run.notes.clone();
+    findings.extend(of_units(report));
+    findings.extend(report.survey.labels.iter().filter_map(of_label));
+    findings.extend(of_motion(report));
+    findings.extend(of_methods(report.survey));
+    findings
+}
+
+/// Signs of a wrong unit, scale or frame.
+fn of_units(report: &CheckReport) -> Vec<String> {
+    let (run, survey) = (report.run, report.survey);
+    let rests = &survey.rests;
+    let mut findings = Vec::new();
+    let wrong = |force: f64| (force / run.site.gravity - 1.0).abs() > WRONG_FORCE;
+    let wrong: Vec<usize> = places(rests.iter().map(|rest| wrong(rest.force.norm())));
+    if let Some(&first) = wrong.first() {
+        findings.push(format!(
+            "Specific force at rest is {} m/s² in {}, not gravity's {}: correct accel_unit, the scale or the bias in \
+             [imu.prior.accel].",
+            three_digits(rests[first].force.norm()),
+            dwells(&wrong),
+            three_digits(run.site.gravity)
+        ));
+    }
+    let tilted = places(
+        rests
+            .iter()
+            .map(|rest| rest.off_table().is_some_and(|off| off > WRONG_ANGLE)),
+    );
+    if !tilted.is_empty() {
+        findings.push(format!(
+            "In {} the accelerometers see another axis up than the table's log: check body_axes, the order of \
+             quaternion or angles, and that the table's zero is as C_b_n = I has it.",
+            dwells(&tilted)
+        ));
+    }
+    let far = |turn: &Turn, off: Option<f64>| {
+        off.is_some_and(|off| off > WRONG_ANGLE.max(WRONG_PART * turn.angle.abs()))
+    };
+    let by_table = places(
+        survey
+            .turns
+            .iter()
+            .map(|turn| far(turn, turn.off_table(rests))),
+    );
+    let by_gravity = places(
+        survey
+            .turns
+            .iter()
+            .map(|turn| far(turn, turn.off_gravity(rests))),
+    );
+    for (wrong, by) in [
+        (by_table, "the table's log"),
+        (by_gravity, "gravity's direction"),
+    ] {
+        if let Some(&first) = wrong.first() {
+            let turn = &survey.turns[first];
+            findings.push(format!(
+                "Gyros and {by} do not turn alike in {} of {} turns (first at {} s): check gyro_unit, scale, signs and \
+                 the order of axes.",
+                wrong.len(),
+                survey.turns.len(),
+                value(run.imu.time(turn.samples.start), 1.0)
+            ));
+        }
+    }
+    findings
+}
+
+fn places(which: impl Iterator<Item = bool>) -> Vec<usize> {
+    which
+        .enumerate()
+        .filter(|&(_, is)| is)
+        .map(|(place, _)| place)
+        .collect()
+}
+
+/// Such as `dwells 1, 2 and 4`.
+fn dwells(places: &[usize]) -> String {
+    let numbers: Vec<String> = places
+        .iter()
+        .take(NAMED)
+        .map(|k| (k + 1).to_string())
+        .collect();
+    let more = places.len().saturating_sub(NAMED);
+    let word = if places.len() == 1 { "dwell" } else { "dwells" };
+    match more {
+        0 => format!("{word} {}", numbers.join(", ")),
+        more => format!("{word} {} and {more} more", numbers.join(", ")),
+    }
+}
+
+/// What a label and the record disagree in.
+pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
+    if check.agrees() {
+        return None;
+    }
+    let label = &check.segment.label;
+    let at = format!("{} s", value(check.segment.start, 1.0));
+    let said = match (&check.verdict, check.segment.motion) {
+        (Verdict::Unknown, _) => {
+            "is no position (x_up … z_down) and no turn (rot_x+360): it has no effect".to_owned()
+        }
+        (Verdict::Empty, _) => "holds no samples: correct its times".to_owned(),
+        (Verdict::Position { off, .. }, _) if *off > 30.0 * DEGREE => format!(
+            "is {}° off the plumb line: another axis is up; correct the label or body_axes",
+            degrees(*off)
+        ),
+        (Verdict::Position { moving, .. }, _) => format!(
+            "moves for {} s of its time: draw its borders closer",
+            value(*moving, 1.0)
+        ),
+        (Verdict::Turn { cut: true, .. }, _) => {
+            "begins or ends within the turn: draw its borders wider, to where it stands".to_owned()
+        }
+        (Verdict::Turn { angle, .. }, Some(LabelledMotion::Turns { angle: said, .. })) => format!(
+            "turns by {}° about its axis, not {}°: correct axis, sign or angle of the label, or the gyros' scale",
+            signed(*angle),
+            signed(said)
+        ),
+        (Verdict::Turn { .. }, _) => "is no turn".to_owned(),
+    };
+    Some(format!("Section `{label}` at {at} {said}."))
+}
+
+/// What positions and turns lack.
+fn of_motion(report: &CheckReport) -> Vec<String> {
+    let survey = report.survey;
+    let mut findings = Vec::new();
+    if survey.rests.len() < 2 {
+        findings.push(
+            "There are fewer than two dwells: let the instrument stand for a second or more between turns; if it does, \
+             check bias_sigma of the gyros and the noise figures."
+                .to_owned(),
+        );
+        return findings;
+    }
+    let missing: Vec<String> = survey
+        .ways_up()
+        .iter()
+        .enumerate()
+        .filter(|&(_, &rests)| rests == 0)
+        .map(|(way, _)| way_up(way / 2, way % 2 == 1))
+        .collect();
+    if !missing.is_empty() && survey.directions < DIRECTIONS {
+        findings.push(format!(
+            "Of the six positions {} are missing, and there are {} directions of up that differ by {}°; the nine \
+             parameters of the accelerometers without a table need all six or {DIRECTIONS} directions.",
+            missing.join(", "),
+            survey.directions,
+            degrees(APART)
+        ));
+    }
+    let unturned: Vec<String> = (0..3)
+        .filter(|&axis| {
+            let about = |turn: &Turn| turn.sum[axis].abs() > WORTH;
+            !survey.turns.iter().any(about)
+        })
+        .map(|axis| AXES[axis].to_string())
+        .collect();
+    if !unturned.is_empty() {
+        findings.push(format!(
+            "Nothing turns by more than {}° about {}: the scale of that gyro shows only in such a turn.",
+            degrees(WORTH),
+            unturned.join(" and ")
+        ));
+    }
+    findings
+}
+
+/// Parameters that no method could see.
+fn of_methods(survey: &Survey) -> Vec<String> {
+    let expected = || {
+        survey
+            .methods
+            .iter()
+            .filter_map(|method| method.expected.as_ref().ok())
+    };
+    let Some(first) = expected().next() else {
+        return vec![
+            "No method can calibrate from this run; the table of methods says why.".to_owned(),
+        ];
+    };
+    let always: Vec<&str> = first
+        .unobserved
+        .iter()
+        .filter(|name| expected().all(|other| other.unobserved.contains(name)))
+        .map(String::as_str)
+        .collect();
+    match always.is_empty() {
+        true => Vec::new(),
+        false => vec![format!(
+            "By every method {} would stay above half the σ that [imu.prior] states: more positions and turns \
+             would show them.",
+            always.join(", ")
+        )],
+    }
+}

@@ -1,0 +1,108 @@
+//! What each method could see of the instrument.
+
+use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, parameter_name};
+use crate::calibration::states::sensor_and_parameter;
+use crate::calibration::{CalibrationError, Group, bound, coarse_start, six_position};
+use crate::imu::{FurtherVector, InstallationForm};
+use crate::run::Run;
+
+/// Forms differ by what the data must say, not by what they can.
+const FORM: InstallationForm = InstallationForm::General;
+
+/// A way to a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Path {
+    /// `--method six-position`.
+    SixPosition,
+    /// `--method ekf --aiding table`.
+    TableAiding,
+    /// `--method ekf --aiding velocity`.
+    VelocityAiding,
+}
+
+impl Path {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::SixPosition, Self::TableAiding, Self::VelocityAiding];
+
+    /// As `calibrate` is told.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::SixPosition => "--method six-position",
+            Self::TableAiding => "--method ekf --aiding table",
+            Self::VelocityAiding => "--method ekf --aiding velocity",
+        }
+    }
+}
+
+/// What a method could see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodOutlook {
+    /// The method.
+    pub path: Path,
+    /// What is to be expected, or why nothing is.
+    pub expected: Result<Expected, String>,
+}
+
+/// σ to be expected, in the general installation form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expected {
+    /// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; none where all are fixed.
+    pub sigma: Vec<(Group, Option<f64>)>,
+    /// Parameters that stay within half of their prior σ, or that nothing but the prior says.
+    pub unobserved: Vec<String>,
+}
+
+pub(super) fn methods(run: &Run) -> Vec<MethodOutlook> {
+    let outlook = |path| MethodOutlook {
+        path,
+        expected: expected(run, path),
+    };
+    Path::ALL.into_iter().map(outlook).collect()
+}
+
+fn expected(run: &Run, path: Path) -> Result<Expected, String> {
+    let estimate = match path {
+        Path::SixPosition => six_position(run, FORM).map(|closed| closed.estimate),
+        Path::TableAiding if run.table.is_none() => Err(CalibrationError::NoTable),
+        Path::TableAiding => filtered(run),
+        Path::VelocityAiding if run.table.is_none() => filtered(run),
+        Path::VelocityAiding => filtered(&Run {
+            table: None,
+            ..run.clone()
+        }),
+    };
+    match estimate {
+        Ok(estimate) => Ok(summary(run, &estimate)),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// The covariance that the filter ends with, linearised where it would begin.
+fn filtered(run: &Run) -> Result<Estimate, CalibrationError> {
+    if !run.imu.continuous {
+        return Err(CalibrationError::not_continuous(&run.imu));
+    }
+    let start = coarse_start(run, &run.dwells(), FORM)?;
+    Ok(bound(run, &start.at.triads, &FurtherVector::zeros())?.estimate)
+}
+
+fn summary(run: &Run, estimate: &Estimate) -> Expected {
+    let sigma = estimate.sigma();
+    let group = |group: Group| {
+        let indices = group.estimated(estimate);
+        let mean = indices.iter().map(|&k| sigma[k].powi(2)).sum::<f64>() / indices.len() as f64;
+        (group, (!indices.is_empty()).then(|| mean.sqrt()))
+    };
+    let hidden = |&k: &usize| {
+        let (sensor, of_triad) = sensor_and_parameter(k);
+        sigma[k] > OBSERVED_BELOW * run.prior.get(sensor).sigma(FORM)[of_triad]
+    };
+    Expected {
+        sigma: Group::all().map(group).collect(),
+        unobserved: estimate
+            .estimated()
+            .filter(hidden)
+            .filter_map(|k| parameter_name(FORM, k))
+            .collect(),
+    }
+}

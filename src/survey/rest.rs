@@ -1,0 +1,102 @@
+//! Where the instrument stands, and which way up.
+
+use nalgebra::Vector3;
+
+use crate::imu::Sensor;
+use crate::run::{Dwell, LabelledMotion, Run};
+use crate::units::DEGREE;
+
+/// An axis within this angle of the plumb line is up or down, rad.
+const UPRIGHT: f64 = 10.0 * DEGREE;
+
+/// A dwell, by nominal scales and prior biases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rest {
+    /// Its samples, and what the table says of it.
+    pub dwell: Dwell,
+    /// Mean specific force along body axes, m/s².
+    pub force: Vector3<f64>,
+    /// Which axis is up.
+    pub up: Up,
+}
+
+/// The axis nearest to the plumb line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Up {
+    /// Right, front or up of the body.
+    pub axis: usize,
+    /// Whether it points down.
+    pub down: bool,
+    /// Its angle to the plumb line, rad.
+    pub tilt: f64,
+}
+
+impl Up {
+    pub(super) fn of(force: &Vector3<f64>) -> Self {
+        let axis = force.iamax();
+        let cosine = (force[axis].abs() / force.norm()).clamp(0.0, 1.0);
+        Self {
+            axis,
+            down: force[axis] < 0.0,
+            tilt: cosine.acos(),
+        }
+    }
+
+    /// Whether it is nearly plumb.
+    pub fn is_upright(&self) -> bool {
+        self.tilt < UPRIGHT
+    }
+}
+
+impl Rest {
+    fn of(run: &Run, dwell: Dwell) -> Self {
+        let force = mean(run, &dwell, Sensor::Accel) - run.prior.accel.bias;
+        Self {
+            up: Up::of(&force),
+            force,
+            dwell,
+        }
+    }
+
+    /// Begin and end, s.
+    pub fn times(&self, run: &Run) -> [f64; 2] {
+        let samples = &self.dwell.samples;
+        [run.imu.time(samples.start), run.imu.time(samples.end)]
+    }
+
+    /// Angle between gravity as the accelerometers see it and as the table holds the instrument, rad.
+    pub fn off_table(&self) -> Option<f64> {
+        let attitude = self.dwell.position.as_ref()?.attitude;
+        Some(self.force.angle(&attitude.tr_mul(&Vector3::z())))
+    }
+
+    /// s.
+    pub fn duration(&self, run: &Run) -> f64 {
+        self.dwell.samples.len() as f64 * run.imu.period
+    }
+}
+
+pub(super) fn mean(run: &Run, dwell: &Dwell, sensor: Sensor) -> Vector3<f64> {
+    dwell.mean(sensor, run).output
+}
+
+/// The dwells; in a record of labelled sections, those labelled as positions, for what lies between
+/// sections is not known.
+pub(super) fn rests(run: &Run) -> Vec<Rest> {
+    let positions = run.segments.iter().filter_map(|segment| {
+        let stands = matches!(segment.motion, Some(LabelledMotion::Stands { .. }));
+        (stands && !segment.samples.is_empty()).then(|| Dwell {
+            samples: segment.samples.clone(),
+            position: None,
+        })
+    });
+    let dwells = if run.imu.continuous {
+        run.dwells()
+    } else {
+        positions.collect()
+    };
+    dwells
+        .into_iter()
+        .map(|dwell| Rest::of(run, dwell))
+        .collect()
+}

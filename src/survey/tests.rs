@@ -1,0 +1,147 @@
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+
+use super::*;
+use crate::run::{LabelledMotion, Segment};
+use crate::simulation::Scenario;
+use crate::units::DEGREE;
+
+fn demo() -> Run {
+    Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run
+}
+
+fn segment(run: &Run, samples: std::ops::Range<usize>, motion: LabelledMotion) -> Segment {
+    Segment {
+        start: run.imu.time(samples.start),
+        end: run.imu.time(samples.end),
+        samples,
+        label: "any".to_owned(),
+        motion: Some(motion),
+    }
+}
+
+#[test]
+fn rests_say_which_axis_the_table_holds_up() {
+    let run = demo();
+    let survey = Survey::of(&run);
+    assert_eq!(survey.rests.len(), 18);
+    for rest in &survey.rests {
+        let c = rest.dwell.position.as_ref().unwrap().attitude;
+        let up = c[(2, rest.up.axis)];
+        // Installation and biases of the instrument are arc minutes.
+        assert!(((up.abs()).acos() - rest.up.tilt).abs() < 1.0 * DEGREE);
+        assert_eq!(up < 0.0, rest.up.down);
+    }
+}
+
+#[test]
+fn turns_are_those_of_the_table_full_turns_too() {
+    let run = demo();
+    let survey = Survey::of(&run);
+    let table = run.table.as_ref().unwrap();
+    assert_eq!(survey.turns.len(), 17);
+    for turn in &survey.turns[..3] {
+        let full = 4.0 * PI;
+        assert!((turn.angle.abs() - full).abs() < 0.01 * full && turn.body_axis().is_some());
+    }
+    for (turn, pair) in survey.turns.iter().zip(survey.rests.windows(2)) {
+        let attitude =
+            |rest: &Rest| table.attitude[rest.dwell.position.as_ref().unwrap().readings.start];
+        let said = attitude(&pair[0]).transpose() * attitude(&pair[1]);
+        let found = crate::attitude::exp(turn.axis * turn.angle);
+        let off = crate::attitude::log(&(found * said.transpose())).norm();
+        // Scale factors are 0.7 % off at most.
+        let limit = 1.0 * DEGREE + 0.01 * turn.angle.abs();
+        assert!(off < limit, "{}°", off / DEGREE);
+    }
+}
+
+#[test]
+fn a_label_is_held_against_axis_angle_sign_and_borders() {
+    let mut run = demo();
+    let found = Survey::of(&run);
+    let (rest, turn) = (&found.rests[0], &found.turns[0]);
+    let up = rest.force.normalize();
+    let standing = rest.dwell.samples.clone();
+    let turning = turn.samples.clone();
+    let middle = turning.start + turning.len() / 2;
+    let turns = |angle| LabelledMotion::Turns {
+        axis: turn.axis,
+        angle,
+    };
+    let stands = |up: Vector3<f64>| LabelledMotion::Stands { up };
+    let cases = [
+        (standing.clone(), stands(up), true),
+        (standing.clone(), stands(-up), false),
+        (
+            standing.clone(),
+            stands(Vector3::ith(up.iamin(), 1.0)),
+            false,
+        ),
+        (standing.start..middle, stands(up), false),
+        (turning.clone(), turns(turn.angle), true),
+        (turning.clone(), turns(-turn.angle), false),
+        (turning.clone(), turns(0.5 * turn.angle), false),
+        (turning.start..middle, turns(0.5 * turn.angle), false),
+    ];
+    run.segments = cases
+        .iter()
+        .map(|(samples, motion, _)| segment(&run, samples.clone(), *motion))
+        .collect();
+    for (check, (.., agrees)) in Survey::of(&run).labels.iter().zip(cases) {
+        assert_eq!(check.agrees(), agrees, "{:?}", check.verdict);
+    }
+}
+
+#[test]
+fn what_a_run_lacks_is_not_promised() {
+    let run = demo();
+    let of = |run: &Run, path| {
+        let survey = Survey::of(run);
+        survey
+            .methods
+            .into_iter()
+            .find(|m| m.path == path)
+            .unwrap()
+            .expected
+    };
+    assert!(of(&run, Path::TableAiding).unwrap().unobserved.is_empty());
+    let alone = Run {
+        table: None,
+        ..run.clone()
+    };
+    assert!(of(&alone, Path::TableAiding).is_err());
+    // The first turns are about one axis, level: gravity shows neither the others nor their up.
+    let few = 2 * run.imu.len() / 10;
+    let mut short = alone.clone();
+    short.imu.gyro.truncate(few);
+    short.imu.accel.truncate(few);
+    let expected = of(&short, Path::VelocityAiding).unwrap();
+    assert!(
+        expected
+            .unobserved
+            .iter()
+            .any(|name| name.starts_with("gyro.scale")),
+        "{expected:?}"
+    );
+    assert!(
+        expected
+            .unobserved
+            .iter()
+            .any(|name| name.starts_with("accel.scale")),
+        "{expected:?}"
+    );
+    let sections = Run {
+        imu: crate::run::ImuRecord {
+            continuous: false,
+            ..alone.imu.clone()
+        },
+        ..alone
+    };
+    assert!(
+        of(&sections, Path::VelocityAiding)
+            .unwrap_err()
+            .contains("continuous")
+    );
+}
