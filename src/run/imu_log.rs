@@ -86,13 +86,15 @@ impl ImuLog<'_> {
         let body_axes = std::array::from_fn(|column| self.axes.body_axis(column % 3));
         let sensor = |column: usize| Sensor::ALL[column / 3];
         let names = [self.triads.gyro, self.triads.accel].concat();
-        let facts = std::array::from_fn(|k| ColumnFacts::of(names[k], &columns[k]));
+        let unit = |k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]];
+        let units = std::array::from_fn(unit);
+        let facts = std::array::from_fn(|k| ColumnFacts::of(names[k], &columns[k], units[k]));
         let rows = Rows {
             columns,
             facts: &facts,
             full_scale: std::array::from_fn(|k| *self.full_scale.get(sensor(k))),
             body_axes,
-            units: std::array::from_fn(|k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]]),
+            units,
             lines: stamps.iter().map(|&(_, line)| line).collect(),
             numbers: clock.numbers,
             period,

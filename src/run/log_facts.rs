@@ -32,6 +32,8 @@ pub struct ColumnFacts {
     pub at_largest: usize,
     /// The step of the grid on which all values lie, if they do.
     pub step: Option<f64>,
+    /// What one of its unit in a row is, rad or m/s by the nominal scale.
+    pub unit: f64,
 }
 
 /// A column of temperatures.
@@ -47,7 +49,7 @@ pub struct TemperatureFacts {
 
 impl ColumnFacts {
     /// Of a column that is not empty.
-    pub(super) fn of(name: &str, values: &[f64]) -> Self {
+    pub(super) fn of(name: &str, values: &[f64], unit: f64) -> Self {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
         let ends = values
             .iter()
@@ -60,6 +62,7 @@ impl ColumnFacts {
             largest: ends.1,
             at_largest: count(ends.1),
             step: grid_step(values),
+            unit,
         }
     }
 }
@@ -113,13 +116,13 @@ mod tests {
         let rounded = |value: f64| (value * 1e9).round() / 1e9;
         let value = |k: i32| rounded(f64::from(k * k % 201 - 100) / 16.384);
         let values: Vec<f64> = (0..1000).map(value).collect();
-        let step = ColumnFacts::of("gx", &values).step.unwrap();
+        let step = ColumnFacts::of("gx", &values, 1.0).step.unwrap();
         assert!((step * 16.384 - 1.0).abs() < 1e-6, "{step}");
     }
 
     #[test]
     fn a_number_of_all_digits_is_on_no_grid() {
         let values: Vec<f64> = (0..1000).map(|k| f64::from(k).sin()).collect();
-        assert_eq!(ColumnFacts::of("gx", &values).step, None);
+        assert_eq!(ColumnFacts::of("gx", &values, 1.0).step, None);
     }
 }

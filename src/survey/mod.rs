@@ -90,19 +90,10 @@ fn directions(rests: &[Rest]) -> usize {
     known.len()
 }
 
-/// A step of the file's values as a rate. What one unit of a row is as a rate, the largest sample tells.
+/// A step of the file's values as a rate.
 fn step(run: &Run, sensor: Sensor, axis: usize) -> Option<f64> {
     let column = &run.imu.log.as_ref()?.columns.get(sensor)[axis];
-    let samples = match sensor {
-        Sensor::Gyro => &run.imu.gyro,
-        Sensor::Accel => &run.imu.accel,
-    };
-    let largest = samples
-        .iter()
-        .map(|sample| sample[axis].abs())
-        .fold(0.0, f64::max);
-    let of_file = column.smallest.abs().max(column.largest.abs());
-    (of_file > 0.0).then_some(column.step? * largest / of_file / run.imu.period)
+    Some((column.step? * column.unit / run.imu.period).abs())
 }
 
 #[cfg(test)]

@@ -135,7 +135,7 @@ fn find(
             }
             let value = columns[k][run.start];
             let at_end = [facts[k].smallest, facts[k].largest].contains(&value);
-            if at_end {
+            if at_end && !is_level(&columns[k], run) {
                 // The value before it is at the end of the range as well.
                 add(FaultKind::Saturated, k, &(run.start - 1..run.end));
             } else {
@@ -144,4 +144,23 @@ fn find(
         }
     }
     found
+}
+
+/// Rows on either side of a run that tell whether its value is one of theirs …
+const BESIDE: usize = 16;
+/// … within this many times what they change by from row to row.
+const OF_LEVEL: f64 = 3.0;
+
+/// Whether a run lies on a level that goes on beside it, as that of a steady turn; at the end of a range
+/// the truth comes from below and goes back there.
+fn is_level(column: &[f64], run: &Range<usize>) -> bool {
+    let value = column[run.start];
+    let before = &column[run.start.saturating_sub(1 + BESIDE)..run.start - 1];
+    let after = &column[run.end..column.len().min(run.end + BESIDE)];
+    [before, after].into_iter().all(|side| {
+        let count = side.len().max(1) as f64;
+        let off = side.iter().map(|other| value - other).sum::<f64>() / count;
+        let changes = side.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        off.abs() <= OF_LEVEL * changes.sum::<f64>() / count
+    })
 }

@@ -19,11 +19,17 @@ const FEWEST: usize = 50;
 /// by it: what it does on another level says nothing of that, only rows within so many steps do.
 const QUIET_STEPS: f64 = 1.5;
 const SAME_LEVEL_STEPS: f64 = 3.5;
-/// Means of the nearest, so many and over so many of them, …
-const MEANS: usize = 6;
-const MEAN_OF: usize = 16;
-/// … are all on one side of the value of a stuck axis, so far that the sum over the run is wrong by
-/// this many steps. Pulses are right to a few, however long they repeat.
+/// Rows on either side of a run whose mean …
+const BESIDE: usize = 32;
+/// … is this many times further from its value than that of a rate which touches it, …
+const MORE_THAN_TOUCHING: f64 = 3.0;
+/// Or the means of so many such blocks on either side differ by less than this many steps, …
+const BLOCKS: usize = 6;
+const STANDS: f64 = 0.125;
+/// … a run is this many times longer than all others there, …
+const LONGER_WHERE_STANDING: usize = 6;
+/// … and so far that the sum over the run is wrong by this many steps. Pulses are right to a few, however
+/// long they repeat.
 const WRONG_STEPS: f64 = 8.0;
 
 /// For each column the rows that repeat the one before them so long that it is no chance, the first
@@ -94,29 +100,50 @@ fn is_stuck(column: &[f64], run: &Range<usize>, step: Option<f64>) -> bool {
     let by_chance = seen.chance(run.len()) > CHANCE
         || run.len() < LONGER_ON_LEVEL * seen.longest
         || seen.pairs < FEWEST;
-    !by_chance || contradicts_its_level(value, run.len(), &sides, step)
+    !by_chance || contradicts_its_level(value, run.len(), &sides, step, seen.longest)
 }
 
-/// Whether rows on the level of a value do not stay on it for so many repeats, and have another mean.
-fn contradicts_its_level(value: f64, repeats: usize, levels: &[Vec<f64>; 2], step: f64) -> bool {
+/// Whether rows on the level of a value do not stay on it for so many repeats, and those next to them have
+/// another mean.
+///
+/// A rate that only touches the level, `a t²` off, makes a pulse of another size when `a T³ / 12 = 1`
+/// over a run of T rows, and is `12 (T/2 + t)² / T³` off in steps t rows beside it.
+///
+/// Where a table stands the rate stays, and no more is needed than that.
+fn contradicts_its_level(
+    value: f64,
+    repeats: usize,
+    levels: &[Vec<f64>; 2],
+    step: f64,
+    longest: usize,
+) -> bool {
     let (mut stays, mut at_value) = (0.0, 0.0);
-    let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut least = f64::INFINITY;
+    let mut means = Vec::new();
     for level in levels {
         for pair in level.windows(2).filter(|pair| pair[0] == value) {
             at_value += 1.0;
             stays += f64::from(u8::from(pair[1] == value));
         }
-        for rows in level.chunks_exact(MEAN_OF).take(MEANS) {
-            let mean = rows.iter().sum::<f64>() / MEAN_OF as f64;
-            lowest = lowest.min(mean);
-            highest = highest.max(mean);
-        }
+        let blocks = level.chunks_exact(BESIDE).take(BLOCKS);
+        let of_level: Vec<f64> = blocks
+            .map(|block| block.iter().sum::<f64>() / (BESIDE as f64 * step))
+            .collect();
+        let Some(next) = of_level.first() else {
+            return false;
+        };
+        least = least.min((next - value / step).abs());
+        means.push(of_level);
     }
+    let stands = means.iter().all(|of_level| of_level.len() == BLOCKS) && {
+        let all = || means.iter().flatten().copied();
+        all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min) < STANDS
+    };
     let again: f64 = (stays + 1.0) / (at_value + 2.0);
-    let off = (value - highest).max(lowest - value);
-    off.is_finite()
-        && off * repeats as f64 > WRONG_STEPS * step
-        && again.powf(repeats as f64) < CHANCE
+    let rows = repeats as f64;
+    let touching = 12.0 * (0.5 * (rows + BESIDE as f64)).powi(2) / rows.powi(3);
+    let unlikely = again.powf(rows) < CHANCE || repeats > LONGER_WHERE_STANDING * longest;
+    unlikely && least * rows > WRONG_STEPS && (stands || least > MORE_THAN_TOUCHING * touching)
 }
 
 /// How often rows repeat the one before.
@@ -193,14 +220,16 @@ mod tests {
 
     #[test]
     fn pulses_that_stop_to_change_while_the_table_stands_are_found() {
-        let mut columns = noise(1.0);
-        for (k, value) in columns[0].iter_mut().enumerate() {
-            let angle = |k: usize| (2.34 * k as f64).round();
-            *value = angle(k + 1) - angle(k);
+        for (rate, held) in [(2.34, 3.0), (1.11, 1.0)] {
+            let mut columns = noise(1.0);
+            for (k, value) in columns[0].iter_mut().enumerate() {
+                let angle = |k: usize| (rate * k as f64).round();
+                *value = angle(k + 1) - angle(k);
+            }
+            assert!(find(&columns).iter().all(Vec::is_empty));
+            columns[0][7000..7100].fill(held);
+            assert_eq!(find(&columns)[0].len(), 1, "{rate}");
         }
-        assert!(find(&columns).iter().all(Vec::is_empty));
-        columns[0][7000..7100].fill(3.0);
-        assert_eq!(find(&columns)[0].len(), 1);
     }
 
     #[test]
