@@ -10,7 +10,7 @@ use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 use super::error::CalibrationError;
-use super::outcome::{Estimate, OBSERVED_BELOW, parameter_name};
+use super::outcome::{Estimate, OBSERVED_BELOW, parameter_name, to_vector};
 use super::states::{ParameterMatrix, parameter, sensor_and_parameter};
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
@@ -145,7 +145,7 @@ pub fn six_position_of(
         .map(|(dwell, _)| dwell.samples.len() as f64 * run.imu.period)
         .sum();
     Ok(ClosedForm {
-        warnings: unobserved(run, &estimate, Reference::Table),
+        warnings: remarks(run, &estimate, Reference::Table),
         estimate,
         reference: Reference::Table,
         positions: PerSensor::from_fn(|sensor| chosen.get(sensor).len()),
@@ -172,32 +172,52 @@ fn both_triads(
     Ok(Estimate { triads, covariance })
 }
 
-/// A sentence that names the parameters that are hardly better known than before, if there are any.
-fn unobserved(run: &Run, estimate: &Estimate, reference: Reference) -> Vec<String> {
+/// Parameters further from their prior than this many of its σ contradict it.
+const CONTRADICTS: f64 = 5.0;
+
+/// Sentences that name the parameters that are hardly better known than before, and those that the prior
+/// does not allow, if there are any.
+fn remarks(run: &Run, estimate: &Estimate, reference: Reference) -> Vec<String> {
     let prior = run.prior_sigma(estimate.form());
     let sigma = estimate.sigma();
+    let off = estimate.vector() - to_vector(&run.prior_mean(estimate.form()));
+    let contradicts = |&index: &usize| {
+        let (sensor, of_triad) = sensor_and_parameter(index);
+        let prior = prior.get(sensor)[of_triad];
+        prior > 0.0 && off[index].abs() > CONTRADICTS * prior.hypot(sigma[index])
+    };
     let hidden = |&index: &usize| {
         let (sensor, of_triad) = sensor_and_parameter(index);
         let prior = prior.get(sensor)[of_triad];
         prior > 0.0 && sigma[index] > OBSERVED_BELOW * prior
     };
-    let names: Vec<String> = estimate
-        .estimated()
-        .filter(hidden)
-        .filter_map(|index| parameter_name(estimate.form(), index))
-        .collect();
+    let named = |which: &dyn Fn(&usize) -> bool| -> Vec<String> {
+        let those = estimate.estimated().filter(which);
+        let names = those.filter_map(|index| parameter_name(estimate.form(), index));
+        names.collect()
+    };
+    let mut sentences = Vec::new();
+    let wrong = named(&contradicts);
+    if !wrong.is_empty() {
+        sentences.push(format!(
+            "More than {CONTRADICTS} σ of [imu.prior] away from it: {}. Check labels, units and prior.",
+            wrong.join(", ")
+        ));
+    }
+    let names = named(&hidden);
     if names.is_empty() {
-        return Vec::new();
+        return sentences;
     }
     let what = match reference {
         Reference::Table => "these positions",
         Reference::Labels => "these sections",
         Reference::Gravity => "these dwells and turns",
     };
-    vec![format!(
+    sentences.push(format!(
         "Not observed by {what}, σ not even half of the prior's: {}.",
         names.join(", ")
-    )]
+    ));
+    sentences
 }
 
 /// One triad from positions: least squares for `A = K C` and `D` row by row, then the form's split.

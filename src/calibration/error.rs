@@ -35,9 +35,9 @@ pub enum CalibrationError {
     NotContinuous,
     /// A gap in the record, or an axis lost for a while, beyond interpolation.
     #[error(
-        "{lost}: what the instrument did there is not known well enough to go on navigating, and the \
-         filter navigates from beginning to end; use --method six-position, or cut the record so \
-         that this part is left out"
+        "{lost}: what the instrument did there is not known well enough to go on navigating; cut the \
+         record so that this part is left out, or use --method six-position with a table's log or labelled \
+         sections"
     )]
     Unbridged {
         /// What is missing, where.

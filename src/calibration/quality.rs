@@ -12,7 +12,7 @@ use super::schedule::Schedule;
 use crate::attitude::{exp, level, log, tilt};
 use crate::imu::{FurtherVector, PerSensor, Sensed, Sensor, Triad};
 use crate::navigation::{FurtherTerms, Navigator, State};
-use crate::run::{Dwell, LabelledMotion, Run};
+use crate::run::{Dwell, LabelledMotion, Run, Segment};
 
 /// What a calibration leaves of gravity and of turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,8 +32,8 @@ pub struct Measures {
     /// Angle in each dwell between gravity as the accelerometers see it and as the gyros carry it there
     /// from the dwell before, rad.
     pub direction: Spread,
-    /// What the gyros are wrong by over a turn between two readings of the table, or over a labelled
-    /// turn, rad.
+    /// What the gyros are wrong by over a turn between two readings of the table, or about the axis of a
+    /// labelled turn, rad.
     pub turns: Spread,
 }
 
@@ -109,7 +109,7 @@ impl ClosedForm {
     pub fn quality(&self, run: &Run) -> Result<Quality, CalibrationError> {
         let dwells = match self.reference {
             // Nothing is known of what lies between sections.
-            Reference::Labels if !run.imu.continuous => labelled_positions(run),
+            Reference::Labels if run.imu.is_sections() => labelled_positions(run),
             _ => run.dwells(),
         };
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
@@ -124,7 +124,10 @@ impl ClosedForm {
         let held_out = match self.reference {
             Reference::Labels if run.imu.continuous => {
                 let unlabelled = |k: usize| !labelled(run, &dwells[k]);
-                Some(of(&self.estimate.triads, &unlabelled)?)
+                let measures = of(&self.estimate.triads, &unlabelled)?;
+                // Every labelled turn was used.
+                let turns = Spread::default();
+                Some(Measures { turns, ..measures })
             }
             Reference::Labels => None,
             reference => {
@@ -162,7 +165,8 @@ fn labelled(run: &Run, dwell: &Dwell) -> bool {
 
 fn labelled_positions(run: &Run) -> Vec<Dwell> {
     let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
-    let positions = run.segments.iter().filter(|s| stands(s.motion));
+    let sound = |segment: &&Segment| stands(segment.motion) && !run.imu.is_lost(&segment.samples);
+    let positions = run.segments.iter().filter(sound);
     positions
         .map(|segment| Dwell {
             samples: segment.samples.clone(),
@@ -241,13 +245,15 @@ fn measures(
                 .contains(&segment.samples.end.saturating_sub(1))
         };
         let of_judged = dwells.iter().position(ends).is_none_or(&judged);
-        if let Some(LabelledMotion::Turns { angle, .. }) = segment.motion
+        if let Some(LabelledMotion::Turns { axis, angle }) = segment.motion
             && of_judged
+            && !run.imu.is_lost(&segment.samples)
         {
-            let turned = log(&navigate(Matrix3::identity(), segment.samples.clone())?).norm();
-            let full = std::f64::consts::TAU;
-            let due = angle.abs() % full;
-            turns.push(turned - due.min(full - due));
+            let triad = &at.triads.gyro;
+            let correction = triad.correction().ok_or_else(|| singular(&at.triads))?;
+            let sum: Vector3<f64> = run.imu.gyro[segment.samples.clone()].iter().sum();
+            let duration = segment.samples.len() as f64 * run.imu.period;
+            turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
         }
     }
     Ok(Measures {

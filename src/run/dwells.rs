@@ -108,7 +108,8 @@ impl Run {
 pub struct MeanOutput {
     /// Normalised output per second, rad/s or m/s².
     pub output: Vector3<f64>,
-    /// Variance per axis by random walk and pulses.
+    /// Variance per axis by random walk, pulses and, where samples were interpolated, on the axis that
+    /// has most of that.
     pub variance: f64,
 }
 
@@ -121,10 +122,17 @@ impl Dwell {
         };
         let duration = self.samples.len() as f64 * run.imu.period;
         let sum: Vector3<f64> = samples[self.samples.clone()].iter().sum();
+        let mut interpolated = Vector3::<f64>::zeros();
+        for (bridge, part) in run.imu.bridged(&self.samples) {
+            if bridge.sensor == sensor {
+                interpolated[bridge.axis] += bridge.variance * part;
+            }
+        }
         MeanOutput {
             output: sum / duration,
             variance: run.noise.get(sensor).random_walk.powi(2) / duration
-                + run.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration),
+                + run.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration)
+                + interpolated.max() / (duration * duration),
         }
     }
 

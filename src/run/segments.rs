@@ -109,6 +109,13 @@ pub(super) fn read(
                 "Correct the row.",
             ));
         }
+        if row(start) == row(end) {
+            return Err(csv.error_here(
+                format_args!("no sample from {start} s to {end} s"),
+                format_args!("a segment of several samples of {} s", imu.period),
+                "Correct or remove the row.",
+            ));
+        }
         let label = csv.text(label_column)?.to_owned();
         segments.push(Segment {
             start,

@@ -90,10 +90,10 @@ pub(super) fn rests(run: &Run) -> Vec<Rest> {
             position: None,
         })
     });
-    let dwells = if run.imu.continuous {
-        run.dwells()
-    } else {
+    let dwells = if run.imu.is_sections() {
         positions.collect()
+    } else {
+        run.dwells()
     };
     dwells
         .into_iter()

@@ -22,7 +22,7 @@ use turncal::simulation::Scenario;
 use turncal::survey::Survey;
 
 /// Cases of each format where `PROPTEST_CASES` says nothing.
-const CASES: u32 = 500;
+const CASES: u32 = 200;
 
 /// What numbers are replaced by.
 const NUMBERS: [&str; 22] = [

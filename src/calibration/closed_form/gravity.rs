@@ -2,7 +2,7 @@
 
 use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
-use super::{ClosedForm, Reference, unobserved};
+use super::{ClosedForm, Reference, remarks};
 use crate::imu::{InstallationForm, PerSensor};
 use crate::run::{Dwell, Run};
 
@@ -19,7 +19,7 @@ pub(super) fn by_gravity(
         return Err(CalibrationError::not_continuous(&run.imu));
     }
     let ByGravity { estimate, misfit } = coarse::by_gravity(run, dwells, form)?;
-    let mut warnings = unobserved(run, &estimate, Reference::Gravity);
+    let mut warnings = remarks(run, &estimate, Reference::Gravity);
     let misfit = misfit.sqrt();
     if misfit > DOUBTFUL {
         warnings.push(format!(

@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 
 use super::super::error::CalibrationError;
-use super::{ClosedForm, Position, Reference, across, both_triads, unobserved};
+use super::{ClosedForm, Position, Reference, across, both_triads, remarks};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor};
 use crate::run::{Dwell, LabelledMotion, Run};
@@ -19,10 +19,15 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
     let mut turns = 0;
     let mut standing_time = 0.0;
     let sigma = run.segment_sigma;
+    let mut lost = Vec::new();
     for segment in &run.segments {
         let Some(motion) = segment.motion.filter(|_| !segment.samples.is_empty()) else {
             continue;
         };
+        if run.imu.is_lost(&segment.samples) {
+            lost.push(format!("`{}`", segment.label));
+            continue;
+        }
         let section = Dwell {
             samples: segment.samples.clone(),
             position: None,
@@ -62,8 +67,15 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
         labels: run.segments.iter().map(|s| s.label.clone()).collect(),
     };
     let estimate = both_triads(&positions, form).map_err(undetermined)?;
+    let mut warnings = remarks(run, &estimate, Reference::Labels);
+    if !lost.is_empty() {
+        warnings.push(format!(
+            "Not used, for a part of it is lost: section {}.",
+            lost.join(", ")
+        ));
+    }
     Ok(ClosedForm {
-        warnings: unobserved(run, &estimate, Reference::Labels),
+        warnings,
         estimate,
         reference: Reference::Labels,
         positions: PerSensor {

@@ -79,7 +79,8 @@ impl Delimiter {
 
 /// Whether a field is a number, with a point or a comma.
 fn is_number(field: &str) -> bool {
-    field.replacen(',', ".", 1).parse::<f64>().is_ok()
+    // A comma behind the last digit parts fields.
+    !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
 /// Runs of blanks outside quotes become one space, those at the ends nothing.

@@ -1,5 +1,7 @@
 //! Faults in words.
 
+use std::ops::Range;
+
 use super::{Fault, FaultKind};
 use crate::run::ImuRecord;
 
@@ -50,6 +52,19 @@ impl ImuRecord {
             "{what} from {start:.2} s to {end:.2} s (line {})",
             fault.line
         ))
+    }
+
+    /// Whether some of these samples are not known.
+    pub fn is_lost(&self, samples: &Range<usize>) -> bool {
+        let lost = |fault: &Fault| {
+            !fault.bridged && fault.samples.start < samples.end && samples.start < fault.samples.end
+        };
+        self.faults.iter().any(lost)
+    }
+
+    /// Whether it is made of sections that were laid end to end, rather than one record with a part lost.
+    pub fn is_sections(&self) -> bool {
+        !self.continuous && self.faults.iter().all(|fault| fault.bridged)
     }
 
     /// So many rows or samples, the columns of the latter, and what is wrong with them.

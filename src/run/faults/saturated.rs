@@ -33,7 +33,10 @@ impl Column<'_> {
         let step = self.step.unwrap_or(0.0);
         let is_end: Box<dyn Fn(f64) -> bool> = match self.full_scale {
             // Registers go a step further down than up.
-            Some(full) => Box::new(move |value: f64| value.abs() >= (full - step) * (1.0 - 1e-9)),
+            Some(full) => {
+                let zero = self.zero();
+                Box::new(move |value: f64| (value - zero).abs() >= (full - step) * (1.0 - 1e-9))
+            }
             None => {
                 let ends = self.ends();
                 if ends.is_empty() {
@@ -56,6 +59,18 @@ impl Column<'_> {
             .filter(|&k| sure[k] || (mirrored && sure[1 - k]))
             .map(|k| extremes[k])
             .collect()
+    }
+
+    /// What a register says at zero: the middle of its range if it has no sign.
+    fn zero(&self) -> f64 {
+        let unsigned = |bits: i32| {
+            let half = 2f64.powi(bits - 1);
+            let around = (0.5 * half..=1.5 * half).contains(&self.median()?);
+            (self.smallest >= 0.0 && self.largest < 2.0 * half && around).then_some(half)
+        };
+        let whole = self.step.is_some_and(|step| step.fract() == 0.0);
+        let zero = BITS.into_iter().filter(|_| whole).find_map(unsigned);
+        zero.unwrap_or(0.0)
     }
 
     fn is_register_end(&self, end: f64) -> bool {
