@@ -17,7 +17,7 @@ pub enum CalibrationError {
     NoTable,
     /// Not enough standing positions.
     #[error(
-        "{found} dwells found, at least {needed} expected: the instrument must stand for a second or \
+        "dwells found: {found}, expected: at least {needed}; the instrument must stand for a second or \
          more between turns; check the table's log, and reading_sigma_arcsec if it is noisier than \
          stated; without a log, the gyros' prior bias and noise figures"
     )]

@@ -12,7 +12,7 @@ use super::schedule::Schedule;
 use crate::attitude::{exp, level, log, tilt};
 use crate::imu::{FurtherVector, PerSensor, Sensed, Sensor, Triad};
 use crate::navigation::{FurtherTerms, Navigator, State};
-use crate::run::{Dwell, LabelledMotion, Run, Segment};
+use crate::run::{Dwell, LabelledMotion, Run};
 
 /// What a calibration leaves of gravity and of turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,8 +87,11 @@ impl Outcome {
                 let velocity = self.velocity_sigma;
                 let problem = Problem::new(run, schedule, form, self.prior_attitude, velocity);
                 let mode = Mode::Held(Gate::Innovations);
-                let half = pass(&problem, &self.linearised_at, mode)?.estimate;
-                Some(measures(run, &dwells, &half, |k| k % 2 == 1)?)
+                match pass(&problem, &self.linearised_at, mode) {
+                    Ok(half) => Some(measures(run, &dwells, &half.estimate, |k| k % 2 == 1)?),
+                    // Half the dwells may be too few.
+                    Err(_) => None,
+                }
             }
         };
         Ok(Quality {
@@ -107,11 +110,7 @@ impl ClosedForm {
     /// # Errors
     /// [`CalibrationError`] where the run is not the one of the closed form.
     pub fn quality(&self, run: &Run) -> Result<Quality, CalibrationError> {
-        let dwells = match self.reference {
-            // Nothing is known of what lies between sections.
-            Reference::Labels if run.imu.is_sections() => labelled_positions(run),
-            _ => run.dwells(),
-        };
+        let dwells = run.rests();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
             let at = Linearisation {
                 triads: *triads,
@@ -161,18 +160,6 @@ fn labelled(run: &Run, dwell: &Dwell) -> bool {
             && segment.samples.start < samples.end
             && samples.start < segment.samples.end
     })
-}
-
-fn labelled_positions(run: &Run) -> Vec<Dwell> {
-    let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
-    let sound = |segment: &&Segment| stands(segment.motion) && !run.imu.is_lost(&segment.samples);
-    let positions = run.segments.iter().filter(sound);
-    positions
-        .map(|segment| Dwell {
-            samples: segment.samples.clone(),
-            position: None,
-        })
-        .collect()
 }
 
 /// The table's attitude in the first dwell, or one of those in which it is level.

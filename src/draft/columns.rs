@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::motion::median;
 use super::name::Name;
 use super::units::offset;
 use crate::imu::{PerSensor, Sensor};
 use crate::run::Sheet;
+use crate::run::median;
 
 /// Columns by their place in the file.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::turns;
 use crate::imu::PerSensor;
+use crate::run::{SIGMA_OF_MEDIAN, median};
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
@@ -15,8 +16,6 @@ const WINDOW: f64 = 0.25;
 const SIGMAS: f64 = 6.0;
 /// … and this part of gravity or of the fastest turn.
 const PART: f64 = 1e-3;
-/// σ of a normal distribution over the median of its absolute deviations.
-const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 /// Samples on either side of a cut …
 const BESIDE: usize = 8;
 /// … between which gravity's direction changes by this much at once, rad …
@@ -42,15 +41,6 @@ pub(super) struct Motion {
     pub cuts: usize,
     /// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
     pub sum_variance: Option<f64>,
-}
-
-/// The middle of some numbers.
-pub(super) fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 pub(super) fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {

@@ -1,9 +1,9 @@
 //! The clock of a log.
 
-use super::motion::median;
 use super::name;
 use super::name::Name;
 use crate::run::Sheet;
+use crate::run::median;
 
 /// Units of time in s, with the words that `run.toml` has for them.
 const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];

@@ -7,14 +7,12 @@ use super::identify::{Clusters, Found, Hidden, Identified, mean, of_kind};
 use super::process::Process;
 use super::standing::Stretch;
 use crate::imu::{Instability, Noise, PerSensor, Sensor};
-use crate::run::Run;
+use crate::run::{Run, SIGMA_OF_MEDIAN, median};
 
 /// Neighbouring samples that differ by more than this many σ are no noise.
 const KNOCK: f64 = 8.0;
 /// What varies by less than this part of itself is rounding.
 const ROUNDING: f64 = 1e-9;
-/// σ of a normal distribution over the median of its absolute values.
-const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
 /// What a record's standing shows of its noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -197,11 +195,7 @@ fn is_constant(values: impl Iterator<Item = f64>, curve: &Curve) -> bool {
 fn knocks(values: impl Iterator<Item = f64>) -> usize {
     let values: Vec<f64> = values.collect();
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    if steps.is_empty() {
-        return 0;
-    }
-    let middle = steps.len() / 2;
-    let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let median = median(&mut steps).unwrap_or(0.0);
     // Where most samples are equal the steps are those of quantisation.
     let limit = KNOCK * SIGMA_OF_MEDIAN * median;
     steps

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{ImuRecord, Run};
+use super::{ImuRecord, LabelledMotion, Run, Segment};
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
@@ -71,6 +71,17 @@ impl Run {
             dwell.samples.len() as f64 * self.imu.period >= SHORTEST
         });
         dwells
+    }
+
+    /// The dwells; in a record of sections laid end to end those labelled as positions, for of what lies
+    /// between sections nothing is known.
+    pub fn rests(&self) -> Vec<Dwell> {
+        if !self.imu.is_sections() {
+            return self.dwells();
+        }
+        let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
+        let positions = self.segments.iter().filter(|s| stands(s.motion));
+        positions.map(Segment::as_dwell).collect()
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::ImuRecord;
 use super::axes::BodyAxes;
 use super::csv_file::CsvFile;
 use super::error::RunError;
+use super::{Dwell, ImuRecord};
 use crate::units::DEGREE;
 
 /// A labelled section of the record.
@@ -18,12 +18,22 @@ pub struct Segment {
     pub start: f64,
     /// The first stamp after its last row, s.
     pub end: f64,
-    /// Its samples.
+    /// Its samples, at least one.
     pub samples: Range<usize>,
     /// `x_up` … `z_down`, `rot_x+360` and the like, or any other text.
     pub label: String,
     /// What the label says of the motion, if anything.
     pub motion: Option<LabelledMotion>,
+}
+
+impl Segment {
+    /// The section as a dwell, whether it stands or not.
+    pub fn as_dwell(&self) -> Dwell {
+        Dwell {
+            samples: self.samples.clone(),
+            position: None,
+        }
+    }
 }
 
 /// What a label says of a section.

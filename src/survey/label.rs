@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::rest::{Rest, mean};
 use super::turn::{Turn, zero};
 use crate::imu::Sensor;
-use crate::run::{Dwell, LabelledMotion, Run, Segment};
+use crate::run::{LabelledMotion, Run, Segment};
 use crate::units::DEGREE;
 
 /// A label's axis further than this from the plumb line is another one, rad.
@@ -37,8 +37,6 @@ pub struct LabelCheck {
 pub enum Verdict {
     /// The label is no position and no turn.
     Unknown,
-    /// There are no samples in it.
-    Empty,
     /// It is a position.
     Position {
         /// Angle between up and what the label says, rad.
@@ -85,13 +83,8 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
     let samples = segment.samples.clone();
     match segment.motion {
         None => Verdict::Unknown,
-        Some(_) if samples.is_empty() => Verdict::Empty,
         Some(LabelledMotion::Stands { up }) => {
-            let section = Dwell {
-                samples: samples.clone(),
-                position: None,
-            };
-            let force = mean(run, &section, Sensor::Accel) - run.prior.accel.bias;
+            let force = mean(run, &segment.as_dwell(), Sensor::Accel) - run.prior.accel.bias;
             Verdict::Position {
                 off: force.angle(&up),
                 moving: moving(run, rests, &samples),
@@ -100,7 +93,9 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
         Some(LabelledMotion::Turns { axis, .. }) => {
             let zero = zero(run, rests, samples.start);
             let turn = Turn::of(run, samples.clone(), &zero);
-            let length = ((END / run.imu.period).round() as usize).clamp(1, samples.len());
+            let length = ((END / run.imu.period).round() as usize)
+                .max(1)
+                .min(samples.len());
             let rate = |samples: Range<usize>| {
                 angle(run, samples, &zero).norm() / length as f64 / run.imu.period
             };

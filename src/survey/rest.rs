@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::imu::Sensor;
-use crate::run::{Dwell, LabelledMotion, Run};
+use crate::run::{Dwell, Run};
 use crate::units::DEGREE;
 
 /// An axis within this angle of the plumb line is up or down, rad.
@@ -80,23 +80,8 @@ pub(super) fn mean(run: &Run, dwell: &Dwell, sensor: Sensor) -> Vector3<f64> {
     dwell.mean(sensor, run).output
 }
 
-/// The dwells; in a record of labelled sections, those labelled as positions, for what lies between
-/// sections is not known.
+/// Where it stands.
 pub(super) fn rests(run: &Run) -> Vec<Rest> {
-    let positions = run.segments.iter().filter_map(|segment| {
-        let stands = matches!(segment.motion, Some(LabelledMotion::Stands { .. }));
-        (stands && !segment.samples.is_empty()).then(|| Dwell {
-            samples: segment.samples.clone(),
-            position: None,
-        })
-    });
-    let dwells = if run.imu.is_sections() {
-        positions.collect()
-    } else {
-        run.dwells()
-    };
-    dwells
-        .into_iter()
-        .map(|dwell| Rest::of(run, dwell))
-        .collect()
+    let rests = run.rests().into_iter();
+    rests.map(|dwell| Rest::of(run, dwell)).collect()
 }

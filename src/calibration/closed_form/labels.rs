@@ -11,7 +11,7 @@ use super::super::error::CalibrationError;
 use super::{ClosedForm, Position, Reference, across, both_triads, remarks};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor};
-use crate::run::{Dwell, LabelledMotion, Run};
+use crate::run::{LabelledMotion, Run};
 
 /// Both triads from the sections whose labels say how the instrument stands or turns.
 pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
@@ -21,17 +21,14 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
     let sigma = run.segment_sigma;
     let mut lost = Vec::new();
     for segment in &run.segments {
-        let Some(motion) = segment.motion.filter(|_| !segment.samples.is_empty()) else {
+        let Some(motion) = segment.motion else {
             continue;
         };
         if run.imu.is_lost(&segment.samples) {
             lost.push(format!("`{}`", segment.label));
             continue;
         }
-        let section = Dwell {
-            samples: segment.samples.clone(),
-            position: None,
-        };
+        let section = segment.as_dwell();
         let duration = section.samples.len() as f64 * run.imu.period;
         let of_gyro = section.mean(Sensor::Gyro, run);
         let noise = Vector3::repeat(of_gyro.variance);

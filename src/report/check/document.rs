@@ -258,7 +258,7 @@ fn motion(report: &CheckReport, turn: &Turn) -> Motion {
 fn section(check: &LabelCheck) -> Section<'_> {
     let (mut off, mut moving_s, mut found) = (None, None, None);
     match check.verdict {
-        Verdict::Unknown | Verdict::Empty => {}
+        Verdict::Unknown => {}
         Verdict::Position { off: angle, moving } => {
             off = Some(angle);
             moving_s = Some(moving);

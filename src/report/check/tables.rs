@@ -179,7 +179,7 @@ fn labels(report: &CheckReport) -> Option<Table> {
     let checks = &report.survey.labels;
     let rows = checks.iter().map(|check| {
         let found = match (&check.verdict, check.segment.motion) {
-            (Verdict::Unknown | Verdict::Empty, _) => NONE.to_owned(),
+            (Verdict::Unknown, _) => NONE.to_owned(),
             (Verdict::Position { off, moving }, _) => match *moving > 0.0 {
                 true => format!(
                     "{}° off, moves for {} s",

@@ -188,7 +188,6 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
         (Verdict::Unknown, _) => {
             "is no position (x_up … z_down) and no turn (rot_x+360): it has no effect".to_owned()
         }
-        (Verdict::Empty, _) => "holds no samples: correct its times".to_owned(),
         (Verdict::Position { off, .. }, _) if *off > 30.0 * DEGREE => format!(
             "is {}° off the plumb line: another axis is up; correct the label or body_axes",
             degrees(*off)

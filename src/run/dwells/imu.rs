@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{Dwell, STILL_RATE};
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
-use crate::run::Run;
+use crate::run::{Run, SIGMA_OF_MEDIAN, median};
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
@@ -17,8 +17,6 @@ const STILL_SIGMAS: f64 = 6.0;
 const STILL_FORCE: f64 = 3e-3;
 /// A bias is within this many σ of its prior.
 const BIAS_SIGMAS: f64 = 6.0;
-/// σ of a normal distribution over the median of its absolute deviations.
-const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
 /// Mean output of a triad over each window.
 struct Windows {
@@ -112,12 +110,4 @@ impl Run {
         };
         Some(Vector3::new(axis(0)?, axis(1)?, axis(2)?))
     }
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::run::median;
+
 /// Registers that a column of whole numbers may come from. Shorter ones are left to the spikes, for
 /// their ends are values as any other.
 const BITS: [i32; 3] = [16, 24, 32];
@@ -126,9 +128,7 @@ impl Column<'_> {
     }
 
     fn median(&self) -> Option<f64> {
-        let mut values = self.values.to_vec();
-        let middle = values.len() / 2;
-        (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+        median(&mut self.values.to_vec())
     }
 }
 
