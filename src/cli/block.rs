@@ -4,19 +4,20 @@ use anyhow::bail;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use turncal::imu::Term;
-use turncal::run::{Run, StateBlock};
+use turncal::calibration::{ErrorTerm, Problem};
+use turncal::run::Aiding;
 
 /// A block of states that a run can switch on.
 #[derive(Debug, Clone, Copy)]
-pub struct Block(pub StateBlock);
+pub struct Block(pub ErrorTerm);
 
 impl ValueEnum for Block {
     fn value_variants<'a>() -> &'a [Self] {
-        const ALL: [Block; StateBlock::ALL.len()] = {
-            let mut all = [Block(StateBlock::WanderingBias); StateBlock::ALL.len()];
+        const ALL: [Block; ErrorTerm::ALL.len()] = {
+            let mut all = [Block(ErrorTerm::BiasVariation); ErrorTerm::ALL.len()];
             let mut k = 0;
             while k < all.len() {
-                all[k] = Block(StateBlock::ALL[k]);
+                all[k] = Block(ErrorTerm::ALL[k]);
                 k += 1;
             }
             all
@@ -26,16 +27,16 @@ impl ValueEnum for Block {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.0.name()).help(match self.0 {
-            StateBlock::WanderingBias => "Biases that wander during the run",
-            StateBlock::TableBase => "Level and north of the table",
-            StateBlock::TableAxes => "Axes of the table that are not square",
-            StateBlock::Term(Term::AccelSecondOrder) => "Accelerometers: square of specific force",
-            StateBlock::Term(Term::AccelAsymmetry) => {
+            ErrorTerm::BiasVariation => "Biases that wander during the run",
+            ErrorTerm::TableBase => "Level and north of the table",
+            ErrorTerm::TableAxes => "Axes of the table that are not square",
+            ErrorTerm::Instrument(Term::AccelSecondOrder) => "Accelerometers: square of specific force",
+            ErrorTerm::Instrument(Term::AccelAsymmetry) => {
                 "Accelerometers: size of specific force, whatever its sign"
             }
-            StateBlock::Term(Term::SizeEffect) => "Accelerometers that do not stand in one point",
-            StateBlock::Term(Term::TimeOffset) => "Accelerometer samples later than the gyros'",
-            StateBlock::Term(Term::GSensitivity) => "Gyros that sense specific force",
+            ErrorTerm::Instrument(Term::SizeEffect) => "Accelerometers that do not stand in one point",
+            ErrorTerm::Instrument(Term::TimeOffset) => "Accelerometer samples later than the gyros'",
+            ErrorTerm::Instrument(Term::GSensitivity) => "Gyros that sense specific force",
         }))
     }
 }
@@ -43,24 +44,24 @@ impl ValueEnum for Block {
 impl Block {
     /// Whether it is one of the table's errors.
     pub fn of_table(self) -> bool {
-        matches!(self.0, StateBlock::TableBase | StateBlock::TableAxes)
+        matches!(self.0, ErrorTerm::TableBase | ErrorTerm::TableAxes)
     }
 
-    /// Switches it on in a run.
-    pub fn switch_on(self, run: &mut Run) -> anyhow::Result<()> {
-        if !run.can_have(self.0) {
+    /// Switches it on in a problem.
+    pub fn switch_on(self, problem: &mut Problem) -> anyhow::Result<()> {
+        if !problem.model.can_have(self.0) {
             bail!(
                 "{}: --with {} needs {}; leave it out, or add that to the run",
-                run.name,
+                problem.run().recording.name,
                 self.0.name(),
-                match run.table {
-                    Some(_) =>
+                match problem.model.aiding {
+                    Aiding::Table =>
                         "the angles of the table's axes in the table's log, not a quaternion",
-                    None => "the table's log",
+                    Aiding::Velocity => "the table's log",
                 }
             );
         }
-        run.switch_on(self.0);
+        problem.model.switch_on(self.0);
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use turncal::calibration::outcome::Pass;
+use turncal::calibration::Pass;
 
 /// What is being done, with the time it has taken.
 pub struct Activity(ProgressBar);
@@ -26,7 +26,7 @@ impl Activity {
 
     /// Tells of a pass of the filter.
     pub fn pass(&self, pass: &Pass) {
-        let kind = if pass.live { "live" } else { "held" };
+        let kind = if pass.feedback { "live" } else { "held" };
         self.next(format!(
             "{kind} pass done, largest step {:.2} σ",
             pass.largest_step

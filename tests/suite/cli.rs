@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use turncal::run::CalibrationRecord;
+use turncal::calibration::result::Calibration;
 
 fn turncal() -> Command {
     Command::new(env!("CARGO_BIN_EXE_turncal"))
@@ -82,7 +82,7 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
             .assert()
             .success();
         let document = &output.get_output().stdout;
-        let record: CalibrationRecord = serde_json::from_slice(document).unwrap();
+        let record: Calibration = serde_json::from_slice(document).unwrap();
         assert_eq!(record.parameters.len(), record.covariance.len());
         let sigma = record.sigma.unwrap();
         for (name, variance) in [

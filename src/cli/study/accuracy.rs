@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::error::ErrorKind;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
-use turncal::run::record::BodyFrame;
+use turncal::imu::BodyFrame;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
