@@ -59,7 +59,7 @@ mod tests {
         for output in [Output::Pulse, Output::Increment] {
             scenario.output = output;
             let run = scenario.simulate(1, 0).unwrap().run;
-            assert_eq!(velocity_sigma(&run, &run.dwells()), FLOOR);
+            assert_eq!(velocity_sigma(&run, &run.dwells(run.aiding())), FLOOR);
         }
     }
 
@@ -81,7 +81,7 @@ mod tests {
         for k in 0..run.recording.imu.accel.len() {
             run.recording.imu.accel[k] += velocity(k + 1) - velocity(k);
         }
-        let found = velocity_sigma(&run, &run.dwells());
+        let found = velocity_sigma(&run, &run.dwells(run.aiding()));
         assert!((found / sigma - 1.0).abs() < 0.1, "{found}");
     }
 }

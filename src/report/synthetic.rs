@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{ClosedForm, Navigated, Report};
 use crate::attitude;
 use crate::calibration::AttitudePrior;
-use crate::calibration::outcome::*;
+use crate::calibration::*;
 use crate::calibration::{
     PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
 };

@@ -151,7 +151,7 @@ fn a_closed_form_alone_is_reported() {
 #[test]
 fn a_run_without_a_table_is_reported() {
     let mut made_up = synthetic(InstallationForm::General);
-    made_up.run.table = None;
+    made_up.run.recording.table = None;
     made_up.outcome.feedback_history.clear();
     made_up.outcome.passes.retain(|pass| !pass.feedback);
     let innovations = &mut made_up.outcome.innovations;

@@ -214,7 +214,7 @@ mod tests {
     fn dwells_lie_within_the_standstills_of_the_table_and_miss_little_of_them() {
         let scenario = Scenario::load("demo").unwrap();
         let run = scenario.simulate(1, 0).unwrap().run;
-        let dwells = run.dwells();
+        let dwells = run.dwells(run.aiding());
         // The path: 60 s, then 15 s after each of 17 moves but the last, 30 s after that.
         assert_eq!(dwells.len(), 18);
         let standing: f64 = dwells
@@ -233,14 +233,14 @@ mod tests {
     #[test]
     fn a_reading_that_takes_up_the_next_position_before_the_turn_ends_the_dwell() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let before = reading(&run.dwells()[0]);
-        let table = run.table.as_mut().unwrap();
+        let before = reading(&run.dwells(run.aiding())[0]);
+        let table = run.recording.table.as_mut().unwrap();
         let early = 20;
         for reading in before.end - early..before.end {
             table.attitude[reading] =
                 exp(Vector3::new(0.0, 3.0 * ARCSEC, 0.0)) * table.attitude[reading];
         }
-        let after = reading(&run.dwells()[0]);
+        let after = reading(&run.dwells(run.aiding())[0]);
         assert!(after.end <= before.end - early);
         assert!(after.end + early + 20 > before.end);
     }
@@ -248,11 +248,11 @@ mod tests {
     #[test]
     fn one_wild_reading_does_not_make_two_positions_of_one() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let before = run.dwells();
-        let table = run.table.as_mut().unwrap();
+        let before = run.dwells(run.aiding());
+        let table = run.recording.table.as_mut().unwrap();
         let wild = reading(&before[3]).start + 40;
         table.attitude[wild] = exp(Vector3::new(0.0, 0.01, 0.0)) * table.attitude[wild];
-        let after = run.dwells();
+        let after = run.dwells(run.aiding());
         assert_eq!(after.len(), before.len());
         assert_eq!(after[3].samples, before[3].samples);
         let attitude = |dwells: &[Dwell]| dwells[3].position.clone().unwrap().attitude;
@@ -265,13 +265,13 @@ mod tests {
         // The first three moves of the path are two full turns each, seen by the gyros alone if the
         // table is read too seldom.
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let all = run.dwells().len();
-        let table = run.table.as_mut().unwrap();
+        let all = run.dwells(run.aiding()).len();
+        let table = run.recording.table.as_mut().unwrap();
         let seldom = |k: &usize| k.is_multiple_of(60);
         let kept: Vec<usize> = (0..table.time.len()).filter(seldom).collect();
         table.time = kept.iter().map(|&k| table.time[k]).collect();
         table.attitude = kept.iter().map(|&k| table.attitude[k]).collect();
-        let dwells = run.dwells();
+        let dwells = run.dwells(run.aiding());
         assert!(!dwells.is_empty() && dwells.len() <= all);
         for dwell in &dwells {
             let fastest = dwell
@@ -292,15 +292,12 @@ mod tests {
             let angle = (t - 20.0).clamp(0.0, 20.0) * 0.5 * DEGREE;
             exp(Vector3::new(0.0, 0.0, angle))
         };
-        run.table = Some(TableLog {
+        run.recording.table = Some(TableLog {
             attitude: time.iter().map(attitude).collect(),
             time,
-            position_sigma: ARCSEC,
-            reading_sigma: 0.5 * ARCSEC,
-            geometry: Default::default(),
             tilts: Vec::new(),
         });
-        let dwells = run.dwells();
+        let dwells = run.dwells(run.aiding());
         assert_eq!(dwells.len(), 2);
         assert!(run.recording.imu.time(dwells[0].samples.end) <= 20.0);
         assert!(run.recording.imu.time(dwells[1].samples.start) >= 40.0);

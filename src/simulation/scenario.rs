@@ -123,7 +123,7 @@ impl Scenario {
     }
 
     /// The same scenario with the errors of a block, of usual size unless its models state one.
-    pub fn with_block(mut self, block: ErrorTerm) -> Self {
+    pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
             ErrorTerm::BiasVariation => {
                 let noise = &mut self.instrument.noise;

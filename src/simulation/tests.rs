@@ -26,7 +26,7 @@ fn table_errors_move_neither_truth_nor_noise() {
     let other = scenario.simulate(7, 3).unwrap();
     assert_eq!(plain.truth, other.truth);
     assert_eq!(plain.run.recording.imu, other.run.recording.imu);
-    assert_ne!(plain.run.table, other.run.table);
+    assert_ne!(plain.run.recording.table, other.run.recording.table);
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn the_prior_is_the_draw_s_mean_and_standard_deviation() {
 fn a_position_error_stays_while_the_table_stands_and_is_new_after_each_move() {
     let mut scenario = demo();
     scenario.table.errors.reading = 0.0;
-    let table = scenario.simulate(1, 0).unwrap().run.table.unwrap();
+    let table = scenario.simulate(1, 0).unwrap().run.recording.table.unwrap();
     let motion = Motion::new(
         &scenario.table,
         &scenario.path,
@@ -110,7 +110,7 @@ fn level_and_north_errors_move_the_truth_but_not_the_reading() {
     crooked.table.errors.north = 20.0 * ARCSEC;
     crooked.table.errors.nonorthogonality = 3.0 * ARCSEC;
     let [plain, crooked] = [demo(), crooked].map(|scenario| scenario.simulate(1, 0).unwrap());
-    let [read, of_crooked] = [&plain, &crooked].map(|made| made.run.table.as_ref().unwrap());
+    let [read, of_crooked] = [&plain, &crooked].map(|made| made.run.recording.table.as_ref().unwrap());
     assert_eq!(read.attitude, of_crooked.attitude);
     assert!(!read.geometry.any() && of_crooked.geometry.any());
     assert_ne!(plain.run.recording.imu.accel, crooked.run.recording.imu.accel);

@@ -39,7 +39,7 @@ fn rests_say_which_axis_the_table_holds_up() {
 fn turns_are_those_of_the_table_full_turns_too() {
     let run = demo();
     let survey = Survey::of(&run);
-    let table = run.table.as_ref().unwrap();
+    let table = run.recording.table.as_ref().unwrap();
     assert_eq!(survey.turns.len(), 17);
     for turn in &survey.turns[..3] {
         let full = 4.0 * PI;

@@ -82,7 +82,7 @@ impl Accuracy {
                 );
                 clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
             }
-            scenario = scenario.with_block(block.0);
+            scenario = scenario.with_error_term(block.0);
         }
         let study = AccuracyStudy {
             unmodelled: self.unmodelled.iter().map(|block| block.0).collect(),

@@ -1,23 +1,32 @@
-use super::super::parameters::{STATES, parameter};
+use nalgebra::SMatrix;
+
 use super::*;
+use crate::calibration::parameters::PARAMETERS;
+use crate::calibration::{Options, parameter};
+use crate::imu::PARAMETERS as PER_TRIAD;
 use crate::navigation::{BlockMatrix, ParameterBlock};
+use crate::simulation::Scenario;
 use approx::assert_relative_eq;
+
+const STATES: usize = NAVIGATION + PARAMETERS + 6;
 
 type StateMatrix = SMatrix<f64, STATES, STATES>;
 
-fn filter() -> Filter<STATES> {
+fn filter() -> Filter {
+    let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+    let mut model = Model::new(&run, &Options::default());
+    model.prior_sigma.fill(7e-3);
+    let parameters = ParameterVector::from_element(1e-4);
+    let mut filter = Filter::new(&model, &parameters, &TermVector::zeros());
     let start = Start {
-        attitude: Vector3::repeat(3e-4),
-        velocity: 1e-3,
-        position: 1.0,
-        table: 5e-6,
+        attitude: Vector3::new(1e-5, 2e-5, 3e-5),
+        attitude_sigma: Vector3::repeat(3e-4),
+        velocity_sigma: 1e-3,
+        position_sigma: 1.0,
     };
-    Filter::new(
-        start,
-        &ParameterVector::from_element(1e-4),
-        &ParameterVector::from_element(7e-3),
-        Vector3::new(1e-5, 2e-5, 3e-5),
-    )
+    filter.begin(&start, 5e-6, true);
+    assert_eq!(filter.layout.size(), STATES);
+    filter
 }
 
 /// A block with nothing special about it.
@@ -34,20 +43,53 @@ fn block(seed: f64) -> Block {
             gyro: ParameterBlock::from_fn(wave),
             accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
         },
-        further: Vec::new(),
+        terms: Vec::new(),
         noise: noise * noise.transpose(),
     }
 }
 
-fn dense_transition(block: &Block) -> StateMatrix {
-    let mut phi = StateMatrix::identity();
-    phi.fixed_view_mut::<9, 9>(0, 0)
+/// Φ as a whole, whatever states are on.
+fn dense_transition(filter: &Filter, block: &Block) -> DMatrix<f64> {
+    let n = filter.x.len();
+    let mut phi = DMatrix::identity(n, n);
+    phi.view_mut((0, 0), (NAVIGATION, NAVIGATION))
         .copy_from(&block.navigation);
     for sensor in Sensor::ALL {
-        phi.fixed_view_mut::<9, PER_TRIAD>(0, PARAMETER + parameter(sensor, 0))
-            .copy_from(block.parameters.get(sensor));
+        phi.view_mut(
+            (0, NAVIGATION + parameter(sensor, 0)),
+            (NAVIGATION, PER_TRIAD),
+        )
+        .copy_from(block.parameters.get(sensor));
+    }
+    for (state, sensor, constant) in filter.layout.varying_biases() {
+        let column = NAVIGATION + parameter(sensor, constant);
+        let of_bias = phi.view((0, column), (NAVIGATION, 1)).into_owned();
+        phi.view_mut((0, state), (NAVIGATION, 1)).copy_from(&of_bias);
+        phi[(state, state)] = (-block.duration / CORRELATION_TIME).exp();
     }
     phi
+}
+
+const CORRELATION_TIME: f64 = 3.0;
+
+fn measurement(first: usize, minus: Option<usize>, z: Vector3<f64>, variance: f64) -> Measurement {
+    let row = |axis: usize| {
+        let minus = minus.map(|minus| (minus + axis, -1.0));
+        std::iter::once((first + axis, 1.0)).chain(minus).collect()
+    };
+    Measurement {
+        residual: z,
+        rows: [0, 1, 2].map(row),
+        variance,
+    }
+}
+
+fn of_velocity(z: Vector3<f64>, variance: f64) -> Measurement {
+    measurement(VELOCITY, None, z, variance)
+}
+
+fn of_table(filter: &Filter, z: Vector3<f64>, variance: f64) -> Measurement {
+    measurement(ATTITUDE, filter.layout.table_position(), z, variance)
 }
 
 #[test]
@@ -55,91 +97,89 @@ fn block_propagation_equals_the_dense_product() {
     let mut filter = filter();
     for k in 0..5 {
         let block = block(f64::from(k));
-        let phi = dense_transition(&block);
-        let mut p = phi * filter.p * phi.transpose();
-        let mut corner = p.fixed_view_mut::<9, 9>(0, 0);
+        let phi = dense_transition(&filter, &block);
+        let mut p = &phi * &filter.p * phi.transpose();
+        let mut corner = p.view_mut((0, 0), (NAVIGATION, NAVIGATION));
         corner += block.noise;
-        let x = phi * filter.x;
+        let x = phi * &filter.x;
         filter.propagate(&block);
         assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
         assert_relative_eq!(filter.x, x, max_relative = 1e-12);
-        filter.observe(Sight::table(None), &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+        let measurement = of_table(&filter, Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+        filter.update(&measurement);
     }
 }
 
 #[test]
-fn a_wandering_bias_does_what_the_constant_one_does_and_forgets() {
-    let wandering = BiasVariation {
-        sigma: 2e-6,
-        correlation_time: 3.0,
-    };
+fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
+    let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+    let sigma = 2e-6f64;
+    let mut model = Model::new(&run, &Options::default());
+    model.prior_sigma.fill(1e-4);
+    for noise in [&mut model.noise.gyro, &mut model.noise.accel] {
+        noise.bias_variation = Some(crate::imu::BiasVariation {
+            sigma,
+            correlation_time: CORRELATION_TIME,
+        });
+    }
+    let mean = ParameterVector::from_element(1e-4);
+    let mut filter = Filter::new(&model, &mean, &TermVector::zeros());
     let start = Start {
-        attitude: Vector3::repeat(3e-4),
-        velocity: 1e-3,
-        position: 1.0,
-        table: 5e-6,
+        attitude: Vector3::zeros(),
+        attitude_sigma: Vector3::repeat(3e-4),
+        velocity_sigma: 1e-3,
+        position_sigma: 1.0,
     };
-    let sigma = ParameterVector::from_element(1e-4);
-    let mut filter = Filter::<STATES_WITH_DRIFT>::new(start, &sigma, &sigma, Vector3::zeros())
-        .with_drift(PerSensor::from_fn(|_| Some(wandering)));
+    filter.begin(&start, 5e-6, true);
+    let varying: Vec<usize> = filter.layout.varying_biases().map(|(s, ..)| s).collect();
+    assert_eq!(varying.len(), 6);
     for k in 0..5 {
         let block = block(f64::from(k));
-        let mut phi = SMatrix::<f64, STATES_WITH_DRIFT, STATES_WITH_DRIFT>::identity();
-        phi.fixed_view_mut::<STATES, STATES>(0, 0)
-            .copy_from(&dense_transition(&block));
-        let keep = (-block.duration / 3.0f64).exp();
-        for axis in 0..6 {
-            let bias = if axis < 3 { GYRO } else { ACCEL } + 9 + axis % 3;
-            let column = phi.fixed_view::<NAVIGATION, 1>(0, bias).into_owned();
-            phi.fixed_view_mut::<NAVIGATION, 1>(0, DRIFT + axis)
-                .copy_from(&column);
-            phi[(DRIFT + axis, DRIFT + axis)] = keep;
-        }
-        let mut p = phi * filter.p * phi.transpose();
-        let mut corner = p.fixed_view_mut::<9, 9>(0, 0);
+        let phi = dense_transition(&filter, &block);
+        let mut p = &phi * &filter.p * phi.transpose();
+        let mut corner = p.view_mut((0, 0), (NAVIGATION, NAVIGATION));
         corner += block.noise;
-        for state in DRIFT..DRIFT + 6 {
-            p[(state, state)] += wandering.sigma.powi(2) * (1.0 - keep * keep);
+        for &state in &varying {
+            p[(state, state)] += sigma.powi(2) * (1.0 - phi[(state, state)].powi(2));
         }
-        let x = phi * filter.x;
+        let x = phi * &filter.x;
         filter.propagate(&block);
         assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
         assert_relative_eq!(filter.x, x, max_relative = 1e-12);
-        filter.observe(Sight::VELOCITY, &Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+        filter.update(&of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11));
     }
     // Without observations of it a stationary process stays as uncertain as it was.
-    assert!(filter.p[(DRIFT, DRIFT)] <= wandering.sigma.powi(2));
+    assert!(filter.p[(varying[0], varying[0])] <= sigma.powi(2));
 }
 
 #[test]
-fn scalar_observations_equal_the_dense_update_with_the_full_gain() {
+fn scalar_updates_equal_the_dense_one_with_the_full_gain() {
     let mut filter = filter();
     filter.propagate(&block(0.3));
-    let variance = 1e-9;
     let z = Vector3::new(1e-3, -2e-3, 5e-4);
-    for sight in [Sight::VELOCITY, Sight::table(None)] {
-        let mut h = nalgebra::SMatrix::<f64, 3, STATES>::zeros();
-        for axis in 0..3 {
-            h[(axis, sight.plus + axis)] = 1.0;
-            if let Some(minus) = sight.minus {
-                h[(axis, minus + axis)] = -1.0;
-            }
+    let table = of_table(&filter, z, 1e-9);
+    for measurement in [of_velocity(z, 1e-9), table] {
+        let mut h = SMatrix::<f64, 3, STATES>::zeros();
+        for (axis, row) in measurement.rows.iter().enumerate() {
+            row.iter().for_each(|&(state, weight)| h[(axis, state)] = weight);
         }
-        let s = h * filter.p * h.transpose() + Matrix3::identity() * variance;
-        let gain = filter.p * h.transpose() * s.try_inverse().unwrap();
-        let x = filter.x + gain * (z - h * filter.x);
-        let p = (StateMatrix::identity() - gain * h) * filter.p;
-        let (whitened, log_determinant) = filter.whitened(sight, &z, variance).unwrap();
+        let before = StateMatrix::from_iterator(filter.p.iter().copied());
+        let s = h * before * h.transpose() + Matrix3::identity() * measurement.variance;
+        let gain = before * h.transpose() * s.try_inverse().unwrap();
+        let innovation = z - h * &filter.x;
+        let x = &filter.x + gain * innovation;
+        let p = (StateMatrix::identity() - gain * h) * before;
+        let (whitened, log_determinant) = filter.whitened(&measurement).unwrap();
         assert_relative_eq!(log_determinant, s.determinant().ln(), max_relative = 1e-9);
-        let innovation = z - h * filter.x;
         assert_relative_eq!(
             whitened.norm_squared(),
             innovation.dot(&(s.try_inverse().unwrap() * innovation)),
             max_relative = 1e-9
         );
-        filter.observe(sight, &z, variance);
+        filter.update(&measurement);
+        let after = StateMatrix::from_iterator(filter.p.iter().copied());
         assert_relative_eq!(filter.x, x, max_relative = 1e-6, epsilon = 1e-12);
-        assert_relative_eq!(filter.p, p, max_relative = 1e-6, epsilon = 1e-13);
+        assert_relative_eq!(after, p, max_relative = 1e-6, epsilon = 1e-13);
     }
 }
 
@@ -164,8 +204,8 @@ fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
     let mut filter = filter();
     for k in 0..4000 {
         filter.propagate(&turning(f64::from(k) * 0.37));
-        filter.observe(Sight::VELOCITY, &Vector3::zeros(), 1e-12);
-        filter.observe(Sight::table(None), &Vector3::zeros(), 1e-12);
+        filter.update(&of_velocity(Vector3::zeros(), 1e-12));
+        filter.update(&of_table(&filter, Vector3::zeros(), 1e-12));
         if k % 50 == 0 {
             filter.redraw_table(5e-6);
         }
