@@ -31,7 +31,6 @@ use super::schedule::AtRest;
 use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
 use crate::imu::Triad;
 use crate::navigation::{Block, BlockMatrix, Navigator, State};
-use crate::run::Run;
 
 /// The attitude error at the first sample is the initial one to within this, rad: a number so small
 /// that it is none, where a row needs a σ.

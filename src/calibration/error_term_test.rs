@@ -50,14 +50,17 @@ impl ErrorTermTest {
         self.gain > self.limit
     }
 
-    /// What must be known of it: that the data show it, and it is off.
-    pub fn finding(&self) -> Option<Finding> {
-        (!self.on && self.significant()).then(|| Finding::ErrorTermSignificant {
-            term: self.term.name(),
-            gain: self.gain,
-            limit: self.limit,
-            nis_without: self.without,
-            nis_with: self.with,
+    /// Of error terms that are off and that the data show, the one that explains most: the others may
+    /// explain what is left once it is on.
+    pub fn most_significant(tests: &[Self]) -> Option<Finding> {
+        let shown = tests.iter().filter(|test| !test.on && test.significant());
+        let most = shown.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+        Some(Finding::ErrorTermSignificant {
+            term: most.term.name(),
+            gain: most.gain,
+            limit: most.limit,
+            nis_without: most.without,
+            nis_with: most.with,
         })
     }
 }

@@ -42,7 +42,7 @@ impl Outcome {
         quality: &Quality,
     ) -> Calibration {
         let mut findings = self.findings.clone();
-        findings.extend(tests.iter().filter_map(ErrorTermTest::finding));
+        findings.extend(ErrorTermTest::most_significant(tests));
         Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::Ekf),

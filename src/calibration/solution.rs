@@ -101,8 +101,7 @@ impl Solution {
             Self::Filter(outcome) => outcome.findings.clone(),
             Self::ClosedForm(closed_form) => closed_form.findings.clone(),
         };
-        let tests = assessment.error_terms.iter();
-        findings.extend(tests.filter_map(ErrorTermTest::finding));
+        findings.extend(ErrorTermTest::most_significant(&assessment.error_terms));
         findings
     }
 

@@ -214,43 +214,64 @@ impl Filter {
     /// *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
     pub fn update(&mut self, measurement: &Measurement) {
         let n = self.x.len();
+        let (mut ph, mut gain, mut rest) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for (row, z) in measurement.rows.iter().zip(&measurement.residual) {
-            let ph = self.times_covariance(row);
+            self.times_upper(row, &mut ph);
             let scale = 1.0 / (times(row, &ph) + measurement.variance);
-            let gain: Vec<f64> = ph.iter().map(|v| v * scale).collect();
             let innovation = z - times(row, self.x.as_slice());
-            for (x, gain) in self.x.iter_mut().zip(&gain) {
-                *x += gain * innovation;
+            for ((x, gain), ph) in self.x.iter_mut().zip(&mut gain).zip(&ph) {
+                *gain = ph * scale;
+                *x += *gain * innovation;
             }
-            // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ.
-            rank_one(self.p.as_mut_slice(), n, -1.0, &gain, &ph);
-            let mut rest = self.times_covariance(row);
+            // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
+            let columns = self.p.as_mut_slice().chunks_exact_mut(n);
+            for (j, column) in columns.enumerate() {
+                for (p, gain) in column[..=j].iter_mut().zip(&gain) {
+                    *p -= gain * ph[j];
+                }
+            }
+            self.times_upper(row, &mut rest);
             for (rest, gain) in rest.iter_mut().zip(&gain) {
-                *rest = gain * measurement.variance - *rest;
+                *rest = 0.5 * (gain * measurement.variance - *rest);
             }
-            rank_one(self.p.as_mut_slice(), n, 1.0, &rest, &gain);
+            let columns = self.p.as_mut_slice().chunks_exact_mut(n);
+            for (j, column) in columns.enumerate() {
+                let (gain_j, rest_j) = (gain[j], rest[j]);
+                let both = gain.iter().zip(&rest);
+                for (p, (gain, rest)) in column[..=j].iter_mut().zip(both) {
+                    *p += rest * gain_j + gain * rest_j;
+                }
+            }
         }
-        // Rounding differs on the two sides of the diagonal, and the difference would grow.
         for column in 0..n {
             for row in 0..column {
-                let mean = 0.5 * (self.p[(row, column)] + self.p[(column, row)]);
-                self.p[(row, column)] = mean;
-                self.p[(column, row)] = mean;
+                self.p[(column, row)] = self.p[(row, column)];
+            }
+        }
+    }
+
+    /// `P hᵀ` from the upper half of P.
+    fn times_upper(&self, h: &[(usize, f64)], product: &mut [f64]) {
+        let n = self.x.len();
+        let p = self.p.as_slice();
+        product.fill(0.0);
+        for &(state, weight) in h {
+            let (above, below) = product.split_at_mut(state);
+            for (sum, p) in above.iter_mut().zip(&p[n * state..]) {
+                *sum += weight * p;
+            }
+            let of_row = p[state..].iter().step_by(n).skip(state);
+            for (sum, p) in below.iter_mut().zip(of_row) {
+                *sum += weight * p;
             }
         }
     }
 
     /// `P hᵀ`
     fn times_covariance(&self, h: &[(usize, f64)]) -> Vec<f64> {
-        let n = self.x.len();
-        let mut sum = vec![0.0; n];
-        for &(state, weight) in h {
-            let column = &self.p.as_slice()[n * state..n * (state + 1)];
-            for (sum, value) in sum.iter_mut().zip(column) {
-                *sum += weight * value;
-            }
-        }
-        sum
+        let mut product = vec![0.0; self.x.len()];
+        self.times_upper(h, &mut product);
+        product
     }
 
     /// The body has come to rest: errors of velocity and position become those in the computed frame,
@@ -396,17 +417,6 @@ fn add_scaled(sum: &mut Column, column: &Column, factor: f64) {
 /// `h v`
 fn times(h: &[(usize, f64)], v: &[f64]) -> f64 {
     h.iter().map(|&(state, weight)| weight * v[state]).sum()
-}
-
-/// `P += factor a bᵀ`, P of n rows column by column.
-#[inline]
-fn rank_one(p: &mut [f64], n: usize, factor: f64, a: &[f64], b: &[f64]) {
-    for (column, b) in p.chunks_exact_mut(n).zip(b) {
-        let b = factor * b;
-        for (p, a) in column.iter_mut().zip(a) {
-            *p += a * b;
-        }
-    }
 }
 
 const _: () = assert!(NAVIGATION == crate::navigation::NAVIGATION);

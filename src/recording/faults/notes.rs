@@ -23,7 +23,7 @@ pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
             "bridged by interpolation, whose error is in the σ.".to_owned()
         } else {
             format!(
-                "{unbridged} of {} stretches cannot be bridged, so the record is not continuous.",
+                "{unbridged} of {} stretches cannot be bridged, and part the record there.",
                 faults.len()
             )
         };
@@ -42,29 +42,12 @@ pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
 }
 
 impl ImuSamples {
-    /// The first stretch that no interpolation bridges, in words; none in a record without one.
-    pub(crate) fn unbridged(&self) -> Option<String> {
-        let unbridged = self.faults.iter().filter(|fault| !fault.bridged);
-        let fault = unbridged.min_by_key(|fault| fault.samples.start)?;
-        let what = self.what(fault.kind, [fault], fault.samples.len());
-        let (start, end) = (self.time(fault.samples.start), self.time(fault.samples.end));
-        Some(format!(
-            "{what} from {start:.2} s to {end:.2} s (line {})",
-            fault.line
-        ))
-    }
-
     /// Whether some of these samples are not known.
     pub fn is_lost(&self, samples: &Range<usize>) -> bool {
         let lost = |fault: &Fault| {
             !fault.bridged && fault.samples.start < samples.end && samples.start < fault.samples.end
         };
         self.faults.iter().any(lost)
-    }
-
-    /// Whether it is made of sections that were laid end to end, rather than one record with a part lost.
-    pub fn is_sections(&self) -> bool {
-        !self.continuous && self.faults.iter().all(|fault| fault.bridged)
     }
 
     /// So many rows or samples, the columns of the latter, and what is wrong with them.
