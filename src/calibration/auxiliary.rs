@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::error_term::ErrorTerm;
 use super::parameters::{OBSERVED_BELOW, PARAMETERS};
-use crate::imu::{TERM_PARAMETERS, TermVector, Term};
+use crate::imu::{TERM_PARAMETERS, Term, TermVector};
 use crate::turntable::{TABLE_GEOMETRY, table_geometry_name};
 
 /// Number of parameters of both kinds.
@@ -54,7 +54,10 @@ pub fn auxiliary_name(index: usize) -> Option<String> {
 }
 
 /// Errors of the table and parameters of terms as one vector.
-pub fn auxiliary_vector(table: &SVector<f64, TABLE_GEOMETRY>, terms: &TermVector) -> AuxiliaryVector {
+pub fn auxiliary_vector(
+    table: &SVector<f64, TABLE_GEOMETRY>,
+    terms: &TermVector,
+) -> AuxiliaryVector {
     let mut all = AuxiliaryVector::zeros();
     all.fixed_rows_mut::<TABLE_GEOMETRY>(0).copy_from(table);
     all.fixed_rows_mut::<TERM_PARAMETERS>(TABLE_GEOMETRY)
@@ -97,13 +100,17 @@ impl Auxiliary {
 
     /// Whether a term of the instrument was estimated.
     pub fn has_terms(&self) -> bool {
-        let of_terms = self.prior_sigma.fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY);
+        let of_terms = self
+            .prior_sigma
+            .fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY);
         of_terms.iter().any(|&sigma| sigma > 0.0)
     }
 
     /// The estimated parameters of terms.
     pub fn terms(&self) -> TermVector {
-        self.values.fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY).into()
+        self.values
+            .fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY)
+            .into()
     }
 
     /// Whether second order and asymmetry of an accelerometer are both estimated and hardly more than

@@ -16,10 +16,10 @@ use nalgebra::Vector3;
 
 use super::curvature::curvature;
 use super::error::CalibrationError;
-use super::linearisation::singular;
 use super::error_term::ErrorTerm;
 use super::estimate::Estimate;
 use super::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
+use super::linearisation::singular;
 use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::{
@@ -98,7 +98,10 @@ impl<'a> Batch<'a> {
         let (run, model, at) = (stretch.run, &problem.model, &outcome.linearised_at);
         let walk = crate::imu::PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
         let diverged = CalibrationError::Diverged { time: 0.0 };
-        let attitudes = at.initial_attitudes.first().zip(outcome.prior_attitudes.first());
+        let attitudes = at
+            .initial_attitudes
+            .first()
+            .zip(outcome.prior_attitudes.first());
         let (attitude, prior) = attitudes.ok_or(diverged)?;
         let start = State::at_rest(*attitude);
         let imu = &run.recording.imu;

@@ -15,10 +15,10 @@ use super::finding::Finding;
 use super::model::Model;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, parameter, parameter_name};
 use super::problem::Problem;
+use crate::imu::BodyFrame;
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
-use crate::imu::BodyFrame;
 use crate::run::{Aiding, Dwell, MeanOutput, Run};
 
 /// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.

@@ -99,7 +99,9 @@ pub(super) fn initial_attitudes(problem: &Problem) -> Result<Vec<AttitudePrior>,
 
 fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
     let stretches = problem.stretches().iter();
-    stretches.map(|stretch| stretch.attitude_of_table()).collect()
+    stretches
+        .map(|stretch| stretch.attitude_of_table())
+        .collect()
 }
 
 /// Both triads by gravity alone, as a result of its own.

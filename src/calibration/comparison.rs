@@ -4,11 +4,11 @@
 use super::error::ComparisonError;
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
-use super::scatter::{Scatter, scatter};
 use super::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
-use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, Triad};
+use super::scatter::{Scatter, scatter};
 use crate::calibration::result::Calibration;
 use crate::imu::BodyFrame;
+use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, Triad};
 
 /// A record with the name that tables and messages give it.
 #[derive(Debug, Clone, Copy)]

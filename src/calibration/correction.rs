@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 use super::frame::triad_record;
-use crate::imu::{AXES, TERM_PARAMETERS, TermVector, PerSensor, Sensed, Sensor, Term};
 use crate::calibration::result::Calibration;
+use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
 use crate::run::Run;
 
 /// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
@@ -114,7 +114,8 @@ impl Correction {
             if name.starts_with("table.") {
                 continue;
             }
-            let known = (0..TERM_PARAMETERS).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
+            let known =
+                (0..TERM_PARAMETERS).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
             let known = known.ok_or_else(|| CorrectionError::UnknownTerm(name.clone()))?;
             further[known] = term.value;
         }
@@ -144,8 +145,10 @@ impl Correction {
                 });
             }
             let scales = correction.sensitivity.get(sensor).diagonal();
-            for (axis, (&calibration, &run)) in
-                scales.iter().zip(&run.instrument.nominal.get(sensor).0).enumerate()
+            for (axis, (&calibration, &run)) in scales
+                .iter()
+                .zip(&run.instrument.nominal.get(sensor).0)
+                .enumerate()
             {
                 if !(1.0 / SCALE_FACTOR..=SCALE_FACTOR).contains(&(calibration / run)) {
                     return Err(CorrectionError::Scale {
@@ -200,7 +203,8 @@ impl Correction {
             Sensor::Gyro => run.recording.imu.gyro[k],
             Sensor::Accel => run.recording.imu.accel[k],
         };
-        let output = increment.component_mul(&run.instrument.nominal.get(sensor).0) / run.recording.imu.period;
+        let output = increment.component_mul(&run.instrument.nominal.get(sensor).0)
+            / run.recording.imu.period;
         self.matrix.get(sensor) * (output - self.bias.get(sensor))
     }
 

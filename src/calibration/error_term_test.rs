@@ -131,7 +131,12 @@ pub fn test_error_terms(
 /// The last pass of a calibration with another model.
 fn once_more(problem: &Problem, outcome: &Outcome) -> Result<PassResult, CalibrationError> {
     let mode = Mode::Held(Gate::As(&outcome.innovations));
-    pass(problem, &outcome.prior_attitudes, &outcome.linearised_at, mode)
+    pass(
+        problem,
+        &outcome.prior_attitudes,
+        &outcome.linearised_at,
+        mode,
+    )
 }
 
 /// How well a calibration fits, and variance of the parameters of both triads.

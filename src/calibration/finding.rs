@@ -213,3 +213,25 @@ fn listed(names: &[String]) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_are_listed_by_sensor_and_kind() {
+        let names = ["gyro.scale.x", "gyro.scale.y", "accel.bias.z"].map(str::to_owned);
+        assert_eq!(listed(&names), "gyro scale x, y; accel bias z");
+    }
+
+    #[test]
+    fn a_finding_is_a_kind_and_figures_in_json() {
+        let finding = Finding::Outliers {
+            rejected: 2,
+            observations: 9,
+        };
+        let json = serde_json::to_value(&finding).unwrap();
+        assert_eq!(json["kind"], "outliers");
+        assert_eq!(json["figures"]["rejected"], 2);
+    }
+}

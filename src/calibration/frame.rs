@@ -13,14 +13,16 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::error::ComparisonError;
 use super::estimate::Estimate;
-use super::result::triads_of;
 use super::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, in_general_form, parameter, parameter_name, sensor_and_parameter,
-    to_vector,
+    PARAMETERS, ParameterMatrix, ParameterVector, in_general_form, parameter, parameter_name,
+    sensor_and_parameter, to_vector,
 };
-use crate::attitude::skew;
-use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector};
+use super::result::triads_of;
 use super::result::{Calibration, TermRecord, TriadRecord};
+use crate::attitude::skew;
+use crate::imu::{
+    AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector,
+};
 
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,7 +44,9 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let start = coarse_start(problem)?;
     let others = start.other_headings();
     let of_start = attempt(problem, start, progress);
-    let others = others.into_iter().map(|start| attempt(problem, start, progress));
+    let others = others
+        .into_iter()
+        .map(|start| attempt(problem, start, progress));
     let Attempt {
         priors,
         passes,
@@ -79,7 +81,10 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         feedback_history: feedback.map(|pass| pass.history).unwrap_or_default(),
         innovations: held.innovations,
         aiding: model.aiding,
-        velocity_sigma: problem.stretches().first().map_or(0.0, |s| s.velocity_sigma),
+        velocity_sigma: problem
+            .stretches()
+            .first()
+            .map_or(0.0, |s| s.velocity_sigma),
         passes,
         findings: Vec::new(),
     };

@@ -116,7 +116,8 @@ impl Layout {
 
     /// The states that all stretches share.
     pub fn shared(&self) -> impl Iterator<Item = usize> + use<> {
-        self.driving().chain(self.initial_attitude() + 3..self.size())
+        self.driving()
+            .chain(self.initial_attitude() + 3..self.size())
     }
 
     fn terms_begin(&self) -> usize {

@@ -77,5 +77,5 @@ pub use problem::Problem;
 pub use quality::{Measures, Quality, Spread};
 pub use record::truth_record;
 pub use result::{Calibration, Method, triads_of};
-pub use solution::{Assessment, Solution};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};
+pub use solution::{Assessment, Solution};

@@ -11,8 +11,8 @@ use super::outcome::Outcome;
 use super::pass::{Gate, Mode, pass};
 use super::problem::{Problem, Stretch};
 use crate::attitude::{exp, level, log, tilt};
-use crate::imu::{TermVector, PerSensor, Sensed, Sensor, Triad};
-use crate::navigation::{TermValues, Navigator, State};
+use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
+use crate::navigation::{Navigator, State, TermValues};
 use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
 
@@ -108,7 +108,9 @@ impl ClosedForm {
             let at = Linearisation {
                 triads: *triads,
                 terms: TermVector::zeros(),
-                initial_attitudes: first.map(|s| first_attitude(s, triads)).collect::<Result<_, _>>()?,
+                initial_attitudes: first
+                    .map(|s| first_attitude(s, triads))
+                    .collect::<Result<_, _>>()?,
             };
             measures(problem, &at, judged)
         };
@@ -142,7 +144,10 @@ impl ClosedForm {
 /// two, or a stretch with none.
 fn every_other<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     let half = problem.observed_in(|k| k % 2 == 0);
-    let left = half.stretches().iter().all(|stretch| !stretch.dwells.is_empty());
+    let left = half
+        .stretches()
+        .iter()
+        .all(|stretch| !stretch.dwells.is_empty());
     (left && half.dwells().count() >= 2).then_some(half)
 }
 

@@ -59,7 +59,9 @@ impl Outcome {
             observability: direction_records(self),
             warnings: texts(&findings),
             findings: findings.iter().map(FindingRecord::from).collect(),
-            ..self.estimate.record(problem.run(), problem.model.aiding.body_frame())
+            ..self
+                .estimate
+                .record(problem.run(), problem.model.aiding.body_frame())
         }
     }
 }
@@ -72,7 +74,9 @@ impl ClosedForm {
             method: Some(Method::SixPosition),
             warnings: texts(&self.findings),
             findings: self.findings.iter().map(FindingRecord::from).collect(),
-            ..self.estimate.record(problem.run(), self.reference.body_frame())
+            ..self
+                .estimate
+                .record(problem.run(), self.reference.body_frame())
         }
     }
 }
@@ -110,7 +114,11 @@ impl Estimate {
         };
         let of = |sensor| triad_record(self.triads.get(sensor), run.instrument.nominal.get(sensor));
         let correction = |sensor| {
-            let sensitivity = run.instrument.nominal.get(sensor).sensitivity(self.triads.get(sensor));
+            let sensitivity = run
+                .instrument
+                .nominal
+                .get(sensor)
+                .sensitivity(self.triads.get(sensor));
             Some(rows(&sensitivity.try_inverse()?))
         };
         Calibration {
@@ -119,7 +127,11 @@ impl Estimate {
             unit: Some(run.instrument.unit.clone()),
             sigma: Some(PerSensor::from_fn(|sensor| {
                 let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
-                sigma_record(form, &sigma.into_owned(), run.instrument.nominal.get(sensor))
+                sigma_record(
+                    form,
+                    &sigma.into_owned(),
+                    run.instrument.nominal.get(sensor),
+                )
             })),
             parameters: names(true),
             covariance: estimated

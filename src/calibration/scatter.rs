@@ -147,12 +147,12 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::calibration::PARAMETERS;
     use crate::calibration::frame::own_nominal;
     use crate::calibration::frame::tests::{record, with_covariance};
     use crate::calibration::from_vector;
-    use crate::calibration::PARAMETERS;
-    use crate::imu::InstallationForm::General;
     use crate::imu::BodyFrame;
+    use crate::imu::InstallationForm::General;
 
     /// Calibrations that scatter by `factor` times the σ that they claim.
     fn drawn(count: usize, factor: f64) -> (Vec<Canonical>, ParameterVector) {

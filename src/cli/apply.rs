@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::error::ErrorKind;
 use turncal::calibration::Correction;
+use turncal::calibration::result::Calibration;
 use turncal::formats::export::{sample_rows, write_samples};
 use turncal::imu::{Sensor, Term};
-use turncal::calibration::result::Calibration;
 use turncal::run::Run;
 use turncal::units::PPM;
 
@@ -62,7 +62,10 @@ impl Apply {
         activity.next("writing");
         match &self.output {
             Some(output) => {
-                keep(output, run.recording.files.iter().chain([&self.calibration]))?;
+                keep(
+                    output,
+                    run.recording.files.iter().chain([&self.calibration]),
+                )?;
                 write_samples(output, &correction, &run, self.force)?;
             }
             None => stream(|rows| sample_rows(rows, &correction, &run))?,
@@ -95,7 +98,9 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         let off = scale
             .component_div(&run.instrument.nominal.get(sensor).0)
             .add_scalar(-1.0);
-        let sigmas = off.abs().component_div(&run.instrument.prior.get(sensor).scale_sigma);
+        let sigmas = off
+            .abs()
+            .component_div(&run.instrument.prior.get(sensor).scale_sigma);
         if sigmas.max() > SUSPECT_SIGMAS {
             notes.push(format!(
                 "{} scale factors are up to {:.0} ppm off the run's nominal ones, {:.0} times the 1σ in \

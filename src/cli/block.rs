@@ -3,8 +3,8 @@
 use anyhow::bail;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
-use turncal::imu::Term;
 use turncal::calibration::{ErrorTerm, Problem};
+use turncal::imu::Term;
 use turncal::run::Aiding;
 
 /// A block of states that a run can switch on.
@@ -30,12 +30,18 @@ impl ValueEnum for Block {
             ErrorTerm::BiasVariation => "Biases that wander during the run",
             ErrorTerm::TableBase => "Level and north of the table",
             ErrorTerm::TableAxes => "Axes of the table that are not square",
-            ErrorTerm::Instrument(Term::AccelSecondOrder) => "Accelerometers: square of specific force",
+            ErrorTerm::Instrument(Term::AccelSecondOrder) => {
+                "Accelerometers: square of specific force"
+            }
             ErrorTerm::Instrument(Term::AccelAsymmetry) => {
                 "Accelerometers: size of specific force, whatever its sign"
             }
-            ErrorTerm::Instrument(Term::SizeEffect) => "Accelerometers that do not stand in one point",
-            ErrorTerm::Instrument(Term::TimeOffset) => "Accelerometer samples later than the gyros'",
+            ErrorTerm::Instrument(Term::SizeEffect) => {
+                "Accelerometers that do not stand in one point"
+            }
+            ErrorTerm::Instrument(Term::TimeOffset) => {
+                "Accelerometer samples later than the gyros'"
+            }
             ErrorTerm::Instrument(Term::GSensitivity) => "Gyros that sense specific force",
         }))
     }

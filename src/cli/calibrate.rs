@@ -9,8 +9,8 @@ use clap::ValueEnum;
 use rayon::prelude::*;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference, Solution,
-    in_body_frame, triads_of,
+    self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
+    Solution, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};

@@ -5,9 +5,9 @@ mod document;
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
+use turncal::calibration::result::Calibration;
 use turncal::calibration::{Named, compare};
 use turncal::report::side_by_side;
-use turncal::calibration::result::Calibration;
 
 use super::names::short_names;
 use super::output::Delivery;

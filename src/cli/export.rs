@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::ValueEnum;
+use turncal::calibration::result::Calibration;
 use turncal::formats::export;
 use turncal::formats::write_whole;
-use turncal::calibration::result::Calibration;
 use turncal::run::Run;
 
 use super::output::{keep, print};

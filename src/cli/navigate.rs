@@ -7,11 +7,11 @@ use clap::ValueEnum;
 use nalgebra::Vector3;
 use turncal::attitude::from_pitch_roll_heading;
 use turncal::calibration::Named;
+use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
 use turncal::report::navigation::Navigation;
-use turncal::calibration::result::Calibration;
 use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
 use turncal::units::DEGREE;
 

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde::Serialize;
-use turncal::report::ReportError;
-use turncal::formats::WholeDirectory;
 use turncal::formats::FileError;
+use turncal::formats::WholeDirectory;
+use turncal::report::ReportError;
 
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]

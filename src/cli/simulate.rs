@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use turncal::calibration::truth_record;
-use turncal::imu::{TERM_PARAMETERS, Term};
-use turncal::calibration::result::TermRecord;
-use turncal::formats::write_run;
 use turncal::calibration::result::Calibration;
+use turncal::calibration::result::TermRecord;
+use turncal::calibration::truth_record;
+use turncal::formats::write_run;
+use turncal::imu::{TERM_PARAMETERS, Term};
 use turncal::simulation::{Scenario, Simulated};
 
 use super::output::Overwrite;

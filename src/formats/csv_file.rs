@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use csv::{ByteRecord, ErrorKind, Reader, ReaderBuilder};
 use flate2::read::MultiGzDecoder;
 
-use super::error::{Place, FileError, list, nearest};
+use super::error::{FileError, Place, list, nearest};
 use lines::Lines;
 
 /// What the names of such files end in, each also with `.gz` behind it.

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, FileError, list, suggestion};
+use super::error::{FileError, Place, list, suggestion};
 
 /// The text that spans refer to.
 #[derive(Clone, Copy)]

@@ -9,9 +9,9 @@ use super::clock::{Clock, Stamp, Stamps};
 use super::csv_file::CsvFile;
 use super::error::FileError;
 use super::uniform::Uniform;
+use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
 use crate::recording::{ColumnFacts, ImuSamples, LogFacts, TemperatureFacts, stretches_between};
-use crate::imu::{Nominal, Output, PerSensor, Sensor};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;

@@ -11,7 +11,7 @@ use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
 use super::quantity::{OUTPUTS, units};
 use crate::imu::{
-    TermVector, BiasVariation, Noise, Nominal, Instrument, Output, PerSensor, Prior, Sensor, Term,
+    BiasVariation, Instrument, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use super::error::FileError;
 use super::fields::{Document, Fields};
 use super::instrument::InstrumentFields;
-use super::table_log::TableLogFile;
 use super::segments;
+use super::table_log::TableLogFile;
+use crate::earth::Site;
 use crate::recording::{Recording, faults};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::earth::Site;
 use crate::units::DEGREE;
 
 /// The version of the format of `run.toml`.

@@ -71,27 +71,27 @@ pub(super) fn read(
 
 /// What a label says, its axes being those of the file.
 fn motion_of(label: &str, axes: BodyAxes) -> Option<LabelledMotion> {
-        let axis = |name: &str| {
-            let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;
-            Some(axes.vector(Vector3::ith(index, 1.0)))
-        };
-        if let Some(turn) = label.strip_prefix("rot_") {
-            let (name, angle) = turn.split_at_checked(1)?;
-            let angle: f64 = angle.parse().ok()?;
-            let turns = angle.is_finite() && angle != 0.0;
-            return turns.then_some(LabelledMotion::Turns {
-                axis: axis(name)?,
-                angle: angle * DEGREE,
-            });
-        }
-        let (name, way) = label.split_once('_')?;
-        let up = match way {
-            "up" => axis(name)?,
-            "down" => -axis(name)?,
-            _ => return None,
-        };
-        Some(LabelledMotion::Stands { up })
+    let axis = |name: &str| {
+        let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;
+        Some(axes.vector(Vector3::ith(index, 1.0)))
+    };
+    if let Some(turn) = label.strip_prefix("rot_") {
+        let (name, angle) = turn.split_at_checked(1)?;
+        let angle: f64 = angle.parse().ok()?;
+        let turns = angle.is_finite() && angle != 0.0;
+        return turns.then_some(LabelledMotion::Turns {
+            axis: axis(name)?,
+            angle: angle * DEGREE,
+        });
     }
+    let (name, way) = label.split_once('_')?;
+    let up = match way {
+        "up" => axis(name)?,
+        "down" => -axis(name)?,
+        _ => return None,
+    };
+    Some(LabelledMotion::Stands { up })
+}
 
 #[cfg(test)]
 mod tests {

@@ -8,9 +8,9 @@ use super::clock::{Clock, Stamp, Stamps};
 use super::csv_file::CsvFile;
 use super::error::FileError;
 use super::fields::Fields;
+use crate::attitude;
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{TableAccuracy, TableGeometry, Tilts, tilts};
-use crate::attitude;
 use crate::units::{ARCSEC, DEGREE};
 
 /// Four components printed to four decimals meet it. What is off by more is no quaternion.

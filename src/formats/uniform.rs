@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::error::{Place, FileError};
+use super::error::{FileError, Place};
 use crate::recording::nanoseconds;
 
 /// The uniform clock of increasing stamps.

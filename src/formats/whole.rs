@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::error::{Place, FileError};
+use super::error::{FileError, Place};
 
 /// A place that something new is going to take.
 struct Stage {

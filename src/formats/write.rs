@@ -8,13 +8,13 @@ use std::path::Path;
 use flate2::{Compression, GzBuilder};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
-use super::error::{Place, FileError, list, suggestion};
+use super::error::{FileError, Place, list, suggestion};
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use crate::calibration::Calibration;
+use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
-use crate::imu::{Output, Sensor, Term};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
@@ -43,7 +43,12 @@ pub fn write_run(
             ));
         }
     }
-    if let Some(name) = run.recording.meta.keys().find(|name| !META.contains(&name.as_str())) {
+    if let Some(name) = run
+        .recording
+        .meta
+        .keys()
+        .find(|name| !META.contains(&name.as_str()))
+    {
         return Err(FileError::new(
             &configuration,
             Place::File,
@@ -71,7 +76,9 @@ pub fn write_run(
         write("table.csv.gz", &|file| table_rows(file, table))?;
     }
     if !run.recording.segments.is_empty() {
-        write("segments.csv", &|file| segment_rows(file, &run.recording.segments))?;
+        write("segments.csv", &|file| {
+            segment_rows(file, &run.recording.segments)
+        })?;
     }
     if let Some(truth) = truth {
         let path = directory.join("truth.json");
@@ -273,7 +280,10 @@ position_sigma_deg = {:?}
 }
 
 fn prior_text(run: &Run, sensor: Sensor) -> String {
-    let (prior, nominal) = (run.instrument.prior.get(sensor), run.instrument.nominal.get(sensor).0);
+    let (prior, nominal) = (
+        run.instrument.prior.get(sensor),
+        run.instrument.nominal.get(sensor).0,
+    );
     format!(
         r#"[imu.prior.{name}]
 scale = [{x:?}, {y:?}, {z:?}]

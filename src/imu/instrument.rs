@@ -1,6 +1,6 @@
 //! What is known of an instrument before it is calibrated.
 
-use super::{TermVector, InstallationForm, Noise, Nominal, PerSensor, Prior, Triad};
+use super::{InstallationForm, Noise, Nominal, PerSensor, Prior, TermVector, Triad};
 
 /// An instrument as data sheet and experience describe it.
 #[derive(Debug, Clone, PartialEq)]

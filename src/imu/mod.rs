@@ -16,10 +16,10 @@ mod terms;
 mod triad;
 
 pub use body_frame::BodyFrame;
-pub use instrument::Instrument;
 pub use installation::{ANGLES, InstallationForm};
+pub use instrument::Instrument;
 pub use signal::{BiasVariation, Noise, NoiseSource, Output, Pulses};
-pub use terms::{TERM_PARAMETERS, TermResponse, TermVector, Sensed, Term};
+pub use terms::{Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 
 /// Names of the body axes, in order.

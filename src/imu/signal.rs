@@ -66,8 +66,8 @@ impl NoiseSource {
         let white = normal(rng) * (self.noise.random_walk * self.period.sqrt());
         if let Some(bias_variation) = self.noise.bias_variation {
             let keep = (-self.period / bias_variation.correlation_time).exp();
-            self.wander =
-                self.wander * keep + normal(rng) * (bias_variation.sigma * (1.0 - keep * keep).sqrt());
+            self.wander = self.wander * keep
+                + normal(rng) * (bias_variation.sigma * (1.0 - keep * keep).sqrt());
         }
         white + self.wander * self.period
     }

@@ -229,7 +229,9 @@ mod tests {
     #[test]
     fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
         let sensed = any();
-        let mut names: Vec<String> = (0..TERM_PARAMETERS).map_while(Term::parameter_name).collect();
+        let mut names: Vec<String> = (0..TERM_PARAMETERS)
+            .map_while(Term::parameter_name)
+            .collect();
         names.sort();
         names.dedup();
         assert_eq!(names.len(), TERM_PARAMETERS);

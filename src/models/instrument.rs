@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{
-    ANGLES, TermVector, BiasVariation, InstallationForm, Noise, PerSensor, Prior, Sensor, Term,
+    ANGLES, BiasVariation, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 

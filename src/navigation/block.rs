@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::increments::Increments;
 use super::state::State;
 use crate::attitude::skew;
-use crate::imu::{TermResponse, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, Triad};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, TermResponse, Triad};
 
 /// Attitude, velocity and position error.
 pub const NAVIGATION: usize = 9;

@@ -9,7 +9,7 @@ use super::increments::Increments;
 use super::state::State;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
-use crate::imu::{TermResponse, TermVector, PerSensor, Sensed, Sensor, Triad};
+use crate::imu::{PerSensor, Sensed, Sensor, TermResponse, TermVector, Triad};
 use crate::recording::ImuSamples;
 
 /// Navigates through a record with given triads and accumulates the error model as it goes.

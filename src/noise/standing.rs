@@ -94,7 +94,12 @@ impl Stretch {
         let Some(segment) = longest else {
             return Err(StretchError::UnknownLabel {
                 label: label.to_owned(),
-                labels: run.recording.segments.iter().map(|s| s.label.clone()).collect(),
+                labels: run
+                    .recording
+                    .segments
+                    .iter()
+                    .map(|s| s.label.clone())
+                    .collect(),
             });
         };
         let which = match of_label().count() {
@@ -118,7 +123,10 @@ impl Stretch {
     }
 
     fn standstill(run: &Run) -> Result<Self, StretchError> {
-        let dwells = run.dwells(run.aiding()).into_iter().map(|dwell| dwell.samples);
+        let dwells = run
+            .dwells(run.aiding())
+            .into_iter()
+            .map(|dwell| dwell.samples);
         let samples = dwells
             .max_by_key(|samples| samples.len())
             .ok_or(StretchError::NoStandstill)?;

@@ -150,7 +150,9 @@ impl ImuSamples {
         let begun = self.stretches.partition_point(|s| s.samples.start <= k);
         self.stretches
             .get(begun.saturating_sub(1))
-            .map_or(0.0, |s| s.start + (k - s.samples.start) as f64 * self.period)
+            .map_or(0.0, |s| {
+                s.start + (k - s.samples.start) as f64 * self.period
+            })
     }
 
     /// The sample edge nearest below a time, as a real number of samples from the first one.

@@ -5,8 +5,8 @@ use super::canvas::{Area, DrawError, INK, Pen, QUIET, envelope};
 use super::group::{Group, axis_name};
 use super::panel::{Margins, Panel};
 use super::{Figure, Report, ReportError};
-use crate::calibration::{Epoch, Outcome};
 use crate::calibration::ParameterVector;
+use crate::calibration::{Epoch, Outcome};
 
 const POINTS: usize = 200;
 const COLUMNS: usize = 3;

@@ -22,7 +22,12 @@ pub(super) fn run(run: &Run, aiding: Aiding) -> Markup {
     let text = |name: &str, value: String| (name.to_owned(), value);
     let imu = &run.recording.imu;
     let mut rows = vec![text("run", run.recording.name.clone())];
-    rows.extend(run.recording.meta.iter().map(|(k, v)| (k.clone(), v.clone())));
+    rows.extend(
+        run.recording
+            .meta
+            .iter()
+            .map(|(k, v)| (k.clone(), v.clone())),
+    );
     rows.push(text(
         "site",
         format!(

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::number::{sigma, three_digits, value};
-use crate::calibration::{AuxiliaryKind, Auxiliary, auxiliary_name};
-use crate::imu::Term;
 use crate::calibration::ErrorTerm;
 use crate::calibration::result::TermRecord;
+use crate::calibration::{Auxiliary, AuxiliaryKind, auxiliary_name};
+use crate::imu::Term;
 use crate::units::ARCSEC;
 
 /// One constant, each number as it is shown.

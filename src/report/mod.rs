@@ -40,14 +40,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::calibration::{Estimate, Outcome, to_vector};
 use crate::calibration::ParameterVector;
+use crate::calibration::result::TermRecord;
 use crate::calibration::{ErrorTermTest, Finding, Quality};
+use crate::calibration::{Estimate, Outcome, to_vector};
+use crate::imu::BodyFrame;
 use crate::imu::{PerSensor, Triad};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Run};
-use crate::calibration::result::TermRecord;
-use crate::imu::BodyFrame;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the

@@ -18,9 +18,9 @@ use super::page::{document as html_document, drawn};
 use super::side_by_side::Table;
 use super::{ReportError, facts, number, terminal, write_files};
 use crate::attitude::to_pitch_roll_heading;
-use crate::imu::Sensor;
 use crate::imu::BodyFrame;
-use crate::study::navigation::{INTERVAL, Mission, Epoch, Motion};
+use crate::imu::Sensor;
+use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion};
 use crate::units::{DEGREE, NAUTICAL_MILE};
 use quantity::Quantity;
 

@@ -11,14 +11,12 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{ClosedForm, Navigated, Report};
 use crate::attitude;
 use crate::calibration::AttitudePrior;
+use crate::calibration::result::TermRecord;
 use crate::calibration::*;
-use crate::calibration::{
-    PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
-};
 use crate::calibration::{Direction, Linearisation, Observability, Part};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::earth::Site;
 use crate::imu::*;
-use crate::calibration::result::TermRecord;
 use crate::recording::{ImuSamples, TableLog};
 use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::study::navigation::Mission;
@@ -195,7 +193,9 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         let (sensor, p) = sensor_and_parameter(i);
         run.instrument.prior.get(sensor).sigma(form)[p]
     });
-    let prior_mean = to_vector(&PerSensor::from_fn(|s| run.instrument.prior.get(s).mean(form)));
+    let prior_mean = to_vector(&PerSensor::from_fn(|s| {
+        run.instrument.prior.get(s).mean(form)
+    }));
     let final_sigma = ParameterVector::from_fn(|i, _| {
         let (sensor, p) = sensor_and_parameter(i);
         let kind = ParameterKind::ALL

@@ -196,7 +196,12 @@ pub(super) fn passes(outcome: &Outcome) -> Markup {
     let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
         vec![
             (n + 1).to_string(),
-            if pass.feedback { "live, fed back" } else { "held" }.to_owned(),
+            if pass.feedback {
+                "live, fed back"
+            } else {
+                "held"
+            }
+            .to_owned(),
             three_digits(pass.largest_step),
             number::whole(pass.cost),
             count(pass.observations),

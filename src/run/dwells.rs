@@ -9,9 +9,9 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Aiding, Run};
-use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
+use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
 
 /// A stretch of samples during which the instrument stands.
@@ -69,7 +69,13 @@ impl Run {
                 _ => dwells.push(dwell),
             }
         }
-        let unbridged = || self.recording.imu.faults.iter().filter(|fault| !fault.bridged);
+        let unbridged = || {
+            self.recording
+                .imu
+                .faults
+                .iter()
+                .filter(|fault| !fault.bridged)
+        };
         dwells.retain_mut(|dwell| {
             unbridged().for_each(|fault| dwell.leave_out(&fault.samples));
             dwell.samples.len() as f64 * self.recording.imu.period >= SHORTEST

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::earth::Site;
-use crate::imu::{self, TermVector, PerSensor, Sensor};
+use crate::imu::{self, PerSensor, Sensor, TermVector};
 use crate::turntable::Motion;
 
 /// How increments are integrated.
@@ -71,12 +71,7 @@ struct Sensed<'a> {
 }
 
 impl<'a> Sensed<'a> {
-    fn new(
-        motion: &'a Motion,
-        site: &Site,
-        lever_arm: Vector3<f64>,
-        further: TermVector,
-    ) -> Self {
+    fn new(motion: &'a Motion, site: &Site, lever_arm: Vector3<f64>, further: TermVector) -> Self {
         Self {
             motion,
             earth_rate_n: site.earth_rate_n(),
@@ -267,12 +262,7 @@ mod tests {
         let (motion, site) = demo();
         let arm = Vector3::new(0.3, -0.2, 0.1);
         let coarse = true_increments(&motion, &site, &integrator(arm, 4), &TermVector::zeros());
-        let fine = true_increments(
-            &motion,
-            &site,
-            &integrator(arm, 16),
-            &TermVector::zeros(),
-        );
+        let fine = true_increments(&motion, &site, &integrator(arm, 16), &TermVector::zeros());
         for (coarse, fine) in coarse.gyro.iter().zip(&fine.gyro) {
             assert!((coarse - fine).norm() < 1e-14);
         }

@@ -15,11 +15,13 @@ pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 
 use crate::attitude::exp;
-use crate::imu::{Instrument, TermVector, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
+use crate::imu::{
+    Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
+};
 use crate::recording::{ImuSamples, Recording, TableLog};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::turntable::{TABLE_GEOMETRY, TableAccuracy, TableGeometry, Tilts, across, tilts};
 use crate::turntable::{Imperfection, Motion, Moves, TableError};
+use crate::turntable::{TABLE_GEOMETRY, TableAccuracy, TableGeometry, Tilts, across, tilts};
 
 /// A run and what it was made from.
 #[derive(Debug, Clone, PartialEq)]

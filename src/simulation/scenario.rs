@@ -6,14 +6,14 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 use super::Integrator;
+use crate::calibration::ErrorTerm;
+use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, USUAL_TILT, usual_variation};
 use crate::earth::Site;
-use crate::imu::{ANGLES, TermVector, InstallationForm, Output, PerSensor, Sensor, Triad};
+use crate::imu::BodyFrame;
+use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
 use crate::models::{
     self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
-use crate::imu::BodyFrame;
-use crate::calibration::ErrorTerm;
-use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, USUAL_TILT, usual_variation};
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 

@@ -75,7 +75,13 @@ fn the_prior_is_the_draw_s_mean_and_standard_deviation() {
 fn a_position_error_stays_while_the_table_stands_and_is_new_after_each_move() {
     let mut scenario = demo();
     scenario.table.errors.reading = 0.0;
-    let table = scenario.simulate(1, 0).unwrap().run.recording.table.unwrap();
+    let table = scenario
+        .simulate(1, 0)
+        .unwrap()
+        .run
+        .recording
+        .table
+        .unwrap();
     let motion = Motion::new(
         &scenario.table,
         &scenario.path,
@@ -110,10 +116,14 @@ fn level_and_north_errors_move_the_truth_but_not_the_reading() {
     crooked.table.errors.north = 20.0 * ARCSEC;
     crooked.table.errors.nonorthogonality = 3.0 * ARCSEC;
     let [plain, crooked] = [demo(), crooked].map(|scenario| scenario.simulate(1, 0).unwrap());
-    let [read, of_crooked] = [&plain, &crooked].map(|made| made.run.recording.table.as_ref().unwrap());
+    let [read, of_crooked] =
+        [&plain, &crooked].map(|made| made.run.recording.table.as_ref().unwrap());
     assert_eq!(read.attitude, of_crooked.attitude);
-    assert!(!read.geometry.any() && of_crooked.geometry.any());
-    assert_ne!(plain.run.recording.imu.accel, crooked.run.recording.imu.accel);
+    assert!(!plain.run.table.geometry.any() && crooked.run.table.geometry.any());
+    assert_ne!(
+        plain.run.recording.imu.accel,
+        crooked.run.recording.imu.accel
+    );
 }
 
 #[test]
@@ -126,6 +136,7 @@ fn pulses_add_up_to_the_increments_within_a_count() {
     .simulate(1, 0)
     .unwrap()
     .run
+    .recording
     .imu;
     for (counted, integral, pulse) in [
         (&pulses.gyro, &increments.gyro, pulses.pulse.gyro),

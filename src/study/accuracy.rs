@@ -12,12 +12,12 @@ mod trial;
 use rayon::prelude::*;
 
 use super::navigation::NavigationStudyError;
+use crate::calibration::ErrorTerm;
 use crate::calibration::Nis;
+use crate::calibration::{CalibrationError, ErrorTermTest, Group, mean_square_interval};
 use crate::calibration::{PARAMETERS, ParameterVector};
-use crate::calibration::{ErrorTermTest, CalibrationError, Group, mean_square_interval};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
-use crate::calibration::ErrorTerm;
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 

@@ -8,16 +8,16 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{PARAMETERS, ParameterMatrix, parameter};
 use crate::calibration::{Comparison, ComparisonError, Named, compare};
+use crate::calibration::{PARAMETERS, ParameterMatrix, parameter};
 use crate::earth::Site;
+use crate::imu::BodyFrame;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{INPUTS, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorModel, ErrorVector, Height, Increments, NavigationError, NearPole,
     Sensitivity, Solution, Strapdown, Trajectory, Transition, sensed_errors, within_reach,
 };
-use crate::imu::BodyFrame;
 use course::Course;
 
 pub use outlook::Outlook;

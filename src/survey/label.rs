@@ -86,7 +86,8 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
     match segment.motion {
         None => Verdict::Unknown,
         Some(LabelledMotion::Stands { up }) => {
-            let force = mean(run, &Dwell::of_segment(segment), Sensor::Accel) - run.instrument.prior.accel.bias;
+            let force = mean(run, &Dwell::of_segment(segment), Sensor::Accel)
+                - run.instrument.prior.accel.bias;
             Verdict::Position {
                 off: force.angle(&up),
                 moving: moving(run, rests, &samples),

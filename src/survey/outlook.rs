@@ -1,9 +1,9 @@
 //! What each method could see of the instrument.
 
-use crate::calibration::{Estimate, OBSERVED_BELOW, Options, Problem, parameter_name};
 use crate::calibration::sensor_and_parameter;
 use crate::calibration::{CalibrationError, Group, bound, coarse_start, six_position};
-use crate::imu::{TermVector, InstallationForm};
+use crate::calibration::{Estimate, OBSERVED_BELOW, Options, Problem, parameter_name};
+use crate::imu::{InstallationForm, TermVector};
 use crate::run::{Aiding, Run};
 
 /// Forms differ by what the data must say, not by what they can.

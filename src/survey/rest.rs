@@ -61,7 +61,10 @@ impl Rest {
     /// Begin and end, s.
     pub fn times(&self, run: &Run) -> [f64; 2] {
         let samples = &self.dwell.samples;
-        [run.recording.imu.time(samples.start), run.recording.imu.time(samples.end)]
+        [
+            run.recording.imu.time(samples.start),
+            run.recording.imu.time(samples.end),
+        ]
     }
 
     /// Angle between gravity as the accelerometers see it and as the table holds the instrument, rad.

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
 use turncal::formats::export::HEADER;
 use turncal::imu::{FurtherVector, Output, PerSensor, Sensor, Term};
-use turncal::calibration::result::{TermRecord, TriadRecord};
-use turncal::calibration::result::Calibration;
 use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};

@@ -1,11 +1,11 @@
 //! What blocks of states explain: the data ask for the right one.
 
 use rayon::prelude::*;
+use turncal::calibration::StateBlock;
 use turncal::calibration::{
     BlockEffect, CalibrationError, Outcome, batch_estimate, block_effects, estimate,
 };
 use turncal::imu::{InstallationForm, Term};
-use turncal::calibration::StateBlock;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
 

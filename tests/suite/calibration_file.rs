@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::imu::PerSensor;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::TriadRecord;
+use turncal::imu::PerSensor;
 
 pub const ALIGNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 

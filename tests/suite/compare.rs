@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use turncal::imu::PerSensor;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::TermRecord;
+use turncal::imu::PerSensor;
 
 use crate::calibration_file::{record, written};
 

@@ -7,10 +7,10 @@ use std::process;
 
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{BodyFrame, TermRecord, TestVector, TriadRecord};
 use turncal::formats::export::{Exported, Format, write};
 use turncal::imu::{Instability, Noise, Nominal, PerSensor};
-use turncal::calibration::result::{BodyFrame, TermRecord, TestVector, TriadRecord};
-use turncal::calibration::result::Calibration;
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
 
@@ -135,7 +135,10 @@ fn the_c_header_compiles_without_a_warning_and_gives_the_test_vectors() {
         ("notes", "*/ int x = ;\n#error \u{2028} in C:\\"),
         ("table", "which??/"),
     ] {
-        record.recording.meta.insert(name.to_owned(), notes.to_owned());
+        record
+            .recording
+            .meta
+            .insert(name.to_owned(), notes.to_owned());
     }
     let root = tempfile::tempdir().unwrap();
     let header = exported(&record, Format::C).text;

@@ -6,8 +6,8 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use turncal::calibration::{CalibrationError, Outcome, estimate};
-use turncal::imu::{InstallationForm, Output, Sensor};
 use turncal::formats::write_run;
+use turncal::imu::{InstallationForm, Output, Sensor};
 use turncal::recording::FaultKind;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
@@ -173,7 +173,8 @@ fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
 
     let run = log.read();
     let of = |kind| {
-        run.recording.imu
+        run.recording
+            .imu
             .faults
             .iter()
             .filter(move |fault| fault.kind == kind)

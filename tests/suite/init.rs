@@ -50,7 +50,9 @@ fn raw(run: &Run, sensor: Sensor, k: usize) -> [f64; 3] {
         Sensor::Gyro => &run.recording.imu.gyro,
         Sensor::Accel => &run.recording.imu.accel,
     };
-    samples[k].component_mul(&run.instrument.nominal.get(sensor).0).into()
+    samples[k]
+        .component_mul(&run.instrument.nominal.get(sensor).0)
+        .into()
 }
 
 #[test]
@@ -102,8 +104,8 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
                 "{name} {found_scale} {given_scale}"
             );
             for k in [0, 1000, 5000] {
-                let [found, given] =
-                    [&found, &given].map(|run| raw(run, sensor, k).map(|v| v / run.recording.imu.period));
+                let [found, given] = [&found, &given]
+                    .map(|run| raw(run, sensor, k).map(|v| v / run.recording.imu.period));
                 let same = found
                     .iter()
                     .zip(given)

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use serde_json::Value;
-use turncal::imu::InstallationForm;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::TriadRecord;
+use turncal::imu::InstallationForm;
 
 use crate::calibration_file::{record, written};
 use crate::shared::shared;

@@ -7,8 +7,8 @@ use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::attitude::exp;
 use turncal::calibration::{Observation, to_vector};
-use turncal::calibration::{PARAMETERS, ParameterVector};
 use turncal::calibration::{Outcome, estimate};
+use turncal::calibration::{PARAMETERS, ParameterVector};
 use turncal::imu::InstallationForm;
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
@@ -35,7 +35,8 @@ fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng)
 /// none.
 fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
     // What a velocity is known to after a stretch: the walk since the last one, and a pulse's share.
-    let variance = run.instrument.noise.accel.random_walk.powi(2) * 0.1 + run.recording.imu.pulse.accel.powi(2) / 12.0;
+    let variance = run.instrument.noise.accel.random_walk.powi(2) * 0.1
+        + run.recording.imu.pulse.accel.powi(2) / 12.0;
     let velocity = direction(rng) * (SIZE * variance.sqrt());
     run.recording.imu.accel[sample] += velocity;
     run.recording.imu.accel[sample + 1] -= velocity;

@@ -1,10 +1,10 @@
 //! Records that other programs made, with known truth.
 
-use turncal::calibration::to_vector;
 use turncal::calibration::PARAMETERS;
+use turncal::calibration::result::Calibration;
+use turncal::calibration::to_vector;
 use turncal::calibration::{Outcome, estimate, triads_of};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
-use turncal::calibration::result::Calibration;
 use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 use crate::shared::{read, shared};

@@ -2,14 +2,14 @@
 
 use nalgebra::SMatrix;
 use rayon::prelude::*;
+use turncal::calibration::StateBlock;
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
 use turncal::calibration::to_vector;
 use turncal::calibration::{Outcome, estimate, mean_square_interval};
 use turncal::imu::{FURTHER, FurtherVector, InstallationForm, Term};
-use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
-use turncal::calibration::StateBlock;
-use turncal::calibration::result::Calibration;
-use turncal::turntable::TABLE_GEOMETRY;
 use turncal::simulation::{Scenario, Simulated};
+use turncal::turntable::TABLE_GEOMETRY;
 
 use crate::shared::{read, shared};
 

@@ -3,11 +3,11 @@
 use nalgebra::{SVector, Vector3};
 use turncal::calibration::{Outcome, estimate};
 use turncal::earth::Site;
+use turncal::imu::BodyFrame;
 use turncal::imu::{
     InstallationForm, Output, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Triad,
 };
 use turncal::models::{InstallationModel, Instrument, Place};
-use turncal::imu::BodyFrame;
 use turncal::simulation::{Given, Scenario, Simulated};
 use turncal::units::{ARCSEC, DEGREE, PPM};
 
@@ -66,7 +66,10 @@ fn dwells_are_found_in_the_instruments_own_record_where_the_table_has_them() {
             assert!(imu.samples.start >= begin, "{name}: {imu:?} {table:?}");
             assert!(imu.samples.end <= table.samples.end + margin, "{name}");
             let lost = table.samples.len() as f64 - imu.samples.len() as f64;
-            assert!(lost * run.recording.imu.period < 1.5, "{name}: {imu:?} {table:?}");
+            assert!(
+                lost * run.recording.imu.period < 1.5,
+                "{name}: {imu:?} {table:?}"
+            );
         }
     }
 }
@@ -94,7 +97,10 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
             ..Given::default()
         });
         let mut run = without_table(&scenario, 0).run;
-        for prior in [&mut run.instrument.prior.gyro, &mut run.instrument.prior.accel] {
+        for prior in [
+            &mut run.instrument.prior.gyro,
+            &mut run.instrument.prior.accel,
+        ] {
             prior.scale_sigma = Vector3::repeat(200.0 * PPM);
             prior.installation_sigma = Vector3::repeat(200.0 * ARCSEC);
         }

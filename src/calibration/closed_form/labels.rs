@@ -66,7 +66,12 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
     }
     let undetermined = |sensor| CalibrationError::TooFewSections {
         sensor,
-        labels: run.recording.segments.iter().map(|s| s.label.clone()).collect(),
+        labels: run
+            .recording
+            .segments
+            .iter()
+            .map(|s| s.label.clone())
+            .collect(),
     };
     let estimate = both_triads(&positions, model.form).map_err(undetermined)?;
     let mut findings = remarks(model, &estimate, Reference::Labels);
@@ -132,7 +137,7 @@ mod tests {
     use super::*;
     use crate::attitude::exp;
     use crate::calibration::mean_square_interval;
-    use crate::imu::{ParameterKind, Triad, TriadVector};
+    use crate::imu::{InstallationForm, ParameterKind, Triad, TriadVector};
     use crate::units::DEGREE;
 
     /// Squared errors over variances of scale factors, installation and biases, from this many sets of

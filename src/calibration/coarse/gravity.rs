@@ -15,9 +15,7 @@ use crate::imu::{PARAMETERS, PerSensor, Sensor, Triad};
 ///
 /// Source: Skog and Händel 2006, "Calibration of a MEMS inertial measurement unit", XVII IMEKO World
 /// Congress, §3.
-pub(super) fn accelerometers(
-    problem: &Problem,
-) -> Result<PerSensor<Triad>, CalibrationError> {
+pub(super) fn accelerometers(problem: &Problem) -> Result<PerSensor<Triad>, CalibrationError> {
     let model = &problem.model;
     let prior = from_vector(model.form, &model.prior_mean);
     gauss_newton(prior, |triads| {

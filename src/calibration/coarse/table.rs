@@ -13,8 +13,6 @@ use crate::attitude::log;
 use crate::imu::{PerSensor, Sensor, Triad};
 use crate::navigation::{Block, Navigator, State};
 
-
-
 /// Both triads from the table's attitude alone: over each dwell the velocity must stay zero and the
 /// attitude must stay; over each turn between two dwells the gyros must turn by what the table says.
 /// The prior ties down what these do not see.

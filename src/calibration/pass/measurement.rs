@@ -41,7 +41,10 @@ impl Measurement {
         let residual = -log(&(computed.attitude * reading.transpose()));
         let mut measurement = Self::of(ATTITUDE, residual, variance);
         for (axis, row) in measurement.rows.iter_mut().enumerate() {
-            let errors = layout.table_position().into_iter().chain(layout.table_base());
+            let errors = layout
+                .table_position()
+                .into_iter()
+                .chain(layout.table_base());
             row.extend(errors.map(|first| (first + axis, -1.0)));
             if let Some(tilts) = tilts {
                 let of_tilts = layout.table_tilts();

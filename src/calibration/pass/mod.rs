@@ -405,11 +405,7 @@ impl Sums {
         }
     }
 
-    fn result(
-        self,
-        prior_sigma: AuxiliaryVector,
-        earlier: &[InitialAttitude],
-    ) -> PassResult {
+    fn result(self, prior_sigma: AuxiliaryVector, earlier: &[InitialAttitude]) -> PassResult {
         let filter = &self.filter;
         let form = self.at.triads.gyro.form;
         let errors = earlier.iter().map(|attitude| attitude.smoothed(filter));
@@ -447,11 +443,7 @@ impl Sums {
 }
 
 /// Estimates of error terms and table, those of terms off `at` where the pass linearises.
-fn auxiliary(
-    filter: &Filter,
-    at: &TermVector,
-    prior_sigma: AuxiliaryVector,
-) -> Auxiliary {
+fn auxiliary(filter: &Filter, at: &TermVector, prior_sigma: AuxiliaryVector) -> Auxiliary {
     let layout = &filter.layout;
     let mut auxiliary = Auxiliary {
         prior_sigma,
@@ -500,7 +492,10 @@ impl InitialAttitude {
         };
         let initial = filter.layout.initial_attitude();
         let n = states.len();
-        let sigma: Vec<f64> = states.iter().map(|&s| filter.covariance(s, s).sqrt()).collect();
+        let sigma: Vec<f64> = states
+            .iter()
+            .map(|&s| filter.covariance(s, s).sqrt())
+            .collect();
         let correlation = DMatrix::from_fn(n, n, |i, j| {
             filter.covariance(states[i], states[j]) / (sigma[i] * sigma[j])
         });
@@ -522,7 +517,9 @@ impl InitialAttitude {
 
     fn smoothed(&self, last: &Filter) -> Vector3<f64> {
         let states = last.layout.shared();
-        let change = states.zip(&self.shared).map(|(s, then)| last.mean(s) - then);
+        let change = states
+            .zip(&self.shared)
+            .map(|(s, then)| last.mean(s) - then);
         let change = DVector::from_iterator(self.shared.len(), change);
         let moved = &self.gain * change;
         self.error + Vector3::from_fn(|axis, _| moved[axis])

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use clap::error::ErrorKind;
+use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
-use turncal::imu::BodyFrame;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::name::Name;
 use super::units::offset;
-use crate::imu::{PerSensor, Sensor};
 use crate::formats::Sheet;
+use crate::imu::{PerSensor, Sensor};
 use crate::statistics::median;
 
 /// Columns by their place in the file.

@@ -12,8 +12,8 @@ mod units;
 
 use std::path::Path;
 
-use crate::imu::{PerSensor, Sensor};
 use crate::formats::{FileError, Sheet};
+use crate::imu::{PerSensor, Sensor};
 use columns::Columns;
 use motion::Motion;
 use time::Clock;

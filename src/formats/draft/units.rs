@@ -6,8 +6,8 @@ use super::columns::Columns;
 use super::motion::Motion;
 use super::name::{self, Name};
 use super::time::Clock;
-use crate::imu::{Output, PerSensor, Sensor};
 use crate::formats::Sheet;
+use crate::imu::{Output, PerSensor, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 
 /// Gravity at rest tells units that differ by more than this factor: raw sensors are off by tenths.

@@ -10,8 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Exported;
 use super::source::{Document, Normalised, Source, divide, yaml_list, yaml_number};
-use crate::imu::{PerSensor, Sensor};
 use crate::calibration::result::TriadRecord;
+use crate::imu::{PerSensor, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, PPM};
 
 /// One milligal in m/s².

@@ -3,12 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Exported;
-use crate::calibration::{Correction, CorrectionError};
-use crate::imu::{PerSensor, Sensor, Term};
-use crate::calibration::result::{EQUATION, Method};
-use crate::run::Aiding;
 use crate::calibration::result::Calibration;
+use crate::calibration::result::{EQUATION, Method};
+use crate::calibration::{Correction, CorrectionError};
 use crate::formats::unit_scale;
+use crate::imu::{PerSensor, Sensor, Term};
+use crate::run::Aiding;
 use crate::run::Run;
 
 /// A calibration and, perhaps, a run of its instrument.
@@ -27,10 +27,7 @@ pub(super) struct Normalised {
 }
 
 impl<'a> Source<'a> {
-    pub fn new(
-        record: &'a Calibration,
-        run: Option<&'a Run>,
-    ) -> Result<Self, CorrectionError> {
+    pub fn new(record: &'a Calibration, run: Option<&'a Run>) -> Result<Self, CorrectionError> {
         let correction = match run {
             Some(run) => Correction::for_run(record, run)?,
             None => Correction::of_record(record)?,

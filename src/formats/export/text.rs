@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::Exported;
 use super::source::{Document, Source, si_unit};
-use crate::imu::{AXES, TERM_PARAMETERS, Sensor, Term};
 use crate::calibration::result::TriadRecord;
+use crate::imu::{AXES, Sensor, TERM_PARAMETERS, Term};
 
 pub(super) fn write(source: &Source) -> Exported {
     let covariance = "covariance of the parameters; it is in calibration.json".to_owned();

@@ -1,6 +1,6 @@
 use super::*;
 use crate::attitude::log;
-use crate::imu::{TERM_PARAMETERS, InstallationForm, PARAMETERS, Term, TriadVector};
+use crate::imu::{InstallationForm, PARAMETERS, TERM_PARAMETERS, Term, TriadVector};
 use crate::recording::Bridge;
 use approx::assert_relative_eq;
 use nalgebra::SVector;
@@ -12,21 +12,16 @@ const SAMPLES: usize = 10;
 /// Turning about a wandering axis at about 30°/s while gravity is sensed.
 fn record() -> ImuSamples {
     let t = |k: usize| k as f64 * PERIOD;
-    ImuSamples {
-        start: 0.0,
-        period: PERIOD,
-        continuous: true,
-        gyro: (0..SAMPLES)
+    ImuSamples::made(
+        0.0,
+        PERIOD,
+        (0..SAMPLES)
             .map(|k| Vector3::new(0.5, 0.3 * t(k), -0.2) * PERIOD)
             .collect(),
-        accel: (0..SAMPLES)
+        (0..SAMPLES)
             .map(|k| Vector3::new(1.0, -2.0 * t(k), 9.6) * PERIOD)
             .collect(),
-        pulse: PerSensor::default(),
-        faults: Vec::new(),
-        bridges: Vec::new(),
-        log: None,
-    }
+    )
 }
 
 fn site() -> Site {
@@ -147,21 +142,21 @@ fn transition_of_further_parameters_is_the_derivative_of_navigation() {
             .advance(0..SAMPLES)
     };
     let nominal = with(TermVector::zeros());
-    assert_eq!(nominal.further.len(), TERM_PARAMETERS);
-    for further in &nominal.further {
+    assert_eq!(nominal.terms.len(), TERM_PARAMETERS);
+    for term in &nominal.terms {
         let mut step = TermVector::zeros();
-        step[further.parameter] = 1e-6;
+        step[term.parameter] = 1e-6;
         // δq is true − estimated, so the computed parameter goes the other way.
         let shifted = |sign: f64| error(&with(-step * sign).state, &nominal.state);
         let difference = (shifted(1.0) - shifted(-1.0)) / 2e-6;
         let scale = difference.norm().max(1e-3);
         assert_relative_eq!(
-            further.column.rows(0, 6).into_owned(),
+            term.column.rows(0, 6).into_owned(),
             difference.rows(0, 6).into_owned(),
             epsilon = 1e-3 * scale
         );
         assert_relative_eq!(
-            further.column.rows(6, 3).into_owned(),
+            term.column.rows(6, 3).into_owned(),
             difference.rows(6, 3).into_owned(),
             epsilon = 0.05 * scale
         );

@@ -153,7 +153,11 @@ pub(super) fn document<'a>(report: &CheckReport<'a>) -> impl Serialize + use<'a>
         rate_hz: imu.period.recip(),
         duration_s: imu.duration(),
         continuous: imu.continuous,
-        table_readings: run.recording.table.as_ref().map_or(0, |table| table.time.len()),
+        table_readings: run
+            .recording
+            .table
+            .as_ref()
+            .map_or(0, |table| table.time.len()),
         unit: &run.instrument.unit,
         log: log(report),
         faults: imu

@@ -2,10 +2,10 @@
 
 use super::{Comparison, FLAGGED, NONE, Table};
 use crate::calibration::Canonical;
+use crate::calibration::result::TermRecord;
 use crate::calibration::{AUXILIARY, AuxiliaryKind, auxiliary_name};
 use crate::report::further::unit;
 use crate::report::number::{sigma, three_digits, value};
-use crate::calibration::result::TermRecord;
 
 /// The constants that any calibration has; none if none has any.
 pub(super) fn table(comparison: &Comparison) -> Option<Table> {

@@ -4,7 +4,12 @@ use super::*;
 fn every_embedded_scenario_makes_a_run_as_long_as_its_path() {
     for name in models::names(Room::Scenario) {
         let scenario = Scenario::load(name).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let imu = scenario.simulate(scenario.seed, 0).unwrap().run.recording.imu;
+        let imu = scenario
+            .simulate(scenario.seed, 0)
+            .unwrap()
+            .run
+            .recording
+            .imu;
         let missing = scenario.duration().unwrap() - imu.duration();
         assert!(
             (-1e-6..imu.period).contains(&missing),

@@ -4,7 +4,7 @@
 use super::StudyError;
 use crate::calibration::ParameterVector;
 use crate::calibration::{Options, Problem};
-use crate::calibration::{in_body_frame, in_general_form, to_vector, six_position_of};
+use crate::calibration::{in_body_frame, in_general_form, six_position_of, to_vector};
 use crate::imu::InstallationForm;
 use crate::models::{self, ModelError, Place};
 use crate::run::Dwell;

@@ -2,8 +2,8 @@
 
 use super::figures::rms;
 use super::trial::{Filtered, Trial};
-use crate::calibration::{AUXILIARY, AuxiliaryKind, AuxiliaryVector};
 use crate::calibration::ErrorTerm;
+use crate::calibration::{AUXILIARY, AuxiliaryKind, AuxiliaryVector};
 use crate::study::Ratio;
 
 /// Figures of one block of constants, RMS over them and all runs, in rad or SI.

@@ -3,17 +3,17 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::{AccuracyStudy, Baseline, StudyError};
-use crate::calibration::{Options, Problem};
-use crate::run::Aiding;
 use crate::calibration::{AUXILIARY, AuxiliaryVector, auxiliary_vector};
 use crate::calibration::{Epoch, Nis, from_vector, to_vector};
-use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::calibration::{
-    ErrorTermTest, Estimate, FormTest, Nees, Outcome, test_error_terms, bound, estimate,
-    in_general_form, nees,
+    ErrorTermTest, Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
+    test_error_terms,
 };
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::calibration::{Options, Problem};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::BodyFrame;
+use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::run::Aiding;
 
 /// One run. Errors are estimate less truth; everything is in the general form.
 #[derive(Debug, Clone)]

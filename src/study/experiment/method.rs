@@ -1,10 +1,10 @@
 //! The methods, and what each makes of an instrument.
 
 use super::{ExperimentError, HOUR_PATH, POSITIONS};
-use crate::calibration::{Options, Problem};
 use crate::calibration::to_vector;
-use crate::calibration::{ParameterMatrix, ParameterVector};
 use crate::calibration::{Estimate, estimate, in_general_form, six_position};
+use crate::calibration::{Options, Problem};
+use crate::calibration::{ParameterMatrix, ParameterVector};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};

@@ -49,7 +49,8 @@ impl Variances {
             white: each(&|n| n.random_walk.powi(2)),
             wander: each(&|n| n.bias_variation.map_or(0.0, |i| i.sigma.powi(2))),
             correlation_time: each(&|n| {
-                n.bias_variation.map_or(f64::INFINITY, |i| i.correlation_time)
+                n.bias_variation
+                    .map_or(f64::INFINITY, |i| i.correlation_time)
             }),
         }
     }

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use super::budget::Budget;
 use super::*;
 use crate::calibration::ParameterMatrix;
-use crate::calibration::{Group, in_general_form, six_position};
+use crate::calibration::{Group, Options, Problem, in_general_form, six_position};
 use crate::imu::{BiasVariation, Noise};
 use crate::models::{Place, trajectory};
 use crate::study::navigation::Pair;
@@ -36,7 +36,12 @@ fn what_exposure_says_of_a_closed_form_calibration_is_what_nonlinear_navigation_
         let study = study(minutes);
         let scenario = study.scenario.clone().with_path(POSITIONS).unwrap();
         let simulated = scenario.simulate(3, 0).unwrap();
-        let estimate = six_position(&Problem::new(&simulated.run, &Options::default().installation(form))).unwrap().estimate;
+        let estimate = six_position(&Problem::new(
+            &simulated.run,
+            &Options::default().installation(form),
+        ))
+        .unwrap()
+        .estimate;
         let pair = Pair {
             truth: in_general_form(&simulated.truth),
             calibration: estimate.in_general_form().triads,

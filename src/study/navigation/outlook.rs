@@ -60,8 +60,8 @@ impl Mission {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{from_vector, to_vector};
     use crate::calibration::{ParameterMatrix, ParameterVector};
+    use crate::calibration::{from_vector, to_vector};
     use crate::earth::Site;
     use crate::imu::InstallationForm;
     use crate::units::{DEG_PER_H, DEGREE, PPM};

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
 use turncal::imu::{Instability, Noise, Nominal, PerSensor, Prior, Sensor};
-use turncal::recording::{LabelledMotion, Segment};
 use turncal::recording::{ImuSamples, TableLog};
+use turncal::recording::{LabelledMotion, Segment};
 use turncal::run::{Run, Standstill};
 use turncal::units::DEGREE;
 

@@ -4,10 +4,10 @@ use std::fs;
 
 use nalgebra::Vector3;
 use turncal::attitude;
-use turncal::imu::Output;
-use turncal::formats::write_run;
-use turncal::recording::LabelledMotion;
 use turncal::calibration::result::Calibration;
+use turncal::formats::write_run;
+use turncal::imu::Output;
+use turncal::recording::LabelledMotion;
 use turncal::run::Run;
 use turncal::units::DEGREE;
 
@@ -180,7 +180,12 @@ fn what_has_no_effect_yet_is_noted() {
         plain,
     );
     assert_eq!(run.recording.notes.len(), 2);
-    for (note, word) in run.recording.notes.iter().zip(["temperature", "time_sigma"]) {
+    for (note, word) in run
+        .recording
+        .notes
+        .iter()
+        .zip(["temperature", "time_sigma"])
+    {
         assert!(
             note.contains(word) && note.contains("no effect yet"),
             "{note}"

@@ -3,10 +3,12 @@
 use std::fs;
 
 use nalgebra::Vector3;
-use turncal::imu::{InstallationForm, Nominal, Output, PerSensor};
-use turncal::calibration::result::{Aiding, BodyFrame, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord};
-use turncal::formats::write_run;
 use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{
+    Aiding, BodyFrame, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
+};
+use turncal::formats::write_run;
+use turncal::imu::{InstallationForm, Nominal, Output, PerSensor};
 use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
 
 use super::made::{assert_same, made_run};
@@ -29,10 +31,7 @@ fn increments_and_rates_come_back_as_they_went() {
     fs::create_dir(&place).unwrap();
     write_run(&place, &run, Output::Increment, Some(&truth)).unwrap();
     assert_same(&run, &read(&place));
-    assert_eq!(
-        Calibration::read(&place.join("truth.json")),
-        Ok(truth)
-    );
+    assert_eq!(Calibration::read(&place.join("truth.json")), Ok(truth));
 
     run.recording.name = "rates".to_owned();
     run.instrument.unit = PerSensor {
@@ -84,7 +83,9 @@ fn a_run_that_could_not_be_read_is_not_written() {
     let error = write_run(directory.path(), &made_run("x"), Output::Pulse, None).unwrap_err();
     assert!(error.to_string().contains("gyro_unit = `rad`"), "{error}");
     let mut run = made_run("x");
-    run.recording.meta.insert("weather".to_owned(), "fine".to_owned());
+    run.recording
+        .meta
+        .insert("weather".to_owned(), "fine".to_owned());
     let error = write_run(directory.path(), &run, Output::Increment, None).unwrap_err();
     assert!(error.to_string().contains("weather"), "{error}");
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
@@ -134,7 +135,10 @@ fn a_calibration_comes_back_as_it_went() {
         raw: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
         calibrated: [0.1; 6],
     }];
-    record.recording.meta.insert("serial".to_owned(), "7".to_owned());
+    record
+        .recording
+        .meta
+        .insert("serial".to_owned(), "7".to_owned());
 
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.json");

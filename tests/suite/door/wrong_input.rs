@@ -114,7 +114,11 @@ fn the_run_that_the_cases_spoil_is_good() {
     good_run(directory.path());
     let run = Run::read(&directory.path().join("run.toml")).unwrap();
     assert_eq!(
-        (run.recording.imu.len(), run.recording.imu.start, run.recording.imu.period),
+        (
+            run.recording.imu.len(),
+            run.recording.imu.start,
+            run.recording.imu.period
+        ),
         (200, 0.0, 0.01)
     );
     assert!(run.recording.notes.is_empty());
