@@ -94,6 +94,10 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
     }
     let held_out = by_filter.held_out.unwrap();
     println!("{held_out:?}");
+    // Every other dwell and its turn.
+    let half = by_filter.all.gravity.count / 2;
+    assert_eq!(held_out.gravity.count, half);
+    assert!(held_out.gravity.rms != by_filter.all.gravity.rms);
     assert!(held_out.gravity.rms < 0.51 * MILLI_G);
     assert!(held_out.direction.rms < 0.645 * DEGREE);
 }
