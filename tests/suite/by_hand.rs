@@ -122,7 +122,10 @@ fn errors_of_scale_show_in_gravity_and_in_turns_by_their_size() {
         triad.scale.component_mul_assign(&size);
         triad
     });
-    let all = spoilt.quality(&run).unwrap().all;
+    let judged = spoilt.quality(&run).unwrap();
+    // What is held out is judged by a calibration of its own, which is not spoilt.
+    assert_eq!(judged.held_out, quality.held_out);
+    let all = judged.all;
     let expected = wrong * run.site.gravity;
     assert!((all.gravity.rms / expected - 1.0).abs() < 0.02, "{all:?}");
     assert!(

@@ -160,7 +160,7 @@ fn wrong_usage_is_status_two_and_names_the_way() {
         ),
         (&["simulate", "demo"], "--output <DIR>"),
         (&["dance"], "unrecognized subcommand 'dance'"),
-        (&["demo", "--seed", "many"], "'many' for '--seed <N>'"),
+        (&["demo", "--seed", "many"], "'many' for '--seed <SEED>'"),
     ] {
         let refused = turncal().args(arguments).assert().code(2).stdout("");
         let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();

@@ -58,10 +58,13 @@ fn an_experiment_is_reported_whole() {
             // Three methods of the closed form, which is not compared with itself.
             let gain = &method["closed_form_over_ekf"];
             assert_eq!(gain.is_null(), place < 3);
-            if place >= 3 {
-                let of_closed_form = methods.iter().take(3);
-                let same_form = of_closed_form.filter(|m| m["installation_form"] == method["installation_form"]);
-                println!("{method} {:?}", same_form.collect::<Vec<_>>());
+            if let Some(gain) = gain.as_f64() {
+                let mut closed_forms = methods[..3].iter();
+                let form = &method["installation_form"];
+                let closed_form = closed_forms.find(|m| &m["installation_form"] == form);
+                let median = &closed_form.unwrap()["position_nmile"]["median"];
+                let expected = median.as_f64().unwrap() / number("median");
+                assert!((gain / expected - 1.0).abs() < 1e-9, "{gain} {expected}");
             }
         }
     }
