@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn instability_keeps_its_stationary_sigma() {
+    fn instability_keeps_its_stationary_sigma_and_forgets_with_its_correlation_time() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let bias_variation = BiasVariation {
             sigma: 3.0,
@@ -140,10 +140,19 @@ mod tests {
         };
         let mut source = NoiseSource::new(noise, 0.5, &mut rng);
         let draws = 40_000;
-        let mean_square = (0..draws)
-            .map(|_| (source.draw(&mut rng) / 0.5).norm_squared() / 3.0)
-            .sum::<f64>()
-            / f64::from(draws);
-        assert!((mean_square / 9.0 - 1.0).abs() < 0.05);
+        let drift: Vec<Vector3<f64>> = (0..draws).map(|_| source.draw(&mut rng) / 0.5).collect();
+        let mean_product = |lag: usize| {
+            let pairs = drift.iter().zip(&drift[lag..]);
+            pairs.map(|(a, b)| a.dot(b)).sum::<f64>() / (3 * (drift.len() - lag)) as f64
+        };
+        assert!((mean_product(0) / 9.0 - 1.0).abs() < 0.05);
+        for lag in [1, 2, 4] {
+            let correlation = mean_product(lag) / mean_product(0);
+            let expected = (-0.5 * lag as f64).exp();
+            assert!(
+                (correlation - expected).abs() < 0.03,
+                "{lag}: {correlation}"
+            );
+        }
     }
 }

@@ -94,6 +94,10 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
     }
     let held_out = by_filter.held_out.unwrap();
     println!("{held_out:?}");
+    // Every other dwell and its turn.
+    let half = by_filter.all.gravity.count / 2;
+    assert_eq!(held_out.gravity.count, half);
+    assert!(held_out.gravity.rms != by_filter.all.gravity.rms);
     assert!(held_out.gravity.rms < 0.51 * MILLI_G);
     assert!(held_out.direction.rms < 0.645 * DEGREE);
 }
@@ -118,7 +122,10 @@ fn errors_of_scale_show_in_gravity_and_in_turns_by_their_size() {
         triad.scale.component_mul_assign(&size);
         triad
     });
-    let all = spoilt.quality(&run).unwrap().all;
+    let judged = spoilt.quality(&run).unwrap();
+    // What is held out is judged by a calibration of its own, which is not spoilt.
+    assert_eq!(judged.held_out, quality.held_out);
+    let all = judged.all;
     let expected = wrong * run.site.gravity;
     assert!((all.gravity.rms / expected - 1.0).abs() < 0.02, "{all:?}");
     assert!(

@@ -94,6 +94,21 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
             assert!((covariance / variance - 1.0).abs() < 1e-12, "{name}");
         }
         let correction = record.correction.unwrap();
+        for (triad, matrix) in [
+            (&record.gyro, correction.gyro),
+            (&record.accel, correction.accel),
+        ] {
+            // Its inverse is K C, whichever way round it was meant.
+            for i in 0..3 {
+                for j in 0..3 {
+                    let product: f64 = (0..3)
+                        .map(|k| matrix[i][k] * triad.scale[k] * triad.installation[k][j])
+                        .sum();
+                    let expected = f64::from(u8::from(i == j));
+                    assert!((product - expected).abs() < 1e-12, "{i} {j}: {product}");
+                }
+            }
+        }
         for vector in &record.test_vectors {
             // u = correction (N − bias), as a user would write it.
             for (triad, matrix, first) in [
@@ -137,14 +152,21 @@ fn an_existing_output_is_kept_unless_forced() {
 
 #[test]
 fn wrong_usage_is_status_two_and_names_the_way() {
-    for arguments in [
-        &["calibrate"][..],
-        &["calibrate", "run.toml", "--installation", "four-angle"],
-        &["simulate", "demo"],
-        &["dance"],
-        &["demo", "--seed", "many"],
+    for (arguments, way) in [
+        (&["calibrate"][..], "Usage: turncal calibrate <RUN>"),
+        (
+            &["calibrate", "run.toml", "--installation", "four-angle"],
+            "general, six-angle, three-angle",
+        ),
+        (&["simulate", "demo"], "--output <DIR>"),
+        (&["dance"], "unrecognized subcommand 'dance'"),
+        (&["demo", "--seed", "many"], "'many' for '--seed <SEED>'"),
     ] {
-        turncal().args(arguments).assert().code(2);
+        let refused = turncal().args(arguments).assert().code(2).stdout("");
+        let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        for said in [way, "--help"] {
+            assert!(message.contains(said), "no `{said}` in {message}");
+        }
     }
 }
 

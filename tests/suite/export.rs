@@ -16,6 +16,7 @@ use turncal::units::{ARCSEC, DEG_PER_H};
 
 use crate::calibration_file::written;
 use crate::door::made::made_run;
+use crate::shared::skipped;
 
 const INPUTS: [[f64; 6]; 3] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 9.8],
@@ -119,7 +120,7 @@ fn numbers(text: &str) -> Vec<f64> {
 fn of_program(program: &str) -> bool {
     let there = process::Command::new(program).arg("--version").output();
     if there.is_err() {
-        println!("skipped: no {program}");
+        skipped(&format!("no {program}"));
     }
     there.is_ok()
 }

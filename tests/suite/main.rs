@@ -14,6 +14,7 @@ mod export;
 mod faults;
 mod fuzz;
 mod init;
+mod modules;
 mod navigate;
 mod navigation;
 mod observability;

@@ -8,7 +8,6 @@ use turncal::simulation::Scenario;
 use crate::simulated::{Trial, accurate_as_claimed, trial};
 
 const FORM: InstallationForm = InstallationForm::General;
-const RUNS: u64 = 20;
 
 /// What turns about the vertical, with all dwells at one heading, cannot show. The gyros' inputs are
 /// the turn along z and one constant vector of Earth rate, which their biases take up; all
@@ -55,8 +54,18 @@ fn turns_about_one_axis_say_in_words_what_they_did_not_observe() {
 
 #[test]
 fn turns_about_one_axis_invent_nothing_and_get_right_what_they_observe() {
+    about_one_axis(3);
+}
+
+#[test]
+#[ignore = "statistical: 20 runs"]
+fn turns_about_one_axis_invent_nothing_over_many_runs() {
+    about_one_axis(20);
+}
+
+fn about_one_axis(runs: u64) {
     let scenario = Scenario::load("single-axis").unwrap();
-    let trials = accurate_as_claimed(RUNS, |stream| trial(&scenario, stream));
+    let trials = accurate_as_claimed(runs, |stream| trial(&scenario, stream));
     for Trial {
         normalised,
         outcome,

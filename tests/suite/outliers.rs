@@ -15,7 +15,6 @@ use turncal::simulation::{Scenario, Simulated};
 
 /// Fixed before the first run was made.
 const SEED: u64 = 1616;
-const RUNS: u64 = 24;
 /// Size of an outlier in σ of its observation.
 const SIZE: f64 = 20.0;
 /// One in so many.
@@ -59,10 +58,22 @@ fn rejected(outcome: &Outcome, observation: Observation) -> usize {
 }
 
 #[test]
+fn one_outlier_in_a_hundred_costs_little_and_is_rejected() {
+    // Few runs scatter by more than the tenth that many allow.
+    one_outlier_in_a_hundred(3, 1.3);
+}
+
+#[test]
+#[ignore = "statistical: 48 runs"]
 fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
+    one_outlier_in_a_hundred(24, 1.1);
+}
+
+/// RMS errors over so many runs with outliers are below `limit` times those without.
+fn one_outlier_in_a_hundred(runs: u64, limit: f64) {
     let scenario = Scenario::load("demo").unwrap();
     let squares = |spoilt: bool| -> (f64, usize, usize, usize) {
-        (0..RUNS)
+        (0..runs)
             .into_par_iter()
             .map(|stream| {
                 let mut simulated = scenario.simulate(SEED, stream).unwrap();
@@ -99,12 +110,12 @@ fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
     let (spoilt, made, velocity, table) = squares(true);
     let ratio = (spoilt / clean).sqrt();
     println!(
-        "RMS/σ {:.3} clean, {:.3} with outliers, ratio {ratio:.4} over {RUNS} runs; {made} outliers, \
+        "RMS/σ {:.3} clean, {:.3} with outliers, ratio {ratio:.4} over {runs} runs; {made} outliers, \
          rejected {velocity} velocities and {table} readings",
-        (clean / (RUNS as f64 * PARAMETERS as f64)).sqrt(),
-        (spoilt / (RUNS as f64 * PARAMETERS as f64)).sqrt(),
+        (clean / (runs as f64 * PARAMETERS as f64)).sqrt(),
+        (spoilt / (runs as f64 * PARAMETERS as f64)).sqrt(),
     );
-    assert!(ratio < 1.1, "{ratio}");
+    assert!(ratio < limit, "{ratio}");
     let share = (velocity + table) as f64 / made as f64;
     assert!(
         (0.9..1.1).contains(&share),
