@@ -9,7 +9,7 @@ use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
 use turncal::formats::export::HEADER;
-use turncal::imu::{FurtherVector, Output, PerSensor, Sensor, Term};
+use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
@@ -170,7 +170,7 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
     scenario.table.errors = Default::default();
     for term in terms {
         for parameter in term.parameters() {
-            scenario.instrument.further_sigma[parameter] = term.usual_sigma();
+            scenario.instrument.term_sigma[parameter] = term.usual_sigma();
         }
     }
     let simulated = scenario.simulate(3, 0).unwrap();
@@ -187,7 +187,7 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
     let Scenario {
         site, integrator, ..
     } = &scenario;
-    let ideal = true_increments(&motion, site, integrator, &FurtherVector::zeros());
+    let ideal = true_increments(&motion, site, integrator, &TermVector::zeros());
     let largest = |record: &Calibration| {
         let correction = Correction::for_run(record, run).unwrap();
         let period = run.recording.imu.period;
@@ -272,8 +272,8 @@ fn the_calibrated_record_is_a_record_again() {
     fs::write(again.join("run.toml"), toml).unwrap();
     let read = Run::read(&again.join("run.toml")).unwrap();
     let expected = by_hand(&record.gyro, [1.0, 2.0, 3.0]);
-    assert!((read.imu.gyro[50] / 0.01 - expected).amax() < 1e-12);
-    assert_eq!(read.imu.start, 0.0);
+    assert!((read.recording.imu.gyro[50] / 0.01 - expected).amax() < 1e-12);
+    assert_eq!(read.recording.imu.start(), 0.0);
 }
 
 /// A calibration and a log of two rows, both in SI.

@@ -30,7 +30,14 @@ fn difference(run: &Run, outcome: &Outcome) -> (f64, f64) {
 #[test]
 fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
     let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
-    let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(
+            &simulated.run,
+            &Options::default().installation(InstallationForm::General),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     assert!(outcome.converged);
     let (estimate, covariance) = difference(&simulated.run, &outcome);
     assert!(estimate < 1e-6 && covariance < 1e-6);
@@ -41,7 +48,7 @@ fn short() -> Run {
     let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
     run.recording.imu.gyro.truncate(20_000);
     run.recording.imu.accel.truncate(20_000);
-    if let Some(table) = &mut run.table {
+    if let Some(table) = &mut run.recording.table {
         let readings = table.time.partition_point(|&t| t <= 200.0);
         table.time.truncate(readings);
         table.attitude.truncate(readings);
@@ -52,11 +59,18 @@ fn short() -> Run {
 #[test]
 fn it_agrees_on_what_the_gate_leaves_out() {
     let mut run = short();
-    if let Some(table) = &mut run.table {
+    if let Some(table) = &mut run.recording.table {
         let outlier = exp(Vector3::new(0.0, 30.0 * ARCSEC, 0.0));
         table.attitude[300] = outlier * table.attitude[300];
     }
-    let outcome = estimate(&run, InstallationForm::SixAngle, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(
+            &run,
+            &Options::default().installation(InstallationForm::SixAngle),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     assert!(outcome.innovations.iter().any(|i| !i.accepted));
     let (estimate, covariance) = difference(&run, &outcome);
     assert!(estimate < 1e-6 && covariance < 1e-6);
@@ -71,7 +85,14 @@ fn it_agrees_where_gyros_or_table_have_no_error_and_the_problem_fewer_unknowns()
         table.position_sigma = 0.0;
     }
     for run in [quiet, exact] {
-        let outcome = estimate(&run, InstallationForm::General, &|_| {}).unwrap();
+        let outcome = estimate(
+            &Problem::new(
+                &run,
+                &Options::default().installation(InstallationForm::General),
+            ),
+            &|_| {},
+        )
+        .unwrap();
         let (estimate, covariance) = difference(&run, &outcome);
         assert!(estimate < 1e-6 && covariance < 1e-6);
     }

@@ -1,9 +1,9 @@
 //! What blocks of states explain: the data ask for the right one.
 
 use rayon::prelude::*;
-use turncal::calibration::StateBlock;
+use turncal::calibration::ErrorTerm;
 use turncal::calibration::{
-    BlockEffect, CalibrationError, Outcome, batch_estimate, block_effects, estimate,
+    CalibrationError, ErrorTermTest, Outcome, batch_estimate, estimate, test_error_terms,
 };
 use turncal::imu::{InstallationForm, Term};
 use turncal::run::Run;
@@ -11,47 +11,54 @@ use turncal::simulation::Scenario;
 
 /// Fixed before the first run was made.
 const SEED: u64 = 23;
-const ORDER: StateBlock = StateBlock::Term(Term::AccelSecondOrder);
+const ORDER: ErrorTerm = ErrorTerm::Instrument(Term::AccelSecondOrder);
 
-fn calibrated(run: &Run) -> (Outcome, Vec<BlockEffect>) {
-    let outcome = estimate(run, InstallationForm::General, &|_| {}).unwrap();
-    let effects = block_effects(run, &outcome).unwrap();
+fn calibrated(run: &Run) -> (Outcome, Vec<ErrorTermTest>) {
+    let outcome = estimate(
+        &Problem::new(
+            run,
+            &Options::default().installation(InstallationForm::General),
+        ),
+        &|_| {},
+    )
+    .unwrap();
+    let effects = test_error_terms(run, &outcome).unwrap();
     (outcome, effects)
 }
 
 #[test]
 fn the_data_ask_most_for_the_block_whose_errors_they_have_and_for_none_where_there_are_none() {
-    the_data_ask_for(vec![Some(ORDER), Some(StateBlock::TableAxes), None]);
+    the_data_ask_for(vec![Some(ORDER), Some(ErrorTerm::TableAxes), None]);
 }
 
 #[test]
 #[ignore = "statistical: 8 runs"]
 fn the_data_ask_most_for_each_block_whose_errors_they_have() {
-    let all = StateBlock::ALL.into_iter().map(Some);
+    let all = ErrorTerm::ALL.into_iter().map(Some);
     the_data_ask_for(all.collect());
 }
 
 /// For each of these blocks, whose errors are there and not modelled, or none.
-fn the_data_ask_for(all: Vec<Option<StateBlock>>) {
-    let asked = |unmodelled: Option<StateBlock>| {
+fn the_data_ask_for(all: Vec<Option<ErrorTerm>>) {
+    let asked = |unmodelled: Option<ErrorTerm>| {
         let mut scenario = Scenario::load("demo").unwrap();
         if let Some(block) = unmodelled {
-            scenario = scenario.with_block(block);
+            scenario = scenario.with_error_term(block);
         }
         // The usual wandering is not told from white noise within ten minutes; five times as much is.
         let noise = &mut scenario.instrument.noise;
         for noise in [&mut noise.gyro, &mut noise.accel] {
-            if let Some(instability) = &mut noise.instability {
+            if let Some(instability) = &mut noise.bias_variation {
                 instability.sigma *= 5.0;
             }
         }
         let mut run = scenario.simulate(SEED, 0).unwrap().run;
-        for block in StateBlock::ALL {
+        for block in ErrorTerm::ALL {
             run.switch_off(block);
         }
         let (_, effects) = calibrated(&run);
         assert!(effects.iter().all(|effect| !effect.on));
-        let asked = effects.into_iter().filter(BlockEffect::asked_for);
+        let asked = effects.into_iter().filter(ErrorTermTest::asked_for);
         let most = asked.max_by(|a, b| a.gain.total_cmp(&b.gain));
         (unmodelled, most.map(|effect| effect.block))
     };

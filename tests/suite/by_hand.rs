@@ -34,7 +34,8 @@ fn labelled_sections_give_what_another_program_finds_in_them() {
             return;
         };
         let run = read(&directory);
-        let closed_form = six_position(&run, FORM).unwrap();
+        let closed_form =
+            six_position(&Problem::new(&run, &Options::default().installation(FORM))).unwrap();
         assert_eq!(closed_form.reference, Reference::Labels);
         assert_eq!((closed_form.positions.accel, closed_form.turns), (6, 3));
         let record = closed_form.record(&run, &closed_form.quality(&run).unwrap());
@@ -63,10 +64,16 @@ fn sections_laid_end_to_end_are_refused_where_turns_must_be_navigated() {
         return;
     };
     let mut run = read(&directory);
-    let refused = estimate(&run, FORM, &|_| {}).unwrap_err();
+    let refused = estimate(
+        &Problem::new(&run, &Options::default().installation(FORM)),
+        &|_| {},
+    )
+    .unwrap_err();
     assert_eq!(refused, CalibrationError::NotContinuous);
     run.recording.segments.truncate(5);
-    let refused = six_position(&run, FORM).unwrap_err().to_string();
+    let refused = six_position(&Problem::new(&run, &Options::default().installation(FORM)))
+        .unwrap_err()
+        .to_string();
     assert!(
         refused.contains("`y_down`") && refused.contains("each axis up and down"),
         "{refused}"
@@ -79,12 +86,20 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
         return;
     };
     let run = read(&directory);
-    let filtered = estimate(&run, FORM, &|_| {}).unwrap();
+    let filtered = estimate(
+        &Problem::new(&run, &Options::default().installation(FORM)),
+        &|_| {},
+    )
+    .unwrap();
     assert!(filtered.converged);
     let by_filter = filtered.quality(&run).unwrap();
     let mut unlabelled = run.clone();
-    unlabelled.segments.clear();
-    let by_gravity = six_position(&unlabelled, FORM).unwrap();
+    unlabelled.recording.segments.clear();
+    let by_gravity = six_position(&Problem::new(
+        &unlabelled,
+        &Options::default().installation(FORM),
+    ))
+    .unwrap();
     assert_eq!(by_gravity.reference, Reference::Gravity);
     // What imucal leaves over all standstills, and on those that it did not use.
     for all in [by_filter.all, by_gravity.quality(&unlabelled).unwrap().all] {
@@ -106,13 +121,20 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
 fn errors_of_scale_show_in_gravity_and_in_turns_by_their_size() {
     let simulated = Scenario::load("demo").unwrap().simulate(6, 0).unwrap();
     let run = simulated.run;
-    let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(&run, &Options::default().installation(FORM)),
+        &|_| {},
+    )
+    .unwrap();
     let quality = outcome.quality(&run).unwrap();
     // 5 µg/√Hz over 15 s and a bias instability; arc seconds of table and walk.
     assert!(quality.all.gravity.rms < 3.0 * MICRO_G);
     assert!(quality.all.turns.rms < 5.0 / 3600.0 * DEGREE);
     assert!(quality.held_out.unwrap().gravity.rms < 3.0 * MICRO_G);
-    assert_eq!(quality.all.direction.count, run.dwells().len() - 1);
+    assert_eq!(
+        quality.all.direction.count,
+        run.dwells(run.aiding()).len() - 1
+    );
 
     let (wrong, size) = (100e-6, Vector3::repeat(1.0 - 100e-6));
     let mut spoilt = outcome.clone();

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{BodyFrame, TermRecord, TestVector, TriadRecord};
 use turncal::formats::export::{Exported, Format, write};
-use turncal::imu::{Instability, Noise, Nominal, PerSensor};
+use turncal::imu::{BiasVariation, Noise, Nominal, PerSensor};
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
 
@@ -405,7 +405,7 @@ fn run() -> Run {
     };
     run.instrument.noise.gyro = Noise {
         random_walk: 2e-5,
-        instability: Some(Instability {
+        bias_variation: Some(BiasVariation {
             sigma: 4e-7,
             correlation_time: 200.0,
         }),

@@ -222,13 +222,16 @@ path = "path.toml"
 /// Reads a run and does what needs no filter.
 fn read_run(directory: &Path) -> Result<(), String> {
     let mut run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
-    let _ = run.dwells();
+    let _ = run.dwells(run.aiding());
     let _ = Stretch::find(&run, None);
     for without_table in [false, true] {
         if without_table {
-            run.table = None;
+            run.recording.table = None;
         }
-        if let Ok(closed_form) = six_position(&run, InstallationForm::General) {
+        if let Ok(closed_form) = six_position(&Problem::new(
+            &run,
+            &Options::default().installation(InstallationForm::General),
+        )) {
             let _ = closed_form.quality(&run);
         }
     }
@@ -296,9 +299,15 @@ fn runs_whose_figures_make_no_sense_are_calibrated_or_refused() {
         };
         for without_table in [false, true] {
             if without_table {
-                run.table = None;
+                run.recording.table = None;
             }
-            if let Ok(outcome) = estimate(&run, InstallationForm::General, &|_| {}) {
+            if let Ok(outcome) = estimate(
+                &Problem::new(
+                    &run,
+                    &Options::default().installation(InstallationForm::General),
+                ),
+                &|_| {},
+            ) {
                 let _ = outcome.quality(&run);
             }
         }
@@ -353,7 +362,14 @@ fn spoilt_models() {
 fn spoilt_calibrations() {
     let run = small_run();
     let read = Run::read(&run.path().join("run.toml")).unwrap();
-    let outcome = estimate(&read, InstallationForm::General, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(
+            &read,
+            &Options::default().installation(InstallationForm::General),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     let record = outcome.record(&read, &[], &outcome.quality(&read).unwrap());
     let path = run.path().join("calibration.json");
     record.write(&path, false).unwrap();

@@ -25,7 +25,7 @@ fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng) {
-    let table = run.table.as_mut().unwrap();
+    let table = run.recording.table.as_mut().unwrap();
     let turn = exp(direction(rng) * (size * table.reading_sigma));
     table.attitude[reading] = turn * table.attitude[reading];
 }
@@ -42,7 +42,14 @@ fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
-    let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(
+            &simulated.run,
+            &Options::default().installation(InstallationForm::General),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     assert!(outcome.converged);
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
@@ -81,7 +88,7 @@ fn one_outlier_in_a_hundred(runs: u64, limit: f64) {
                 let mut made = 0;
                 if spoilt {
                     let run = &mut simulated.run;
-                    for dwell in run.dwells() {
+                    for dwell in run.dwells(run.aiding()) {
                         for reading in dwell.position.unwrap().readings {
                             if rng.random_bool(1.0 / ONE_IN) {
                                 spoil_reading(run, reading, SIZE, &mut rng);
@@ -131,7 +138,7 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
     // A larger one would still be taken for part of the turn.
     const HIDDEN: f64 = 12.0;
     let run = &mut simulated.run;
-    for dwell in &run.dwells()[1..] {
+    for dwell in &run.dwells(run.aiding())[1..] {
         spoil_reading(
             run,
             dwell.position.as_ref().unwrap().readings.start,
@@ -139,7 +146,7 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
             &mut rng,
         );
     }
-    let dwells = run.dwells();
+    let dwells = run.dwells(run.aiding());
     for dwell in &dwells[1..] {
         jerk(run, dwell.samples.start + 9, &mut rng);
     }

@@ -14,7 +14,14 @@ fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
     let truth = Calibration::read(&directory.join("truth.json")).unwrap();
-    let outcome = estimate(&run, InstallationForm::General, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(
+            &run,
+            &Options::default().installation(InstallationForm::General),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);
     let mut largest = [0f64; 6];

@@ -23,7 +23,14 @@ pub struct Trial {
 
 impl Trial {
     pub fn new(simulated: &Simulated) -> Self {
-        let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+        let outcome = estimate(
+            &Problem::new(
+                &simulated.run,
+                &Options::default().installation(InstallationForm::General),
+            ),
+            &|_| {},
+        )
+        .unwrap();
         let error = outcome.estimate.vector() - to_vector(&simulated.truth);
         let sigma = outcome.estimate.sigma();
         let estimated: Vec<usize> = outcome.estimate.estimated().collect();
@@ -87,8 +94,15 @@ fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
 
     // Not modelled, the same errors are several σ.
     let mut run = scenario.simulate(SEED, 0).unwrap();
-    run.run.table.as_mut().unwrap().geometry = Default::default();
-    let outcome = estimate(&run.run, InstallationForm::General, &|_| {}).unwrap();
+    run.run.recording.table.as_mut().unwrap().geometry = Default::default();
+    let outcome = estimate(
+        &Problem::new(
+            &run.run,
+            &Options::default().installation(InstallationForm::General),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     let error = outcome.estimate.vector() - to_vector(&run.truth);
     let worst = error.component_div(&outcome.estimate.sigma()).amax();
     println!(
@@ -101,7 +115,7 @@ fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
 /// A tactical instrument, whose biases wander by more than the filter's σ without states for them.
 fn with_wandering_biases(runs: u64) {
     let scenario = Scenario::load("two-axis").unwrap();
-    assert!(scenario.instrument.noise.accel.instability.is_some());
+    assert!(scenario.instrument.noise.accel.bias_variation.is_some());
     accurate_as_claimed(runs, |stream| trial(&scenario, stream));
 }
 
@@ -188,7 +202,11 @@ fn the_filter_knows_the_form_of_an_instrument_that_has_it() {
         let mut scenario = Scenario::load("demo").unwrap();
         scenario.installation = InstallationModel::load(model, &Place::CommandLine).unwrap();
         let simulated = scenario.simulate(SEED, 0).unwrap();
-        let outcome = estimate(&simulated.run, form, &|_| {}).unwrap();
+        let outcome = estimate(
+            &Problem::new(&simulated.run, &Options::default().installation(form)),
+            &|_| {},
+        )
+        .unwrap();
         let error = outcome.estimate.vector() - to_vector(&simulated.truth);
         let estimated: Vec<usize> = outcome.estimate.estimated().collect();
         assert_eq!(estimated.len(), 18 + 2 * (form.angle_names().len() - 3));
@@ -202,7 +220,14 @@ fn the_filter_knows_the_form_of_an_instrument_that_has_it() {
 #[test]
 fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations_not_gated_away() {
     let simulated = Scenario::load("demo").unwrap().simulate(SEED, 0).unwrap();
-    let outcome = estimate(&simulated.run, InstallationForm::ThreeAngle, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(
+            &simulated.run,
+            &Options::default().installation(InstallationForm::ThreeAngle),
+        ),
+        &|_| {},
+    )
+    .unwrap();
     assert!(outcome.converged);
     assert!(outcome.consistency.velocity.mean > 100.0 && outcome.consistency.table.mean > 100.0);
     assert!(outcome.innovations.iter().all(|i| i.accepted));

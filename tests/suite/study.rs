@@ -2,8 +2,8 @@
 
 use assert_cmd::Command;
 use serde_json::Value;
-use turncal::calibration::outcome::to_vector;
-use turncal::calibration::states::ParameterVector;
+use turncal::calibration::ParameterVector;
+use turncal::calibration::to_vector;
 use turncal::calibration::{bound, estimate, six_position};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::simulation::Scenario;
@@ -45,11 +45,21 @@ fn by_hand() -> [Vec<ParameterVector>; 4] {
     let mut all = [const { Vec::new() }; 4];
     for stream in 0..RUNS {
         let made = scenario.simulate(SEED, stream).unwrap();
-        let filtered = estimate(&made.run, form, &|_| {}).unwrap().estimate;
+        let filtered = estimate(
+            &Problem::new(&made.run, &Options::default().installation(form)),
+            &|_| {},
+        )
+        .unwrap()
+        .estimate;
         let truth = to_vector(&made.truth);
         let bound = bound(&made.run, &made.truth, &made.further).unwrap();
         let at_rest = positions.simulate(SEED, stream).unwrap();
-        let closed = six_position(&at_rest.run, form).unwrap().estimate;
+        let closed = six_position(&Problem::new(
+            &at_rest.run,
+            &Options::default().installation(form),
+        ))
+        .unwrap()
+        .estimate;
         let of_run = [
             filtered.vector() - truth,
             closed.vector() - to_vector(&at_rest.truth),

@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 use rayon::prelude::*;
-use turncal::calibration::StateBlock;
+use turncal::calibration::ErrorTerm;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
 use turncal::calibration::to_vector;
 use turncal::calibration::{Outcome, estimate, mean_square_interval};
-use turncal::imu::{FURTHER, FurtherVector, InstallationForm, Term};
+use turncal::imu::{InstallationForm, TERM_PARAMETERS, Term, TermVector};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::turntable::TABLE_GEOMETRY;
 
@@ -21,33 +21,37 @@ const SEED: u64 = 41;
 fn scenario(term: Term) -> Scenario {
     let mut scenario = Scenario::load("demo").unwrap();
     for parameter in term.parameters() {
-        scenario.instrument.further_sigma[parameter] = term.usual_sigma();
+        scenario.instrument.term_sigma[parameter] = term.usual_sigma();
     }
     scenario
 }
 
 /// 1σ of the parameters of terms.
-fn sigma(outcome: &Outcome) -> FurtherVector {
+fn sigma(outcome: &Outcome) -> TermVector {
     outcome
         .further
         .sigma()
-        .fixed_rows::<FURTHER>(TABLE_GEOMETRY)
+        .fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY)
         .into()
 }
 
 /// NEES of a term's parameters in one run, and how many they are.
 fn nees(term: Term, stream: u64) -> (f64, usize) {
     let Simulated { run, further, .. } = scenario(term).simulate(SEED, stream).unwrap();
-    let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(&run, &Options::default().installation(FORM)),
+        &|_| {},
+    )
+    .unwrap();
     assert!(outcome.converged, "{}: {stream}", term.name());
-    assert!(outcome.further.unobserved().next().is_none());
-    let error = outcome.further.terms() - further;
+    assert!(outcome.auxiliary.unobserved().next().is_none());
+    let error = outcome.auxiliary.terms() - further;
     let sigma = sigma(&outcome);
     let of_term: Vec<usize> = term.parameters().collect();
     // In units of σ the covariance is a correlation matrix, which inverts without loss.
     let correlation = DMatrix::from_fn(of_term.len(), of_term.len(), |a, b| {
         let [i, j] = [of_term[a], of_term[b]];
-        let covariance = outcome.further.covariance[(TABLE_GEOMETRY + i, TABLE_GEOMETRY + j)];
+        let covariance = outcome.auxiliary.covariance[(TABLE_GEOMETRY + i, TABLE_GEOMETRY + j)];
         covariance / (sigma[i] * sigma[j])
     });
     let error = DVector::from_fn(of_term.len(), |a, _| error[of_term[a]] / sigma[of_term[a]]);
@@ -104,7 +108,7 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
     let scenario = Scenario::load(models.to_str().unwrap()).unwrap();
     let made = scenario.simulate(scenario.seed, 0).unwrap();
     let read = turncal::run::Run::read(&run.join("run.toml")).unwrap();
-    assert_eq!(read.further_sigma, made.run.instrument.further_sigma);
+    assert_eq!(read.instrument.term_sigma, made.run.instrument.term_sigma);
     let truth = Calibration::read(&run.join("truth.json")).unwrap();
     let offset = made.further[Term::TimeOffset.parameters().start];
     assert_eq!(truth.terms["accel.time_offset"].value, offset);
@@ -119,20 +123,28 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
         .unwrap()
         .run;
     let equation = |run: &turncal::run::Run| {
-        let outcome = estimate(run, FORM, &|_| {}).unwrap();
+        let outcome = estimate(
+            &Problem::new(run, &Options::default().installation(FORM)),
+            &|_| {},
+        )
+        .unwrap();
         let quality = outcome.quality(run).unwrap();
         outcome.record(run, &[], &quality).equation.unwrap()
     };
     // Errors of the table are none of the instrument.
     assert_eq!(equation(&run), EQUATION);
-    run.switch_on(StateBlock::Term(Term::TimeOffset));
+    run.switch_on(ErrorTerm::Instrument(Term::TimeOffset));
     assert_eq!(equation(&run), EQUATION_WITH_TERMS);
 }
 
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
-    run.instrument.further_sigma = FurtherVector::zeros();
-    let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+    run.instrument.term_sigma = TermVector::zeros();
+    let outcome = estimate(
+        &Problem::new(&run, &Options::default().installation(FORM)),
+        &|_| {},
+    )
+    .unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
     (outcome, normalised)
@@ -157,9 +169,13 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
     };
     let mut run = read(&directory);
     for term in [Term::AccelSecondOrder, Term::SizeEffect, Term::TimeOffset] {
-        run.switch_on(StateBlock::Term(term));
+        run.switch_on(ErrorTerm::Instrument(term));
     }
-    let outcome = estimate(&run, FORM, &|_| {}).unwrap();
+    let outcome = estimate(
+        &Problem::new(&run, &Options::default().installation(FORM)),
+        &|_| {},
+    )
+    .unwrap();
     let truth = Calibration::read(&directory.join("truth.json")).unwrap();
     let truth = turncal::calibration::triads_of(&truth, &run.instrument.nominal, FORM);
     let error = outcome.estimate.vector() - to_vector(&truth);
@@ -170,7 +186,7 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
     // truth.json: f − Ka2 f², lever arms subtracted, f − tGA ω × f.
     let g = |micro_g: f64| -micro_g * 9.797e-6 / 9.797f64.powi(2);
     let arms = [-0.01, -0.02, -0.03, -0.04, -0.05, -0.06];
-    let mut expected = FurtherVector::zeros();
+    let mut expected = TermVector::zeros();
     for (k, value) in [10.0, 20.0, 30.0].map(g).into_iter().enumerate() {
         expected[Term::AccelSecondOrder.parameters().start + k] = value;
     }
@@ -178,15 +194,15 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
         expected[Term::SizeEffect.parameters().start + k] = value;
     }
     expected[Term::TimeOffset.parameters().start] = 0.005;
-    for k in 0..FURTHER {
+    for k in 0..TERM_PARAMETERS {
         let sigma = sigma(&outcome)[k];
         println!(
             "{:?}: {} {sigma:.1e} {}",
             Term::parameter_name(k),
             expected[k],
-            outcome.further.terms()[k]
+            outcome.auxiliary.terms()[k]
         );
-        let off = (outcome.further.terms()[k] - expected[k]).abs();
+        let off = (outcome.auxiliary.terms()[k] - expected[k]).abs();
         assert!(
             off <= 4.0 * sigma,
             "{:?}: {off} of σ {sigma}",

@@ -18,7 +18,7 @@ const SEED: u64 = 5;
 
 fn without_table(scenario: &Scenario, stream: u64) -> Simulated {
     let mut simulated = scenario.simulate(SEED, stream).unwrap();
-    simulated.run.table = None;
+    simulated.run.recording.table = None;
     simulated
 }
 
@@ -65,9 +65,9 @@ fn without_a_table(runs: u64) {
 fn dwells_are_found_in_the_instruments_own_record_where_the_table_has_them() {
     for name in ["demo", "nineteen-position", "two-axis", "mems"] {
         let mut run = Scenario::load(name).unwrap().simulate(SEED, 0).unwrap().run;
-        let seen_by_table = run.dwells();
-        run.table = None;
-        let seen_by_imu = run.dwells();
+        let seen_by_table = run.dwells(run.aiding());
+        run.recording.table = None;
+        let seen_by_imu = run.dwells(run.aiding());
         assert_eq!(seen_by_imu.len(), seen_by_table.len(), "{name}");
         for (imu, table) in seen_by_imu.iter().zip(&seen_by_table) {
             // The table's dwells are cut by 0.2 s at each end.
@@ -114,7 +114,14 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
             prior.scale_sigma = Vector3::repeat(200.0 * PPM);
             prior.installation_sigma = Vector3::repeat(200.0 * ARCSEC);
         }
-        estimate(&run, InstallationForm::General, &|_| {}).unwrap()
+        estimate(
+            &Problem::new(
+                &run,
+                &Options::default().installation(InstallationForm::General),
+            ),
+            &|_| {},
+        )
+        .unwrap()
     };
     let [published, level] = [published, level].map(calibrated);
     let scale = largest_gyro_sigma(&published, ParameterKind::Scale) / PPM;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
-use turncal::imu::{Instability, Noise, Nominal, PerSensor, Prior, Sensor};
+use turncal::imu::{BiasVariation, Noise, Nominal, PerSensor, Prior, Sensor};
 use turncal::recording::{ImuSamples, TableLog};
 use turncal::recording::{LabelledMotion, Segment};
 use turncal::run::{Run, Standstill};
@@ -33,7 +33,7 @@ pub fn made_run(name: &str) -> Run {
         bias_sigma: Vector3::new(1e-6, 2e-6, 3e-6),
     };
     Run {
-        further_sigma: Default::default(),
+        term_sigma: Default::default(),
         name: name.to_owned(),
         site: Site::with_normal_gravity(0.7, -1.9, 123.4),
         meta: [("serial", "A \"7\""), ("notes", "two\nlines")]
@@ -43,14 +43,14 @@ pub fn made_run(name: &str) -> Run {
         noise: PerSensor {
             gyro: Noise {
                 random_walk: 3e-7,
-                instability: Some(Instability {
+                bias_variation: Some(BiasVariation {
                     sigma: 5e-8,
                     correlation_time: 300.0,
                 }),
             },
             accel: Noise {
                 random_walk: 5e-5,
-                instability: None,
+                bias_variation: None,
             },
         },
         prior: PerSensor {
@@ -125,14 +125,14 @@ pub fn assert_same(a: &Run, b: &Run) {
     );
     assert_eq!(
         (
-            a.imu.start,
+            a.imu.start(),
             a.imu.period,
             a.imu.continuous,
             a.imu.pulse,
             a.imu.len()
         ),
         (
-            b.imu.start,
+            b.imu.start(),
             b.imu.period,
             b.imu.continuous,
             b.imu.pulse,
@@ -142,8 +142,11 @@ pub fn assert_same(a: &Run, b: &Run) {
     for sensor in Sensor::ALL {
         let (noise_a, noise_b) = (a.noise.get(sensor), b.noise.get(sensor));
         near(noise_a.random_walk, noise_b.random_walk);
-        assert_eq!(noise_a.instability.is_some(), noise_b.instability.is_some());
-        if let (Some(a), Some(b)) = (noise_a.instability, noise_b.instability) {
+        assert_eq!(
+            noise_a.bias_variation.is_some(),
+            noise_b.bias_variation.is_some()
+        );
+        if let (Some(a), Some(b)) = (noise_a.bias_variation, noise_b.bias_variation) {
             near(a.sigma, b.sigma);
             near(a.correlation_time, b.correlation_time);
         }

@@ -31,7 +31,7 @@ fn every_shared_run_and_truth_reads() {
         let run = read(&directory);
         assert_eq!(run.recording.name, name);
         assert_eq!(run.recording.imu.len(), samples, "{name}");
-        assert_eq!(run.table.is_some(), table, "{name}");
+        assert_eq!(run.recording.table.is_some(), table, "{name}");
         assert_eq!(run.recording.segments.len(), segments, "{name}");
         let truth = directory.join("truth.json");
         if truth.exists() {
@@ -139,9 +139,9 @@ fn time_stamps_may_name_any_moment_of_a_sample_and_be_rounded() {
         // Stamps rounded to 0.1 ms fix the period over 300 samples to better than 1 µs.
         assert!((run.recording.imu.period - 1.0 / 128.0).abs() < 1e-6);
         assert!(
-            (run.recording.imu.start - 3.25).abs() < 1e-4,
+            (run.recording.imu.start() - 3.25).abs() < 1e-4,
             "{word}: {}",
-            run.recording.imu.start
+            run.recording.imu.start()
         );
     }
 }
@@ -158,7 +158,7 @@ fn axis_angles_multiply_from_the_outer_axis_in() {
         },
         plain,
     );
-    let table = run.table.unwrap();
+    let table = run.recording.table.unwrap();
     for (k, c_b_n) in table.attitude.iter().enumerate() {
         // Heading is clockwise and the outer angle is not.
         let [outer, middle, inner] = [3.0 * k as f64, -20.0, 2.0 * k as f64].map(|a| a * DEGREE);

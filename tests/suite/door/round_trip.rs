@@ -71,7 +71,7 @@ fn pulses_come_back_exactly() {
     write_run(&place, &run, Output::Pulse, None).unwrap();
     let back = read(&place);
     assert_eq!(
-        (&back.imu.gyro, &back.imu.accel),
+        (&back.recording.imu.gyro, &back.recording.imu.accel),
         (&run.recording.imu.gyro, &run.recording.imu.accel)
     );
     assert_same(&run, &back);

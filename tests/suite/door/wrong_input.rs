@@ -116,7 +116,7 @@ fn the_run_that_the_cases_spoil_is_good() {
     assert_eq!(
         (
             run.recording.imu.len(),
-            run.recording.imu.start,
+            run.recording.imu.start(),
             run.recording.imu.period
         ),
         (200, 0.0, 0.01)
