@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::outcome::Estimate;
 use turncal::calibration::{
@@ -29,12 +30,14 @@ use super::progress::Activity;
 #[command(after_help = "Examples:
   turncal calibrate my-run/run.toml
   turncal calibrate my-run/run.toml -o result --truth my-run/truth.json
+  turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale")]
 pub struct Calibrate {
     /// The run's run.toml
     run: PathBuf,
-    /// Directory to write [default: NAME-calibration, or nothing with --json]
+    /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method;
+    /// nothing with --json]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// How to estimate
@@ -151,6 +154,14 @@ impl Result {
 
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
+        if let (Method::SixPosition, Some(block)) = (self.method, self.with.first()) {
+            let message = format!(
+                "--with {}: --method six-position estimates scale factors, installation and biases only; \
+                 leave --with out, or estimate it by --method ekf\n",
+                block.0.name()
+            );
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let mut run = Run::read(&self.run)?;
         match self.aiding {
@@ -179,7 +190,10 @@ impl Calibrate {
         let target = match (&self.output, self.json) {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
-            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.name))),
+            (None, false) => Some(PathBuf::from(match self.method {
+                Method::Ekf => format!("{}-calibration", run.name),
+                Method::SixPosition => format!("{}-calibration-six-position", run.name),
+            })),
         };
         let directory = target
             .as_deref()

@@ -6,16 +6,24 @@ mod block;
 mod calibrate;
 mod check;
 mod compare;
+mod completions;
 mod demo;
 mod export;
 mod init;
+mod list;
+mod man;
 mod names;
 mod navigate;
 mod noise;
 mod output;
 mod progress;
+mod signals;
 mod simulate;
 mod study;
+mod threads;
+
+pub use signals::leave_nothing_behind;
+pub use threads::with_threads;
 
 use clap::{Parser, Subcommand};
 
@@ -47,6 +55,9 @@ enum Command {
     Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
+    List(list::List),
+    Completions(completions::Completions),
+    Man(man::Manual),
 }
 
 impl Cli {
@@ -65,6 +76,9 @@ impl Cli {
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
+            Command::List(list) => list.run(),
+            Command::Completions(completions) => completions.run(),
+            Command::Man(manual) => manual.run(),
         }
     }
 }

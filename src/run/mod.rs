@@ -41,7 +41,7 @@ pub use table_geometry::{
     AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,
 };
 pub(crate) use whole::write_whole_with;
-pub use whole::{WholeDirectory, write_whole};
+pub use whole::{WholeDirectory, abandon_unfinished, write_whole};
 pub(crate) use write::write_rows;
 pub use write::write_run;
 
