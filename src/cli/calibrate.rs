@@ -19,13 +19,15 @@ use turncal::run::record::TermRecord;
 use turncal::run::{CalibrationRecord, Run};
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
-use super::block::Block;
+use super::error_term::ErrorTerm;
+use super::input::run_file;
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 
 /// Estimates scale factors, installation and biases of a run
 ///
-/// Writes DIR/calibration.json and DIR/report/ and prints a summary.
+/// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
+/// failure.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate my-run/run.toml
@@ -35,6 +37,7 @@ use super::progress::Activity;
   turncal calibrate my-run/run.toml --json | jq .gyro.scale")]
 pub struct Calibrate {
     /// The run's run.toml
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
     /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method;
     /// nothing with --json]
@@ -49,9 +52,9 @@ pub struct Calibrate {
     /// What is observed [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Blocks of states to estimate, beside those that the run switches on
-    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
-    with: Vec<Block>,
+    /// Error terms to estimate, beside those that the run switches on
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    with: Vec<ErrorTerm>,
     /// True calibration; the estimator never sees it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -84,9 +87,9 @@ pub enum Installation {
 /// What the filter observes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Aiding {
-    /// Standstill, and the attitude of the table
+    /// Zero velocity in every dwell, and the attitude of the table
     Table,
-    /// Standstill alone; the accelerometers fix the body axes
+    /// Zero velocity alone; the accelerometers define the body axes
     Velocity,
 }
 
@@ -154,13 +157,16 @@ impl Result {
 
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
-        if let (Method::SixPosition, Some(block)) = (self.method, self.with.first()) {
+        if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
             let message = format!(
                 "--with {}: --method six-position estimates scale factors, installation and biases only; \
                  leave --with out, or estimate it by --method ekf\n",
-                block.0.name()
+                term.0.name()
             );
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
+        for term in &self.with {
+            term.needs_table(self.aiding);
         }
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let mut run = Run::read(&self.run)?;
@@ -173,8 +179,8 @@ impl Calibrate {
             Some(Aiding::Velocity) => run.table = None,
             Some(Aiding::Table) | None => {}
         }
-        for block in &self.with {
-            block.switch_on(&mut run)?;
+        for term in &self.with {
+            term.switch_on(&mut run)?;
         }
         let form = self.installation.into();
         let truth = self

@@ -39,16 +39,21 @@ impl List {
         if self.json {
             return print((serde_json::to_string_pretty(&entries)? + "\n").as_bytes());
         }
-        let mut table = Table::new();
-        table
-            .load_preset(presets::NOTHING)
-            .set_content_arrangement(ContentArrangement::Dynamic);
-        if let Some(columns) = columns() {
-            table.set_width(columns);
-        }
-        for entry in entries {
-            table.add_row([entry.kind, entry.name, &entry.description]);
-        }
-        print(format!("{table}\n").as_bytes())
+        let widest = entries.iter().map(|entry| entry.name.len()).max();
+        let of_kind = entries.chunk_by(|a, b| a.kind == b.kind).map(|alike| {
+            let mut table = Table::new();
+            table
+                .load_preset(presets::NOTHING)
+                .set_content_arrangement(ContentArrangement::Dynamic);
+            if let Some(columns) = columns() {
+                table.set_width(columns);
+            }
+            for entry in alike {
+                let name = format!(" {:1$}", entry.name, widest.unwrap_or(0));
+                table.add_row([&name, &entry.description]);
+            }
+            format!("{}:\n{}\n", alike[0].kind, table.trim_fmt())
+        });
+        print(of_kind.collect::<Vec<_>>().join("\n").as_bytes())
     }
 }

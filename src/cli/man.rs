@@ -48,7 +48,7 @@ fn collect(
     command: &clap::Command,
     directory: &Path,
     pages: &mut Vec<(PathBuf, Vec<u8>)>,
-) -> std::io::Result<()> {
+) -> anyhow::Result<()> {
     let name = command.get_display_name().unwrap_or(command.get_name());
     pages.push((directory.join(format!("{name}.1")), page(command)?));
     command
@@ -56,8 +56,14 @@ fn collect(
         .try_for_each(|below| collect(below, directory, pages))
 }
 
-fn page(command: &clap::Command) -> std::io::Result<Vec<u8>> {
+fn page(command: &clap::Command) -> anyhow::Result<Vec<u8>> {
     let mut text = Vec::new();
-    Man::new(command.clone()).render(&mut text)?;
-    Ok(text)
+    Man::new(command.clone())
+        .source(concat!("turncal ", env!("CARGO_PKG_VERSION")))
+        .manual("turncal")
+        .render(&mut text)?;
+    // What follows the options are examples first of all.
+    Ok(String::from_utf8(text)?
+        .replace(".SH EXTRA", ".SH EXAMPLES")
+        .into_bytes())
 }

@@ -2,14 +2,15 @@
 
 mod allan;
 mod apply;
-mod block;
 mod calibrate;
 mod check;
 mod compare;
 mod completions;
 mod demo;
+mod error_term;
 mod export;
 mod init;
+mod input;
 mod list;
 mod man;
 mod names;
@@ -33,8 +34,13 @@ use clap::{Parser, Subcommand};
     version,
     arg_required_else_help = true,
     after_help = "\
-Begin with:  turncal demo
-Then:        turncal calibrate my-run/run.toml -o my-calibration"
+Begin with:
+  turncal demo
+
+With a log of your own:
+  turncal init imu.csv -o run.toml
+  turncal check run.toml
+  turncal calibrate run.toml"
 )]
 pub struct Cli {
     #[command(subcommand)]

@@ -10,13 +10,14 @@ use turncal::run::record::TermRecord;
 use turncal::run::{CalibrationRecord, write_run};
 use turncal::simulation::{Scenario, Simulated};
 
+use super::input::seed;
 use super::output::Overwrite;
 use super::progress::Activity;
 
 /// Makes a run directory with known truth from a scenario
 ///
-/// The scenario is a TOML file or the name of an embedded one: demo, demo-six-position,
-/// nineteen-position, two-axis, mems.
+/// Writes run.toml, the logs that it names and truth.json. The scenario is a TOML file or the name of an
+/// embedded one; turncal list shows them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7")]
 pub struct Simulate {
@@ -26,7 +27,7 @@ pub struct Simulate {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     overwrite: Overwrite,

@@ -71,8 +71,15 @@ impl WholeDirectory {
                 return Err(RunError::new(
                     target,
                     Place::File,
-                    format_args!("a directory that holds {}", held.display()),
-                    "one that can be replaced",
+                    format_args!(
+                        "{} in this directory",
+                        if held == Path::new(".") {
+                            "the current directory".into()
+                        } else {
+                            held.display().to_string()
+                        }
+                    ),
+                    "a directory that can be replaced",
                     "Choose another name; replacing this one would delete what is still needed.",
                 ));
             }
