@@ -24,8 +24,8 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// the calibration are corrected, too; the correction of its time offset neglects Earth rate. The file is itself a record for a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal apply result/calibration.json my-run/run.toml -o calibrated.csv.gz
-  turncal apply result/calibration.json my-run/run.toml | head")]
+  turncal apply result/calibration.json run.toml -o calibrated.csv.gz
+  turncal apply result/calibration.json run.toml | head")]
 pub struct Apply {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]

@@ -31,7 +31,7 @@ use super::progress::Activity;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate my-run/run.toml
-  turncal calibrate my-run/run.toml -o result --truth my-run/truth.json
+  turncal calibrate my-run/run.toml -o mine --truth my-run/truth.json
   turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale")]

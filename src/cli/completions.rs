@@ -11,7 +11,8 @@ use super::output::print;
 /// Save it where your shell looks for completions; the examples show where.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal completions bash > ~/.local/share/bash-completion/completions/turncal
+  turncal completions bash > \\
+      ~/.local/share/bash-completion/completions/turncal
   turncal completions zsh > ~/.zfunc/_turncal
   turncal completions fish > ~/.config/fish/completions/turncal.fish")]
 pub struct Completions {

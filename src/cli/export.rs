@@ -17,7 +17,7 @@ use super::output::{keep, print};
 /// a format cannot hold is said in the file and on standard error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal export result/calibration.json --format c -o turncal_calibration.h
+  turncal export result/calibration.json --format c -o imu.h
   turncal export result/calibration.json --format kalibr \\
       --run my-run/run.toml -o imu.yaml
   turncal export result/calibration.json --format text")]

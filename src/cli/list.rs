@@ -13,7 +13,7 @@ use super::output::{columns, print};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal list
-  turncal list --json | jq -r '.[] | select(.kind == \"scenario\").name'")]
+  turncal list --json | jq -r '.[].name'")]
 pub struct List {
     /// Print the list as one JSON document and nothing else
     #[arg(long)]

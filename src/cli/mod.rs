@@ -21,6 +21,8 @@ mod progress;
 mod signals;
 mod simulate;
 mod study;
+#[cfg(test)]
+mod tests;
 mod threads;
 
 pub use signals::leave_nothing_behind;

@@ -32,11 +32,12 @@ const LARGEST_PITCH: f64 = 89.0;
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
-  turncal navigate calibration.json --truth truth.json --latitude-deg 45
-  turncal navigate calibration.json --truth truth.json --trajectory flight \\
-      --hours 3 -o flight
-  turncal navigate monday.json --truth friday.json --latitude-deg -33.9 \\
-      --errors gyro --json")]
+  turncal navigate calibration.json --truth truth.json \\
+      --latitude-deg 45
+  turncal navigate calibration.json --truth truth.json \\
+      --trajectory flight --hours 3 -o flight
+  turncal navigate monday.json --truth friday.json \\
+      --latitude-deg -33.9 --errors gyro --json")]
 pub struct Navigate {
     /// The calibration that navigation uses
     #[arg(value_name = "CALIBRATION.json")]

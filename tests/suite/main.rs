@@ -12,8 +12,12 @@ mod compare;
 mod door;
 mod export;
 mod faults;
+mod features;
 mod fuzz;
+mod help;
 mod init;
+#[cfg(unix)]
+mod interrupted;
 mod navigate;
 mod navigation;
 mod observability;
@@ -24,4 +28,5 @@ mod simulated;
 mod study;
 mod table1;
 mod terms;
+mod threads;
 mod velocity;
