@@ -43,9 +43,7 @@ fn help_fits_80_and_120_columns_and_breaks_no_example() {
         let mut arguments: Vec<&str> = words.iter().map(String::as_str).collect();
         arguments.push("--help");
         let examples = |text: &str| -> BTreeSet<String> {
-            let lines = text
-                .lines()
-                .filter(|line| line.trim_start().starts_with("turncal "));
+            let lines = text.lines().filter(|line| line.starts_with("  turncal "));
             lines.map(str::to_owned).collect()
         };
         let unbroken = examples(&output(&arguments, Some("1000")));

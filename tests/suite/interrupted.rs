@@ -1,8 +1,9 @@
 //! Commands that are ended from outside.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -19,13 +20,22 @@ fn names(directory: &Path) -> Vec<String> {
     names
 }
 
+/// What is being written in a directory.
+fn stages(directory: &Path) -> BTreeSet<PathBuf> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let is_stage = |path: &PathBuf| {
+        let name = path.file_name().unwrap().as_encoded_bytes();
+        name.starts_with(b".turncal-") && path.join("new").exists()
+    };
+    entries.map(|entry| entry.path()).filter(is_stage).collect()
+}
+
 /// A command that is writing, for a second or more, below `directory`.
 fn begun(program: &[&str], directory: &Path, output: &str) -> Child {
-    let all = [
-        program,
-        &[env!("CARGO_BIN_EXE_turncal"), "demo", "-o", output],
-    ]
-    .concat();
+    let target = directory.join(output);
+    let before = stages(target.parent().unwrap());
+    let turncal = [env!("CARGO_BIN_EXE_turncal"), "demo", "-o", output];
+    let all = [program, &turncal].concat();
     let child = Command::new(all[0])
         .args(&all[1..])
         .current_dir(directory)
@@ -34,22 +44,12 @@ fn begun(program: &[&str], directory: &Path, output: &str) -> Child {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let is_stage = |entry: &fs::DirEntry| {
-        entry
-            .file_name()
-            .as_encoded_bytes()
-            .starts_with(b".turncal-")
-            && entry.path().join("new").exists()
-    };
-    let parent = directory.join(output);
-    let parent = parent.parent().unwrap();
     let patience = Instant::now() + Duration::from_secs(60);
-    while !fs::read_dir(parent).is_ok_and(|entries| entries.flatten().any(|entry| is_stage(&entry)))
-    {
+    while stages(target.parent().unwrap()).is_subset(&before) {
         assert!(
             Instant::now() < patience,
-            "nothing begun in {}",
-            parent.display()
+            "{} is not begun",
+            target.display()
         );
         sleep(Duration::from_millis(2));
     }
