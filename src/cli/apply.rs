@@ -110,7 +110,7 @@ fn notes(record: &CalibrationRecord, correction: &Correction, run: &Run) -> Vec<
     }
     if correction.has(Term::SizeEffect) && !run.imu.continuous {
         notes.push(
-            "the record is not continuous, so the size effect is taken out without its part by \
+            "the record is not continuous, so the size effect is corrected without its part by \
              angular acceleration"
                 .to_owned(),
         );

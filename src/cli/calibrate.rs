@@ -55,7 +55,7 @@ pub struct Calibrate {
     /// Error terms to estimate, beside those that the run switches on
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     with: Vec<ErrorTerm>,
-    /// True calibration; the estimator never sees it, summary and report show errors against it
+    /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Print the calibration as one JSON document and nothing else
@@ -294,7 +294,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
     };
     let minutes = closed_form.standing_time / 60.0;
     let digits = usize::from(minutes < 10.0);
-    format!("{from}, {minutes:.digits$} min of standing")
+    format!("{from}, {minutes:.digits$} min at rest")
 }
 
 /// Navigates 40 h standing level at the run's site by the calibration of each method.

@@ -32,9 +32,13 @@ impl Activity {
 
     /// Tells of a pass of the filter.
     pub fn pass(&self, pass: &Pass) {
-        let kind = if pass.live { "live" } else { "held" };
+        let kind = if pass.live {
+            "first pass"
+        } else {
+            "Gauss–Newton iteration"
+        };
         self.next(format!(
-            "{kind} pass done, largest step {:.2} σ",
+            "{kind} done, largest step {:.2} σ",
             pass.largest_step
         ));
     }

@@ -47,7 +47,7 @@ impl Simulate {
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             eprintln!(
-                "note: the axes of the simulated table are not square, which the quaternions of its log \
+                "note: the axes of the simulated table are not orthogonal, which the quaternions of its log \
                  cannot tell: a calibration from these files will claim too small σ of installation. \
                  turncal study accuracy estimates their tilts."
             );

@@ -50,12 +50,17 @@ impl WholeDirectory {
                 return Err(taken(target));
             }
             if !existing.is_dir() {
+                let what = if existing.is_symlink() {
+                    "link"
+                } else {
+                    "file"
+                };
                 return Err(RunError::new(
                     target,
                     Place::File,
-                    "a file of this name",
+                    format_args!("a {what} of this name"),
                     "a directory or nothing",
-                    "Choose another name or remove the file.",
+                    format_args!("Choose another name or remove the {what}."),
                 ));
             }
             let inside = |path: &Path| match (path.canonicalize(), target.canonicalize()) {
@@ -118,7 +123,7 @@ fn only_output(directory: &Path) -> Result<(), RunError> {
             directory,
             Place::File,
             format_args!(
-                "`{}` in this directory, which its list of what turncal wrote ({}) does not name",
+                "`{}` in it, which no list of what turncal wrote there (`{}`) names",
                 foreign.display(),
                 manifest::FILE,
             ),

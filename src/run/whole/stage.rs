@@ -96,7 +96,19 @@ impl Stage {
             }
             Err(error) => {
                 let _ = missing.iter().try_for_each(fs::remove_dir);
-                Err(unwritable(target, "write here", &error))
+                let file = parent.ancestors().find(|ancestor| ancestor.is_file());
+                Err(file.map_or_else(
+                    || unwritable(target, "write here", &error),
+                    |file| {
+                        RunError::new(
+                            target,
+                            Place::File,
+                            format_args!("a file, {}, on the way", file.display()),
+                            "directories",
+                            "Choose another name.",
+                        )
+                    },
+                ))
             }
         }
     }

@@ -196,3 +196,34 @@ fn a_file_is_replaced_only_with_force_and_a_directory_never() {
     assert!(write_whole(root.path(), b"3", true).is_err());
     assert_eq!(names(root.path()), ["x"]);
 }
+
+#[test]
+fn a_file_on_the_way_to_the_output_is_named() {
+    let root = tempfile::tempdir().unwrap();
+    fs::write(root.path().join("x"), "1").unwrap();
+    let error = write_whole(&root.path().join("x/y/z"), b"1", true).unwrap_err();
+    assert!(error.to_string().contains("a file, "), "{error}");
+    assert_eq!(names(root.path()), ["x"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_link_is_neither_followed_nor_replaced_by_a_directory() {
+    let root = tempfile::tempdir().unwrap();
+    let (target, link) = (root.path().join("a"), root.path().join("link"));
+    written(&target, "x");
+    std::os::unix::fs::symlink(&target, &link).unwrap();
+    let error = WholeDirectory::create(&link, true, &[]).err().unwrap();
+    assert!(error.to_string().contains("a link"), "{error}");
+    // A user's directory that a link leads to is not looked into, and outlives the link.
+    let mine = root.path().join("mine");
+    fs::create_dir(&mine).unwrap();
+    fs::write(mine.join("notes.txt"), "precious").unwrap();
+    fs::remove_file(target.join("x")).unwrap();
+    std::os::unix::fs::symlink(&mine, target.join("x")).unwrap();
+    WholeDirectory::create(&target, true, &[])
+        .unwrap()
+        .commit()
+        .unwrap();
+    assert_eq!(fs::read(mine.join("notes.txt")).unwrap(), b"precious");
+}
