@@ -20,18 +20,19 @@
 
 pub mod attitude;
 pub mod calibration;
-pub mod draft;
 pub mod earth;
-pub mod export;
 pub mod imu;
 pub mod models;
 pub mod navigation;
 pub mod noise;
 #[cfg(feature = "report")]
 pub mod report;
+pub mod formats;
+pub mod recording;
 pub mod run;
 pub mod simulation;
 pub mod study;
 pub mod survey;
 pub mod turntable;
+pub(crate) mod statistics;
 pub mod units;

@@ -10,13 +10,16 @@ use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 use super::error::CalibrationError;
-use super::outcome::{Estimate, OBSERVED_BELOW, parameter_name, to_vector};
-use super::states::{ParameterMatrix, parameter, sensor_and_parameter};
+use super::estimate::Estimate;
+use super::finding::Finding;
+use super::model::Model;
+use super::parameters::{OBSERVED_BELOW, ParameterMatrix, parameter, parameter_name};
+use super::problem::Problem;
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
-use crate::run::record::BodyFrame;
-use crate::run::{Dwell, MeanOutput, Run};
+use crate::imu::BodyFrame;
+use crate::run::{Aiding, Dwell, MeanOutput, Run};
 
 /// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +69,7 @@ pub struct ClosedForm {
     /// Total time of all dwells used, s.
     pub standing_time: f64,
     /// What a calibration engineer must know before using the figures.
-    pub warnings: Vec<String>,
+    pub findings: Vec<Finding>,
 }
 
 /// A reference vector within this cosine of a body axis makes a position of the six.
@@ -87,46 +90,48 @@ const NOISELESS: f64 = 1e-9;
 ///
 /// # Errors
 /// [`CalibrationError`] if the positions do not determine the twelve numbers of a triad.
-pub fn six_position(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
-    let reference = if run.table.is_some() {
+pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let sections = &problem.run().recording.segments;
+    let reference = if problem.model.aiding == Aiding::Table {
         Reference::Table
-    } else if run.segments.iter().any(|s| s.motion.is_some()) {
+    } else if sections.iter().any(|s| s.motion.is_some()) {
         Reference::Labels
     } else {
         Reference::Gravity
     };
-    six_position_by(reference, run, &run.dwells(), form)
+    six_position_by(reference, problem)
 }
 
 /// The same by what the inputs are to be known from; labels need no dwells.
 pub(super) fn six_position_by(
     reference: Reference,
-    run: &Run,
-    dwells: &[Dwell],
-    form: InstallationForm,
+    problem: &Problem,
 ) -> Result<ClosedForm, CalibrationError> {
     match reference {
-        Reference::Table => six_position_of(run, dwells, form),
-        Reference::Labels => labels::by_labels(run, form),
-        Reference::Gravity => gravity::by_gravity(run, dwells, form),
+        Reference::Table => {
+            let dwells: Vec<Dwell> = problem.dwells().cloned().collect();
+            six_position_of(problem, &dwells)
+        }
+        Reference::Labels => labels::by_labels(problem),
+        Reference::Gravity => gravity::by_gravity(problem),
     }
 }
 
-/// The same from some dwells with attitudes of a table, or parts of them.
+/// The same from some dwells of the problem's first run with attitudes of a table, or parts of them.
 ///
 /// # Errors
 /// As [`six_position`], and without a table.
 pub fn six_position_of(
-    run: &Run,
+    problem: &Problem,
     dwells: &[Dwell],
-    form: InstallationForm,
 ) -> Result<ClosedForm, CalibrationError> {
+    let (run, model) = (problem.run(), &problem.model);
     let mut chosen = PerSensor::<Vec<Position>>::default();
     let mut used = vec![false; dwells.len()];
     for sensor in Sensor::ALL {
         let all: Vec<Position> = dwells
             .iter()
-            .map(|dwell| position(run, dwell, sensor))
+            .map(|dwell| position(run, model, dwell, sensor))
             .collect::<Option<_>>()
             .ok_or(CalibrationError::NoTable)?;
         let of_six = six_of(&all);
@@ -137,15 +142,15 @@ pub fn six_position_of(
         sensor,
         dwells: chosen.get(sensor).len(),
     };
-    let estimate = both_triads(&chosen, form).map_err(degenerate)?;
+    let estimate = both_triads(&chosen, model.form).map_err(degenerate)?;
     let standing_time = dwells
         .iter()
         .zip(used)
         .filter(|(_, used)| *used)
-        .map(|(dwell, _)| dwell.samples.len() as f64 * run.imu.period)
+        .map(|(dwell, _)| dwell.samples.len() as f64 * run.recording.imu.period)
         .sum();
     Ok(ClosedForm {
-        warnings: remarks(run, &estimate, Reference::Table),
+        findings: remarks(model, &estimate, Reference::Table),
         estimate,
         reference: Reference::Table,
         positions: PerSensor::from_fn(|sensor| chosen.get(sensor).len()),
@@ -175,49 +180,38 @@ fn both_triads(
 /// Parameters further from their prior than this many of its σ contradict it.
 const CONTRADICTS: f64 = 5.0;
 
-/// Sentences that name the parameters that are hardly better known than before, and those that the prior
-/// does not allow, if there are any.
-fn remarks(run: &Run, estimate: &Estimate, reference: Reference) -> Vec<String> {
-    let prior = run.prior_sigma(estimate.form());
+/// Parameters that are hardly better known than before, and those that the prior does not allow, if
+/// there are any.
+fn remarks(model: &Model, estimate: &Estimate, reference: Reference) -> Vec<Finding> {
     let sigma = estimate.sigma();
-    let off = estimate.vector() - to_vector(&run.prior_mean(estimate.form()));
-    let contradicts = |&index: &usize| {
-        let (sensor, of_triad) = sensor_and_parameter(index);
-        let prior = prior.get(sensor)[of_triad];
-        prior > 0.0 && off[index].abs() > CONTRADICTS * prior.hypot(sigma[index])
+    let off = estimate.vector() - model.prior_mean;
+    let far = |&i: &usize| {
+        let prior = model.prior_sigma[i];
+        prior > 0.0 && off[i].abs() > CONTRADICTS * prior.hypot(sigma[i])
     };
-    let hidden = |&index: &usize| {
-        let (sensor, of_triad) = sensor_and_parameter(index);
-        let prior = prior.get(sensor)[of_triad];
-        prior > 0.0 && sigma[index] > OBSERVED_BELOW * prior
+    let hidden = |&i: &usize| {
+        let prior = model.prior_sigma[i];
+        prior > 0.0 && sigma[i] > OBSERVED_BELOW * prior
     };
     let named = |which: &dyn Fn(&usize) -> bool| -> Vec<String> {
         let those = estimate.estimated().filter(which);
         let names = those.filter_map(|index| parameter_name(estimate.form(), index));
         names.collect()
     };
-    let mut sentences = Vec::new();
-    let wrong = named(&contradicts);
-    if !wrong.is_empty() {
-        sentences.push(format!(
-            "More than {CONTRADICTS} σ of [imu.prior] away from it: {}. Check labels, units and prior.",
-            wrong.join(", ")
-        ));
-    }
-    let names = named(&hidden);
-    if names.is_empty() {
-        return sentences;
-    }
-    let what = match reference {
-        Reference::Table => "these positions",
-        Reference::Labels => "these sections",
-        Reference::Gravity => "these dwells and turns",
-    };
-    sentences.push(format!(
-        "Not observed by {what}, σ not even half of the prior's: {}.",
-        names.join(", ")
-    ));
-    sentences
+    let (far, hidden) = (named(&far), named(&hidden));
+    let far = (!far.is_empty()).then_some(Finding::FarFromPrior {
+        sigmas: CONTRADICTS,
+        parameters: far,
+    });
+    let hidden = (!hidden.is_empty()).then_some(Finding::NotObserved {
+        by: match reference {
+            Reference::Table => "these positions",
+            Reference::Labels => "these sections",
+            Reference::Gravity => "these dwells and moves",
+        },
+        parameters: hidden,
+    });
+    far.into_iter().chain(hidden).collect()
 }
 
 /// One triad from positions: least squares for `A = K C` and `D` row by row, then the form's split.
@@ -309,8 +303,7 @@ fn split_covariance(
 }
 
 /// Mean output and known input over one dwell; `None` without a table.
-fn position(run: &Run, dwell: &Dwell, sensor: Sensor) -> Option<Position> {
-    let table = run.table.as_ref()?;
+fn position(run: &Run, model: &Model, dwell: &Dwell, sensor: Sensor) -> Option<Position> {
     let position = dwell.position.as_ref()?;
     let known = match sensor {
         Sensor::Gyro => run.site.earth_rate_n(),
@@ -322,7 +315,7 @@ fn position(run: &Run, dwell: &Dwell, sensor: Sensor) -> Option<Position> {
     } = dwell.mean(sensor, run);
     let input = position.attitude.tr_mul(&known);
     let attitude =
-        table.position_sigma.powi(2) + table.reading_sigma.powi(2) / position.readings.len() as f64;
+        model.position_sigma.powi(2) + model.reading_sigma.powi(2) / position.readings.len() as f64;
     // A wrong attitude turns the other two components of the input into a third.
     let variance = Vector3::repeat(noise) + across(&input) * attitude;
     Some(Position {

@@ -5,10 +5,10 @@ use super::error::ComparisonError;
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
 use super::scatter::{Scatter, scatter};
-use super::states::{ParameterMatrix, ParameterVector, sensor_and_parameter};
+use super::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, Triad};
-use crate::run::CalibrationRecord;
-use crate::run::record::BodyFrame;
+use crate::calibration::result::Calibration;
+use crate::imu::BodyFrame;
 
 /// A record with the name that tables and messages give it.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct Named<'a> {
     /// Its name.
     pub name: &'a str,
     /// The calibration, or the truth.
-    pub record: &'a CalibrationRecord,
+    pub record: &'a Calibration,
 }
 
 /// Calibrations in the general form and a common body frame, held against a reference.
@@ -164,7 +164,7 @@ mod tests {
     use crate::calibration::frame::tests::{record, with_covariance};
     use crate::imu::InstallationForm;
 
-    fn named<'a>(name: &'a str, record: &'a CalibrationRecord) -> Named<'a> {
+    fn named<'a>(name: &'a str, record: &'a Calibration) -> Named<'a> {
         Named { name, record }
     }
 
@@ -189,7 +189,7 @@ mod tests {
     fn nees_of_the_truth_is_zero_and_of_one_sigma_along_one_axis_one_in_n() {
         let truth = record();
         let mut estimate = with_covariance(record(), InstallationForm::General);
-        let nees = |estimate: &CalibrationRecord| {
+        let nees = |estimate: &Calibration| {
             let comparison = compare(&[named("a", estimate)], Some(named("t", &truth))).unwrap();
             comparison.sides[0].nees.unwrap()
         };

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, SMatrix, SVector, SymmetricEigen};
 
-use super::consistency::mean_square_interval;
+use super::innovation::mean_square_interval;
 
 /// A correlation matrix has no information in directions whose eigenvalue is below this: they are
 /// zero but for rounding, as where three angles stand for six.

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::frame::Canonical;
 use super::nees::Directions;
-use super::states::ParameterVector;
+use super::parameters::ParameterVector;
 
 /// Mean and scatter of three calibrations or more, taken as of one instrument that has not changed
 /// and of different data.
@@ -149,10 +149,10 @@ mod tests {
     use super::*;
     use crate::calibration::frame::own_nominal;
     use crate::calibration::frame::tests::{record, with_covariance};
-    use crate::calibration::outcome::from_vector;
-    use crate::calibration::states::PARAMETERS;
+    use crate::calibration::from_vector;
+    use crate::calibration::PARAMETERS;
     use crate::imu::InstallationForm::General;
-    use crate::run::record::BodyFrame;
+    use crate::imu::BodyFrame;
 
     /// Calibrations that scatter by `factor` times the σ that they claim.
     fn drawn(count: usize, factor: f64) -> (Vec<Canonical>, ParameterVector) {

@@ -46,7 +46,7 @@ impl Allan {
         let analysis = NoiseAnalysis::new(&run, stretch);
         drop(activity);
         let report = AllanReport {
-            run: &run.name,
+            run: &run.recording.name,
             analysis: &analysis,
         };
         begun.deliver(

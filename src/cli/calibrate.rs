@@ -8,18 +8,17 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use clap::error::ErrorKind;
 use rayon::prelude::*;
-use turncal::calibration::outcome::Estimate;
+use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    self, BlockEffect, CalibrationError, ClosedForm, Outcome, Quality, Reference, block_effects,
-    in_body_frame, triads_of,
+    self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
+    Solution, in_body_frame, triads_of,
 };
-use turncal::imu::{InstallationForm, PerSensor, Triad};
+use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::{self, Navigated, Report};
-use turncal::run::record::TermRecord;
-use turncal::run::{CalibrationRecord, Run};
+use turncal::run::Run;
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
-use super::error_term::ErrorTerm;
+use super::error_term::TermArgument;
 use super::input::run_file;
 use super::output::{Overwrite, print};
 use super::progress::Activity;
@@ -54,7 +53,7 @@ pub struct Calibrate {
     aiding: Option<Aiding>,
     /// Error terms to estimate, beside those that the run switches on
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
-    with: Vec<ErrorTerm>,
+    with: Vec<TermArgument>,
     /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -103,54 +102,20 @@ impl From<Installation> for InstallationForm {
     }
 }
 
-/// What a method gave.
-enum Result {
-    Filter(Box<Outcome>),
-    ClosedForm(Box<ClosedForm>),
+impl From<Aiding> for turncal::run::Aiding {
+    fn from(aiding: Aiding) -> Self {
+        match aiding {
+            Aiding::Table => Self::Table,
+            Aiding::Velocity => Self::Velocity,
+        }
+    }
 }
 
-impl Result {
-    fn outcome(&self) -> Option<&Outcome> {
-        match self {
-            Self::Filter(outcome) => Some(outcome),
-            Self::ClosedForm(_) => None,
-        }
-    }
-
-    fn closed_form(&self) -> Option<&ClosedForm> {
-        match self {
-            Self::Filter(_) => None,
-            Self::ClosedForm(closed_form) => Some(closed_form),
-        }
-    }
-
-    fn method(&self) -> (&'static str, &Estimate) {
-        match self {
-            Self::Filter(outcome) => ("EKF", &outcome.estimate),
-            Self::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
-        }
-    }
-
-    fn note(&self) -> String {
-        self.closed_form().map(note).unwrap_or_default()
-    }
-
-    fn effects(&self, run: &Run) -> std::result::Result<Vec<BlockEffect>, CalibrationError> {
-        let effects = self.outcome().map(|outcome| block_effects(run, outcome));
-        effects.unwrap_or(Ok(Vec::new()))
-    }
-
-    fn quality(&self, run: &Run) -> std::result::Result<Quality, CalibrationError> {
-        match self {
-            Self::Filter(outcome) => outcome.quality(run),
-            Self::ClosedForm(closed_form) => closed_form.quality(run),
-        }
-    }
-
-    fn record(&self, run: &Run, effects: &[BlockEffect], quality: &Quality) -> CalibrationRecord {
-        match self {
-            Self::Filter(outcome) => outcome.record(run, effects, quality),
-            Self::ClosedForm(closed_form) => closed_form.record(run, quality),
+impl From<Method> for calibration::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Ekf => Self::Ekf,
+            Method::SixPosition => Self::SixPosition,
         }
     }
 }
@@ -169,24 +134,22 @@ impl Calibrate {
             term.needs_table(self.aiding);
         }
         let activity = Activity::new(format!("reading {}", self.run.display()));
-        let mut run = Run::read(&self.run)?;
-        match self.aiding {
-            Some(Aiding::Table) if run.table.is_none() => {
-                return Err(CalibrationError::NoTable)
-                    .with_context(|| self.run.display().to_string());
-            }
-            // What the filter is not to observe is not there.
-            Some(Aiding::Velocity) => run.table = None,
-            Some(Aiding::Table) | None => {}
-        }
-        for term in &self.with {
-            term.switch_on(&mut run)?;
+        let run = Run::read(&self.run)?;
+        if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
+            return Err(CalibrationError::NoTable).with_context(|| self.run.display().to_string());
         }
         let form = self.installation.into();
+        let mut options = Options::default().installation(form);
+        options.aiding = self.aiding.map(turncal::run::Aiding::from);
+        let mut problem = Problem::new(&run, &options);
+        for term in &self.with {
+            term.switch_on(&mut problem)?;
+        }
+        let body_frame = problem.model.aiding.body_frame();
         let truth = self
             .truth
             .as_deref()
-            .map(|path| read_truth(path, &run))
+            .map(|path| read_truth(path, &run, body_frame))
             .transpose()?;
         let (truth, true_terms) = truth.unzip();
         let true_terms = true_terms.unwrap_or_default();
@@ -197,8 +160,8 @@ impl Calibrate {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
             (None, false) => Some(PathBuf::from(match self.method {
-                Method::Ekf => format!("{}-calibration", run.name),
-                Method::SixPosition => format!("{}-calibration-six-position", run.name),
+                Method::Ekf => format!("{}-calibration", run.recording.name),
+                Method::SixPosition => format!("{}-calibration-six-position", run.recording.name),
             })),
         };
         let directory = target
@@ -213,70 +176,75 @@ impl Calibrate {
             })
             .transpose()?;
 
-        let result = match self.method {
-            Method::Ekf => Result::Filter(Box::new(filter(&run, form, &activity)?)),
-            Method::SixPosition => {
-                let closed_form = calibration::six_position(&run, form)
-                    .with_context(|| self.run.display().to_string())?;
-                Result::ClosedForm(Box::new(closed_form))
-            }
+        let solution = solve(&problem, self.method.into(), &activity)?;
+        let method = match self.method {
+            Method::Ekf => "EKF",
+            Method::SixPosition => "closed form",
         };
-        let (effects, (quality, navigation)) = rayon::join(
-            || result.effects(&run),
-            || {
-                let quality = result.quality(&run);
-                (quality, navigate(&run, &[result.method()], truth.as_ref()))
-            },
+        let (assessment, navigation) = rayon::join(
+            || solution.assess(&problem),
+            || navigate(&run, &[(method, solution.estimate())], truth.as_ref()),
         );
-        let (effects, quality) = (effects?, quality?);
-        let record = result.record(&run, &effects, &quality);
-        let note = result.note();
-        let dwells = dwell_times(&run);
+        let assessment = assessment?;
+        let calibration = solution.calibration(&problem, &assessment);
+        let note = solution.closed_form().map(note).unwrap_or_default();
+        let dwells = dwell_times(&problem);
         let report = Report {
-            title: &run.name,
+            title: &run.recording.name,
             run: &run,
-            body_frame: record.body_frame,
-            outcome: result.outcome(),
-            effects: &effects,
-            quality: Some(&quality),
+            aiding: problem.model.aiding,
+            body_frame: calibration.body_frame,
+            outcome: solution.outcome(),
+            effects: &assessment.error_terms,
+            quality: Some(&assessment.quality),
             true_terms: &true_terms,
-            closed_form: result.closed_form().map(|closed_form| report::ClosedForm {
-                estimate: &closed_form.estimate,
-                note: &note,
-                warnings: &closed_form.warnings,
-            }),
+            closed_form: solution
+                .closed_form()
+                .map(|closed_form| report::ClosedForm {
+                    estimate: &closed_form.estimate,
+                    note: &note,
+                    findings: &closed_form.findings,
+                }),
             truth: truth_in_form.as_ref(),
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
         activity.next("writing");
         if let Some(directory) = directory {
-            record.write(&directory.path().join("calibration.json"), false)?;
+            calibration.write(&directory.path().join("calibration.json"), false)?;
             write_report(&report, &directory.path().join("report"))?;
             directory.commit()?;
         }
         drop(activity);
         if self.json {
-            return print(&record.to_json(Path::new("standard output"))?);
+            print(&calibration.to_json(Path::new("standard output"))?)?;
+        } else {
+            print(report.summary().as_bytes())?;
         }
-        print(report.summary().as_bytes())?;
-        if let Some(target) = target {
+        if let Some(target) = target.filter(|_| !self.json) {
             let page = target.join("report").join("index.html");
             eprintln!("\nreport: {}", page.display());
+        }
+        if !solution.converged() {
+            bail!(
+                "{}: not converged; values and σ may not be used, see the findings",
+                run.recording.name
+            );
         }
         Ok(())
     }
 }
 
-/// Runs the filter; a run that does not converge is a failure.
-pub fn filter(run: &Run, form: InstallationForm, activity: &Activity) -> anyhow::Result<Outcome> {
-    activity.next(format!("calibrating {}", run.name));
-    let outcome = calibration::estimate(run, form, &|pass| activity.pass(pass))
-        .with_context(|| run.name.clone())?;
-    if !outcome.converged {
-        bail!("{}: {}", run.name, outcome.warnings.join(" "));
-    }
-    Ok(outcome)
+/// Solves a problem, the passes being shown.
+pub fn solve(
+    problem: &Problem,
+    method: calibration::Method,
+    activity: &Activity,
+) -> anyhow::Result<Solution> {
+    let name = &problem.run().recording.name;
+    activity.next(format!("calibrating {name}"));
+    let solution = problem.solve(method, &|pass| activity.pass(pass));
+    solution.with_context(|| name.clone())
 }
 
 /// What a closed form was made of, in a few words.
@@ -312,10 +280,11 @@ pub fn navigate(
 }
 
 /// Begin and end of each dwell, s.
-pub fn dwell_times(run: &Run) -> Vec<Range<f64>> {
-    run.dwells()
-        .into_iter()
-        .map(|dwell| run.imu.time(dwell.samples.start)..run.imu.time(dwell.samples.end))
+pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
+    let imu = &problem.run().recording.imu;
+    let dwells = problem.dwells();
+    dwells
+        .map(|dwell| imu.time(dwell.samples.start)..imu.time(dwell.samples.end))
         .collect()
 }
 
@@ -330,20 +299,21 @@ pub fn write_report(report: &Report, directory: &Path) -> anyhow::Result<()> {
 fn read_truth(
     path: &Path,
     run: &Run,
+    body_frame: BodyFrame,
 ) -> anyhow::Result<(PerSensor<Triad>, BTreeMap<String, TermRecord>)> {
-    let record = CalibrationRecord::read(path)?;
+    let record = Calibration::read(path)?;
     if let Some(unit) = &record.unit
-        && *unit != run.unit
+        && *unit != run.instrument.unit
     {
         bail!(
             "{}: units are {} and {}, those of the run {} and {}; give the truth of this run",
             path.display(),
             unit.gyro,
             unit.accel,
-            run.unit.gyro,
-            run.unit.accel
+            run.instrument.unit.gyro,
+            run.instrument.unit.accel
         );
     }
-    let triads = triads_of(&record, &run.nominal, InstallationForm::General);
-    Ok((in_body_frame(&triads, run.body_frame()), record.terms))
+    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
+    Ok((in_body_frame(&triads, body_frame), record.terms))
 }

@@ -5,9 +5,9 @@ mod document;
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
+use turncal::calibration::result::Calibration;
 use turncal::calibration::{Named, compare};
 use turncal::report::side_by_side;
-use turncal::run::CalibrationRecord;
 
 use super::names::short_names;
 use super::output::Delivery;
@@ -45,7 +45,7 @@ impl Compare {
             .collect();
         let records = paths
             .iter()
-            .map(|path| CalibrationRecord::read(path))
+            .map(|path| Calibration::read(path))
             .collect::<Result<Vec<_>, _>>()?;
         let names = short_names(&paths);
         let named: Vec<Named> = names

@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use anyhow::Context;
-use turncal::calibration::{self, ClosedForm};
-use turncal::imu::InstallationForm;
+use anyhow::{Context, bail};
+use turncal::calibration::{self, ClosedForm, Options, Problem};
 use turncal::report::{self, Report};
 use turncal::simulation::{Scenario, Simulated};
 
-use super::calibrate::{dwell_times, filter, navigate, note, write_report};
+use super::calibrate::{dwell_times, navigate, note, solve, write_report};
 use super::input::seed;
 use super::output::{Overwrite, print};
 use super::progress::Activity;
@@ -35,9 +34,6 @@ pub struct Demo {
     overwrite: Overwrite,
 }
 
-/// Both installation forms of the demo are the general one.
-const FORM: InstallationForm = InstallationForm::General;
-
 impl Demo {
     pub fn run(&self) -> anyhow::Result<()> {
         let directory = self.overwrite.directory(&self.output, &[])?;
@@ -49,35 +45,37 @@ impl Demo {
         );
         let (turning, (standing, closed_form)) = (turning?, standing?);
         let run = &turning.run;
-        let outcome = filter(run, FORM, &activity)?;
+        let problem = Problem::new(run, &Options::default());
+        let solution = solve(&problem, calibration::Method::Ekf, &activity)?;
+        if !solution.converged() {
+            bail!("the demonstration did not converge; take another --seed");
+        }
 
         let note = note(&closed_form);
-        let dwells = dwell_times(run);
+        let dwells = dwell_times(&problem);
         activity.next("navigating");
         let methods = [
             ("closed form", &closed_form.estimate),
-            ("EKF", &outcome.estimate),
+            ("EKF", solution.estimate()),
         ];
-        let (effects, (quality, navigation)) = rayon::join(
-            || calibration::block_effects(run, &outcome),
-            || {
-                let quality = outcome.quality(run);
-                (quality, navigate(run, &methods, Some(&turning.truth)))
-            },
+        let (assessment, navigation) = rayon::join(
+            || solution.assess(&problem),
+            || navigate(run, &methods, Some(&turning.truth)),
         );
-        let (effects, quality) = (effects?, quality?);
+        let assessment = assessment?;
         let report = Report {
             title: "turncal demo",
             run,
-            body_frame: run.body_frame(),
-            outcome: Some(&outcome),
-            effects: &effects,
-            quality: Some(&quality),
+            aiding: problem.model.aiding,
+            body_frame: problem.model.aiding.body_frame(),
+            outcome: solution.outcome(),
+            effects: &assessment.error_terms,
+            quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
             closed_form: Some(report::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
-                warnings: &closed_form.warnings,
+                findings: &closed_form.findings,
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
@@ -94,9 +92,10 @@ impl Demo {
         };
         let (filtered, closed) = (method("ekf")?, method("six-position")?);
         write(&standing, &closed)?;
-        let record = outcome.record(run, &effects, &quality);
+        let record = solution.calibration(&problem, &assessment);
         record.write(&filtered.join("calibration.json"), false)?;
-        let record = closed_form.record(&standing.run, &closed_form.quality(&standing.run)?);
+        let standing = Problem::new(&standing.run, &Options::default());
+        let record = closed_form.record(&standing, &closed_form.quality(&standing)?);
         record.write(&closed.join("calibration.json"), false)?;
         write_report(&report, &root.join("report"))?;
         directory.commit()?;
@@ -112,6 +111,7 @@ impl Demo {
 /// The static positions and what the closed form makes of them.
 fn static_positions(seed: Option<u64>) -> anyhow::Result<(Simulated, ClosedForm)> {
     let standing = simulated(&Scenario::load("demo-six-position")?, seed)?;
-    let closed_form = calibration::six_position(&standing.run, FORM)?;
+    let problem = Problem::new(&standing.run, &Options::default());
+    let closed_form = calibration::six_position(&problem)?;
     Ok((standing, closed_form))
 }

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use turncal::export;
-use turncal::run::{CalibrationRecord, Run, write_whole};
+use turncal::calibration::result::Calibration;
+use turncal::formats::export;
+use turncal::formats::write_whole;
+use turncal::run::Run;
 
 use super::input::run_file;
 use super::output::{keep, print};
@@ -67,14 +69,14 @@ impl From<Format> for export::Format {
 
 impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
-        let record = CalibrationRecord::read(&self.calibration)?;
+        let record = Calibration::read(&self.calibration)?;
         let run = self.run.as_deref().map(Run::read).transpose()?;
         let exported = export::write(&record, self.format.into(), run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;
         let text = exported.text.as_bytes();
         match &self.output {
             Some(output) => {
-                let files = run.iter().flat_map(|run| &run.files);
+                let files = run.iter().flat_map(|run| &run.recording.files);
                 keep(output, files.chain([&self.calibration]))?;
                 write_whole(output, text, self.force)?;
             }

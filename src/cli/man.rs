@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use clap_mangen::Man;
-use turncal::run::write_whole;
+use turncal::formats::write_whole;
 
 use super::Cli;
 use super::output::print;

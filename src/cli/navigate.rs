@@ -7,11 +7,11 @@ use clap::ValueEnum;
 use nalgebra::Vector3;
 use turncal::attitude::from_pitch_roll_heading;
 use turncal::calibration::Named;
+use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
 use turncal::report::navigation::Navigation;
-use turncal::run::CalibrationRecord;
 use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
 use turncal::units::DEGREE;
 
@@ -109,8 +109,8 @@ impl Navigate {
         let paths = [self.calibration.as_path(), self.truth.as_path()];
         let names = short_names(&paths);
         let [calibration, truth] = [
-            CalibrationRecord::read(&self.calibration)?,
-            CalibrationRecord::read(&self.truth)?,
+            Calibration::read(&self.calibration)?,
+            Calibration::read(&self.truth)?,
         ];
         let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
             .map(|(name, record)| Named { name, record });

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde::Serialize;
+use turncal::formats::FileError;
+use turncal::formats::WholeDirectory;
 use turncal::report::ReportError;
-use turncal::run::{RunError, WholeDirectory};
 
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -18,7 +19,7 @@ pub struct Overwrite {
 
 impl Overwrite {
     /// Begins an output directory; none of `inputs` may lie in it.
-    pub fn directory(self, target: &Path, inputs: &[&Path]) -> Result<WholeDirectory, RunError> {
+    pub fn directory(self, target: &Path, inputs: &[&Path]) -> Result<WholeDirectory, FileError> {
         WholeDirectory::create(target, self.force, inputs)
     }
 }
@@ -40,11 +41,11 @@ pub struct Delivery {
 impl Delivery {
     /// Begins the directory, if one is asked for, so that long work is not done in vain; none of
     /// `inputs` may lie in it.
-    pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, RunError> {
+    pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, FileError> {
         let target = self.output.as_deref();
         let begun = target.map(|target| {
             let whole = self.overwrite.directory(target, inputs)?;
-            Ok::<_, RunError>((target, whole))
+            Ok::<_, FileError>((target, whole))
         });
         Ok(Begun {
             directory: begun.transpose()?,

@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use turncal::calibration::outcome::Pass;
+use turncal::calibration::Pass;
 
 /// What is being done, with the time it has taken.
 pub struct Activity {
@@ -32,7 +32,7 @@ impl Activity {
 
     /// Tells of a pass of the filter.
     pub fn pass(&self, pass: &Pass) {
-        let kind = if pass.live {
+        let kind = if pass.feedback {
             "first pass"
         } else {
             "Gauss–Newton iteration"

@@ -10,7 +10,7 @@ pub fn leave_nothing_behind() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
-    use turncal::run::abandon_unfinished;
+    use turncal::formats::abandon_unfinished;
 
     // Without this thread the signals do what they do by default; the next run clears up.
     let _ = thread::Builder::new().name("signals".into()).spawn(|| {

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::TermRecord;
 use turncal::calibration::truth_record;
-use turncal::imu::{FURTHER, Term};
-use turncal::run::record::TermRecord;
-use turncal::run::{CalibrationRecord, write_run};
+use turncal::formats::write_run;
+use turncal::imu::{TERM_PARAMETERS, Term};
 use turncal::simulation::{Scenario, Simulated};
 
 use super::input::seed;
@@ -55,7 +56,7 @@ impl Simulate {
         eprintln!(
             "{}: {:.0} s written to {}",
             scenario.name,
-            simulated.run.imu.duration(),
+            simulated.run.recording.imu.duration(),
             self.output.display()
         );
         Ok(())
@@ -71,7 +72,7 @@ pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simul
 
 /// The true parameters of the terms that are on.
 fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
-    let on = (0..FURTHER).filter(|&k| simulated.run.further_sigma[k] > 0.0);
+    let on = (0..TERM_PARAMETERS).filter(|&k| simulated.run.instrument.term_sigma[k] > 0.0);
     let term = |k: usize| {
         let (value, sigma) = (simulated.further[k], None);
         Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
@@ -81,7 +82,7 @@ fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
 
 /// Writes a simulated run with its truth into a directory that is there.
 pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
-    let truth = CalibrationRecord {
+    let truth = Calibration {
         terms: true_terms(simulated),
         ..truth_record(&simulated.truth, &simulated.run)
     };

@@ -8,14 +8,18 @@
 
 use serde::{Deserialize, Serialize};
 
+mod body_frame;
 mod installation;
+mod instrument;
 mod signal;
 mod terms;
 mod triad;
 
+pub use body_frame::BodyFrame;
+pub use instrument::Instrument;
 pub use installation::{ANGLES, InstallationForm};
-pub use signal::{Instability, Noise, NoiseSource, Output, Pulses};
-pub use terms::{FURTHER, FurtherResponse, FurtherVector, Sensed, Term};
+pub use signal::{BiasVariation, Noise, NoiseSource, Output, Pulses};
+pub use terms::{TERM_PARAMETERS, TermResponse, TermVector, Sensed, Term};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 
 /// Names of the body axes, in order.

@@ -6,8 +6,9 @@ use super::allan::{Curve, cluster_sizes, overlapping};
 use super::identify::{Clusters, Found, Hidden, Identified, mean, of_kind};
 use super::process::Process;
 use super::standing::Stretch;
-use crate::imu::{Instability, Noise, PerSensor, Sensor};
-use crate::run::{Run, SIGMA_OF_MEDIAN, median};
+use crate::imu::{BiasVariation, Noise, PerSensor, Sensor};
+use crate::run::Run;
+use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
 /// Neighbouring samples that differ by more than this many σ are no noise.
 const KNOCK: f64 = 8.0;
@@ -64,20 +65,20 @@ pub struct NoiseFigures {
 impl NoiseAnalysis {
     /// Examines a stretch of a run.
     pub fn new(run: &Run, stretch: Stretch) -> Self {
-        let period = run.imu.period;
+        let period = run.recording.imu.period;
         let sizes = cluster_sizes(stretch.samples.len());
         let clusters = Clusters::new(stretch.samples.len(), period, sizes);
         let triads = PerSensor::from_fn(|sensor| {
             let all = match sensor {
-                Sensor::Gyro => &run.imu.gyro,
-                Sensor::Accel => &run.imu.accel,
+                Sensor::Gyro => &run.recording.imu.gyro,
+                Sensor::Accel => &run.recording.imu.accel,
             };
             let samples = all.get(stretch.samples.clone()).unwrap_or_default();
             TriadNoise::new(samples, period, &clusters)
         });
         Self {
             period,
-            pulse: run.imu.pulse,
+            pulse: run.recording.imu.pulse,
             triads,
             stretch,
         }
@@ -101,11 +102,11 @@ impl NoiseAnalysis {
             .map(|found| found.strength)
             .or(limit().map(|h| h.limit))?;
         let longest = mean.curve.tau.last().copied().unwrap_or_default();
-        let instability = identified
+        let bias_variation = identified
             .for_filter
             .iter()
             .find_map(|found| match found.process {
-                Process::GaussMarkov { correlation_time } => Some(Instability {
+                Process::GaussMarkov { correlation_time } => Some(BiasVariation {
                     sigma: found.strength,
                     correlation_time,
                 }),
@@ -114,12 +115,12 @@ impl NoiseAnalysis {
         Some(NoiseFigures {
             noise: Noise {
                 random_walk,
-                instability,
+                bias_variation,
             },
             random_walk_is_limit: white.is_none(),
             // The hump of its Allan deviation is at 1.89 correlation times.
-            correlation_is_open: instability
-                .is_some_and(|instability| 1.89 * instability.correlation_time > longest),
+            correlation_is_open: bias_variation
+                .is_some_and(|bias_variation| 1.89 * bias_variation.correlation_time > longest),
         })
     }
 }
@@ -172,7 +173,7 @@ impl AxisNoise {
     }
 
     /// Lowest Allan deviation with its cluster time, if it is not the last: what is read off a curve as
-    /// bias instability.
+    /// bias bias_variation.
     pub fn minimum(&self) -> Option<(f64, f64)> {
         let Curve { tau, variance } = &self.curve;
         let points = tau.iter().zip(variance);

@@ -5,31 +5,31 @@ use super::further::title;
 use super::group::Group;
 use super::number::{three_digits, value};
 use super::side_by_side::Table;
-use crate::calibration::BlockEffect;
+use crate::calibration::ErrorTermTest;
 
 const NONE: &str = "–";
 
 /// The tables: costs of the blocks that were on, and what those explain that were on or that the data
 /// ask for; none if there are no such blocks.
-pub(super) fn tables(effects: &[BlockEffect]) -> Vec<Table> {
+pub(super) fn tables(effects: &[ErrorTermTest]) -> Vec<Table> {
     let mut tables = Vec::new();
     if effects.iter().any(|effect| effect.on) {
         tables.push(costs(effects));
     }
-    let shown = |effect: &&BlockEffect| effect.on || effect.asked_for();
-    let shown: Vec<&BlockEffect> = effects.iter().filter(shown).collect();
+    let shown = |effect: &&ErrorTermTest| effect.on || effect.significant();
+    let shown: Vec<&ErrorTermTest> = effects.iter().filter(shown).collect();
     if !shown.is_empty() {
         tables.push(explained(&shown));
     }
     tables
 }
 
-fn costs(effects: &[BlockEffect]) -> Table {
+fn costs(effects: &[ErrorTermTest]) -> Table {
     let on = effects.iter().filter(|effect| effect.on);
-    let row = |effect: &BlockEffect| {
-        let cells = effect.cost.iter();
+    let row = |effect: &ErrorTermTest| {
+        let cells = effect.sigma_factors.iter();
         let cells = cells.map(|cost| cost.map_or(NONE.to_owned(), |cost| value(cost, 0.1)));
-        std::iter::once(title(effect.block).to_owned())
+        std::iter::once(title(effect.term).to_owned())
             .chain(cells)
             .collect()
     };
@@ -45,7 +45,7 @@ fn costs(effects: &[BlockEffect]) -> Table {
     }
 }
 
-fn explained(effects: &[&BlockEffect]) -> Table {
+fn explained(effects: &[&ErrorTermTest]) -> Table {
     let headings = [
         "block",
         "",
@@ -54,14 +54,14 @@ fn explained(effects: &[&BlockEffect]) -> Table {
         "by chance",
         "asked for",
     ];
-    let row = |effect: &&BlockEffect| {
+    let row = |effect: &&ErrorTermTest| {
         vec![
-            title(effect.block).to_owned(),
+            title(effect.term).to_owned(),
             if effect.on { "on" } else { "off" }.to_owned(),
             nis(effect),
             three_digits(effect.gain),
             format!("< {}", three_digits(effect.limit)),
-            if effect.asked_for() { "yes" } else { "no" }.to_owned(),
+            if effect.significant() { "yes" } else { "no" }.to_owned(),
         ]
     };
     let sections = effects.chunk_by(|a, b| a.on == b.on);
@@ -81,7 +81,7 @@ fn explained(effects: &[&BlockEffect]) -> Table {
     }
 }
 
-fn nis(effect: &BlockEffect) -> String {
+fn nis(effect: &ErrorTermTest) -> String {
     let digits = |nis: f64| {
         if nis < 10.0 {
             value(nis, 0.01)
@@ -93,15 +93,15 @@ fn nis(effect: &BlockEffect) -> String {
 }
 
 /// Where the data ask for blocks that are off: for which of them most.
-pub(super) fn advice(effects: &[BlockEffect]) -> Option<String> {
+pub(super) fn advice(effects: &[ErrorTermTest]) -> Option<String> {
     let off = effects.iter().filter(|effect| !effect.on);
-    let asked = off.filter(|effect| effect.asked_for());
+    let asked = off.filter(|effect| effect.significant());
     let best = asked.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     Some(format!(
         "The data show errors that are not modelled. Of the blocks of states that are off, {} would \
          explain most (NIS {}): use --with {}, then look again.",
-        title(best.block),
+        title(best.term),
         nis(best),
-        best.block.name()
+        best.term.name()
     ))
 }

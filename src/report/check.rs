@@ -69,10 +69,10 @@ impl CheckReport<'_> {
     }
 
     fn title(&self) -> String {
-        let imu = &self.run.imu;
+        let imu = &self.run.recording.imu;
         format!(
             "Check of {}: {} s, {} samples at {} Hz, {}, {}",
-            self.run.name,
+            self.run.recording.name,
             value(imu.duration(), 10.0),
             count(imu.len()),
             three_digits(imu.period.recip()),

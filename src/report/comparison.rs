@@ -5,8 +5,8 @@ use super::canvas::{Area, DrawError, INK, Pen, QUIET};
 use super::group::{Group, axis_name, short_name};
 use super::panel::{Margins, Mark, Panel, all_fixed};
 use super::{Figure, Report, ReportError};
-use crate::calibration::outcome::Estimate;
-use crate::calibration::states::{ParameterVector, sensor_and_parameter};
+use crate::calibration::Estimate;
+use crate::calibration::{ParameterVector, sensor_and_parameter};
 
 /// Errors of each method against the truth, or the difference between the methods where the truth is
 /// not known; `None` if there is neither a truth nor a second method.

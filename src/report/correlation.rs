@@ -6,7 +6,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::canvas::{Area, DrawError, INK, QUIET, font, px, write};
 use super::group::{Group, short_name};
 use super::{Figure, ReportError};
-use crate::calibration::outcome::Estimate;
+use crate::calibration::Estimate;
 
 const LEFT: f64 = 124.0;
 const TOP: f64 = 92.0;

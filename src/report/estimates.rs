@@ -5,8 +5,8 @@ use super::canvas::{Area, DrawError, INK, Pen, QUIET, envelope};
 use super::group::{Group, axis_name};
 use super::panel::{Margins, Panel};
 use super::{Figure, Report, ReportError};
-use crate::calibration::outcome::{Moment, Outcome};
-use crate::calibration::states::ParameterVector;
+use crate::calibration::{Epoch, Outcome};
+use crate::calibration::ParameterVector;
 
 const POINTS: usize = 200;
 const COLUMNS: usize = 3;
@@ -35,7 +35,7 @@ pub(super) fn figure(report: &Report, outcome: &Outcome) -> Result<Option<Figure
         Some(truth) => (truth, "truth"),
         None => (outcome.estimate.vector(), "final value"),
     };
-    let live = if outcome.live_history.is_empty() {
+    let live = if outcome.feedback_history.is_empty() {
         ""
     } else {
         "; thin line: the live pass, from the coarse start on"
@@ -69,11 +69,11 @@ fn draw_panel(
     x_title: &str,
 ) -> Result<(), DrawError> {
     let (group, estimate) = (Group::of(index), &outcome.estimate);
-    let line = |history: &[Moment], shown: &dyn Fn(&Moment) -> f64| {
-        let shown = |m: &Moment| (m.time, shown(m) / group.unit_value());
+    let line = |history: &[Epoch], shown: &dyn Fn(&Epoch) -> f64| {
+        let shown = |m: &Epoch| (m.time, shown(m) / group.unit_value());
         envelope(&history.iter().map(shown).collect::<Vec<_>>(), POINTS)
     };
-    let error = |m: &Moment| m.estimate[index] - reference[index];
+    let error = |m: &Epoch| m.estimate[index] - reference[index];
     let final_sigma = group
         .spread(&estimate.sigma(), &group.estimated(estimate))
         .map_or(0.0, |(_, rms)| rms);
@@ -99,7 +99,7 @@ fn draw_panel(
         &line(&outcome.history, &|m| 3.0 * m.sigma[index]),
     )?;
     panel.line(&[(start, 0.0), (end, 0.0)], Pen::solid(QUIET, 0.75))?;
-    panel.line(&line(&outcome.live_history, &error), Pen::nth(1, 0.9))?;
+    panel.line(&line(&outcome.feedback_history, &error), Pen::nth(1, 0.9))?;
     panel.line(&line(&outcome.history, &error), Pen::solid(INK, 1.75))?;
     panel.finish()
 }

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::number::{count, sigma, three_digits, value};
 use super::{ClosedForm, Report};
 use crate::imu::{Noise, Sensor};
-use crate::run::Run;
+use crate::run::{Aiding, Run};
 use crate::units::{
     ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
 };
@@ -18,11 +18,11 @@ pub(super) fn facts(rows: &[(String, String)]) -> Markup {
 }
 
 /// What was recorded, where, and what was known before.
-pub(super) fn run(run: &Run) -> Markup {
+pub(super) fn run(run: &Run, aiding: Aiding) -> Markup {
     let text = |name: &str, value: String| (name.to_owned(), value);
-    let imu = &run.imu;
-    let mut rows = vec![text("run", run.name.clone())];
-    rows.extend(run.meta.iter().map(|(k, v)| (k.clone(), v.clone())));
+    let imu = &run.recording.imu;
+    let mut rows = vec![text("run", run.recording.name.clone())];
+    rows.extend(run.recording.meta.iter().map(|(k, v)| (k.clone(), v.clone())));
     rows.push(text(
         "site",
         format!(
@@ -53,7 +53,7 @@ pub(super) fn run(run: &Run) -> Markup {
         ));
     }
     for sensor in Sensor::ALL {
-        let nominal = run.nominal.get(sensor).0;
+        let nominal = run.instrument.nominal.get(sensor).0;
         let input = match sensor {
             Sensor::Gyro => "rad/s",
             Sensor::Accel => "m/s²",
@@ -65,22 +65,22 @@ pub(super) fn run(run: &Run) -> Markup {
                 nominal.x,
                 nominal.y,
                 nominal.z,
-                run.unit.get(sensor)
+                run.instrument.unit.get(sensor)
             ),
         ));
         rows.push(text(
             &format!("{} noise", sensor.name()),
-            noise(sensor, run.noise.get(sensor)),
+            noise(sensor, run.instrument.noise.get(sensor)),
         ));
     }
-    rows.push(match &run.table {
+    rows.push(match run.recording.table.as_ref().filter(|_| aiding == Aiding::Table) {
         Some(table) => text(
             "turntable",
             format!(
                 "{} readings; position {} ″ (1σ, new at every position), reading {} ″ (1σ, white)",
                 count(table.time.len()),
-                sigma(table.position_sigma / ARCSEC),
-                sigma(table.reading_sigma / ARCSEC)
+                sigma(run.table.position_sigma / ARCSEC),
+                sigma(run.table.reading_sigma / ARCSEC)
             ),
         ),
         None => text("turntable", "its log was not used".to_owned()),
@@ -97,7 +97,7 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
         "random walk {} {walk_unit}",
         sigma(noise.random_walk / walk)
     );
-    if let Some(instability) = noise.instability {
+    if let Some(instability) = noise.bias_variation {
         text.push_str(&format!(
             ", instability {} {bias_unit} over {} s",
             sigma(instability.sigma / bias),
@@ -124,7 +124,7 @@ pub(super) fn model(report: &Report) -> Markup {
     }
     rows.push(("body frame", report.body_frame.words().to_owned()));
     if let Some(outcome) = report.outcome {
-        let held = outcome.passes.iter().filter(|pass| !pass.live).count();
+        let held = outcome.passes.iter().filter(|pass| !pass.feedback).count();
         let passes = if held < outcome.passes.len() {
             format!("one live pass and {held} held")
         } else {
@@ -141,7 +141,7 @@ pub(super) fn model(report: &Report) -> Markup {
     if let Some(ClosedForm { note, .. }) = report.closed_form {
         rows.push(("closed form", note.to_owned()));
     }
-    let (observed, found_in) = match report.run.table {
+    let (observed, found_in) = match report.table() {
         Some(_) => (
             "standstill and the attitude of the table",
             "the table's log",

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::number::{sigma, three_digits, value};
-use crate::calibration::further::{Constant, Further, constant_name};
+use crate::calibration::{AuxiliaryKind, Auxiliary, auxiliary_name};
 use crate::imu::Term;
-use crate::run::StateBlock;
-use crate::run::record::TermRecord;
+use crate::calibration::ErrorTerm;
+use crate::calibration::result::TermRecord;
 use crate::units::ARCSEC;
 
 /// One constant, each number as it is shown.
@@ -30,33 +30,33 @@ pub(super) struct Row {
 }
 
 /// A block in words.
-pub(super) fn title(block: StateBlock) -> &'static str {
+pub(super) fn title(block: ErrorTerm) -> &'static str {
     match block {
-        StateBlock::WanderingBias => "wandering biases",
-        StateBlock::TableBase => "table level and north",
-        StateBlock::TableAxes => "table axes",
-        StateBlock::Term(Term::AccelSecondOrder) => "accel second order",
-        StateBlock::Term(Term::AccelAsymmetry) => "accel asymmetry",
-        StateBlock::Term(Term::SizeEffect) => "accel lever arm",
-        StateBlock::Term(Term::TimeOffset) => "accel time offset",
-        StateBlock::Term(Term::GSensitivity) => "gyro g-sensitivity",
+        ErrorTerm::BiasVariation => "wandering biases",
+        ErrorTerm::TableBase => "table level and north",
+        ErrorTerm::TableAxes => "table axes",
+        ErrorTerm::Instrument(Term::AccelSecondOrder) => "accel second order",
+        ErrorTerm::Instrument(Term::AccelAsymmetry) => "accel asymmetry",
+        ErrorTerm::Instrument(Term::SizeEffect) => "accel lever arm",
+        ErrorTerm::Instrument(Term::TimeOffset) => "accel time offset",
+        ErrorTerm::Instrument(Term::GSensitivity) => "gyro g-sensitivity",
     }
 }
 
 /// Name and value in SI of the unit that a block's constants are shown in.
-pub(super) fn unit(block: StateBlock) -> (&'static str, f64) {
+pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
-        StateBlock::Term(term) => term.unit(),
-        StateBlock::TableBase | StateBlock::TableAxes | StateBlock::WanderingBias => ("″", ARCSEC),
+        ErrorTerm::Instrument(term) => term.unit(),
+        ErrorTerm::TableBase | ErrorTerm::TableAxes | ErrorTerm::BiasVariation => ("″", ARCSEC),
     }
 }
 
 /// Every constant that was estimated.
-pub(super) fn rows(further: &Further, truth: &BTreeMap<String, TermRecord>) -> Vec<Row> {
+pub(super) fn rows(further: &Auxiliary, truth: &BTreeMap<String, TermRecord>) -> Vec<Row> {
     let posterior = further.sigma();
     let mut last = None;
     let mut row = |k: usize| {
-        let (block, name) = (Constant::of(k)?.block(), constant_name(k)?);
+        let (block, name) = (AuxiliaryKind::of(k)?.error_term(), auxiliary_name(k)?);
         let (unit, in_si) = unit(block);
         let prior = further.prior_sigma[k];
         let axis = name.rsplit('.').next().filter(|end| *end != "time_offset");

@@ -5,7 +5,7 @@ use super::canvas::{INK, Pen, QUIET, envelope};
 use super::number;
 use super::panel::{Margins, Mark, Panel};
 use super::{Figure, Report, ReportError};
-use crate::calibration::outcome::{Innovation, Nis, Observation, Outcome};
+use crate::calibration::{Innovation, Nis, Observation, Outcome};
 
 const DIRECTIONS: [&str; 3] = ["east", "north", "up"];
 /// Beyond this an innovation is drawn at the edge.

@@ -40,12 +40,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::calibration::outcome::{Estimate, Outcome, to_vector};
-use crate::calibration::states::ParameterVector;
-use crate::calibration::{BlockEffect, Quality};
+use crate::calibration::{Estimate, Outcome, to_vector};
+use crate::calibration::ParameterVector;
+use crate::calibration::{ErrorTermTest, Finding, Quality};
 use crate::imu::{PerSensor, Triad};
-use crate::run::Run;
-use crate::run::record::{BodyFrame, TermRecord};
+use crate::recording::TableLog;
+use crate::run::{Aiding, Run};
+use crate::calibration::result::TermRecord;
+use crate::imu::BodyFrame;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the
@@ -56,12 +58,14 @@ pub struct Report<'a> {
     pub title: &'a str,
     /// The record.
     pub run: &'a Run,
+    /// What was observed at rest.
+    pub aiding: Aiding,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
     /// The filter's result, if it ran.
     pub outcome: Option<&'a Outcome>,
     /// What blocks of states did to it, or would do.
-    pub effects: &'a [BlockEffect],
+    pub effects: &'a [ErrorTermTest],
     /// The closed form's result, if there is one.
     pub closed_form: Option<ClosedForm<'a>>,
     /// The true triads, where they are known.
@@ -94,7 +98,7 @@ pub struct ClosedForm<'a> {
     /// What it was made of, such as `six positions, 60 min of its own`.
     pub note: &'a str,
     /// What must be known before using it.
-    pub warnings: &'a [String],
+    pub findings: &'a [Finding],
 }
 
 /// A report that could not be written.
@@ -131,6 +135,11 @@ struct Figure {
 }
 
 impl Report<'_> {
+    /// The table's readings, where they were observed.
+    fn table(&self) -> Option<&TableLog> {
+        self.run.observed_table(self.aiding)
+    }
+
     /// Writes `index.html` and one SVG file for each figure into an existing directory. The page
     /// holds the figures, too, and needs neither the files nor a network.
     pub fn write(&self, directory: &Path) -> Result<(), ReportError> {
@@ -169,8 +178,8 @@ impl Report<'_> {
 
     /// Begin and end of the record, s.
     fn time_span(&self) -> (f64, f64) {
-        let imu = &self.run.imu;
-        (imu.start, imu.start + imu.duration())
+        let imu = &self.run.recording.imu;
+        (imu.start(), imu.start() + imu.duration())
     }
 
     /// Both methods that ran, the closed form first.

@@ -19,8 +19,8 @@ use super::side_by_side::Table;
 use super::{ReportError, facts, number, terminal, write_files};
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::Sensor;
-use crate::run::record::BodyFrame;
-use crate::study::navigation::{INTERVAL, Mission, Moment, Motion};
+use crate::imu::BodyFrame;
+use crate::study::navigation::{INTERVAL, Mission, Epoch, Motion};
 use crate::units::{DEGREE, NAUTICAL_MILE};
 use quantity::Quantity;
 
@@ -49,7 +49,7 @@ pub struct Navigation<'a> {
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
-    pub moments: &'a [Moment],
+    pub moments: &'a [Epoch],
 }
 
 impl Navigation<'_> {
@@ -159,7 +159,7 @@ impl Navigation<'_> {
         }
         if self.terms {
             warnings.push(
-                "Further error terms are taken for exact: these are the errors that K, E and D leave."
+                "Auxiliary error terms are taken for exact: these are the errors that K, E and D leave."
                     .to_owned(),
             );
         }
@@ -201,8 +201,8 @@ impl Navigation<'_> {
     }
 
     fn row(&self, quantity: Quantity) -> Vec<String> {
-        let error = |moment: &Moment| quantity.error(&moment.error);
-        let size = |m: &&Moment| error(m).abs();
+        let error = |moment: &Epoch| quantity.error(&moment.error);
+        let size = |m: &&Epoch| error(m).abs();
         let largest = self
             .moments
             .iter()
@@ -210,7 +210,7 @@ impl Navigation<'_> {
         let last = self.moments.last();
         let sigma = last.and_then(|m| quantity.sigma(m)).filter(|s| *s > 0.0);
         let shown =
-            |m: Option<&Moment>| m.map_or(NONE.to_owned(), |m| number::three_digits(error(m)));
+            |m: Option<&Epoch>| m.map_or(NONE.to_owned(), |m| number::three_digits(error(m)));
         let ratio = last.zip(sigma).filter(|_| quantity.is_component());
         vec![
             quantity.name().to_owned(),

@@ -53,7 +53,7 @@ pub(super) fn page(report: &Report, figures: &[Figure]) -> String {
             }
         }
         section { h2 { "Model and method" } (facts::model(report)) }
-        section { h2 { "Run" } (facts::run(report.run)) }
+        section { h2 { "Run" } (facts::run(report.run, report.aiding)) }
     };
     document(report.title, &body)
 }
@@ -79,8 +79,8 @@ pub(super) fn document(title: &str, body: &Markup) -> String {
 fn summary(report: &Report) -> String {
     let mut text = format!(
         "Run {}, {} s. ",
-        report.run.name,
-        number::value(report.run.imu.duration(), 10.0)
+        report.run.recording.name,
+        number::value(report.run.recording.imu.duration(), 10.0)
     );
     if let Some(outcome) = report.outcome {
         let state = if outcome.converged {

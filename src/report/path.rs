@@ -8,7 +8,7 @@ use super::canvas::{Area, DrawError, Pen, QUIET, envelope, write};
 use super::panel::{Margins, Panel};
 use super::{Figure, Report, ReportError};
 use crate::imu::AXES;
-use crate::run::{ImuRecord, TableRecord};
+use crate::recording::{ImuSamples, TableLog};
 use crate::units::DEGREE;
 
 const POINTS: usize = 1200;
@@ -26,7 +26,7 @@ type Line = Vec<(f64, f64)>;
 
 /// Elevation and azimuth of the body axes from the table, and body rates from the gyros.
 pub(super) fn figure(report: &Report) -> Result<Figure, ReportError> {
-    let table = report.run.table.as_ref();
+    let table = report.table();
     let mut caption = String::from(
         "Rates are the raw gyro outputs about the body axes. Grey: dwells, \
          numbered where there is room.",
@@ -52,7 +52,7 @@ pub(super) fn figure(report: &Report) -> Result<Figure, ReportError> {
             [0, 1, 2].map(|axis| azimuth(table, axis)),
         ));
     }
-    let rates = [0, 1, 2].map(|axis| rate(&report.run.imu, axis));
+    let rates = [0, 1, 2].map(|axis| rate(&report.run.recording.imu, axis));
     let (low, high) = rates
         .iter()
         .flatten()
@@ -119,7 +119,7 @@ fn number_dwells(report: &Report, area: &Area) -> Result<(), DrawError> {
 }
 
 /// Elevation of a body axis above the horizon in degrees.
-fn elevation(table: &TableRecord, axis: usize) -> Vec<Line> {
+fn elevation(table: &TableLog, axis: usize) -> Vec<Line> {
     let line = table.time.iter().zip(&table.attitude);
     vec![
         line.map(|(&t, c)| (t, axis_elevation(c, axis) / DEGREE))
@@ -128,7 +128,7 @@ fn elevation(table: &TableRecord, axis: usize) -> Vec<Line> {
 }
 
 /// Azimuth of a body axis clockwise from North in degrees, in pieces between jumps and steep parts.
-fn azimuth(table: &TableRecord, axis: usize) -> Vec<Line> {
+fn azimuth(table: &TableLog, axis: usize) -> Vec<Line> {
     let line: Vec<_> = table
         .time
         .iter()
@@ -149,7 +149,7 @@ fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
 }
 
 /// Mean rate of each sample about a body axis in degrees a second.
-fn rate(imu: &ImuRecord, axis: usize) -> Vec<Line> {
+fn rate(imu: &ImuSamples, axis: usize) -> Vec<Line> {
     let samples = imu.gyro.iter().enumerate();
     vec![
         samples
@@ -168,11 +168,11 @@ mod tests {
     use super::*;
     use crate::attitude::from_pitch_roll_heading;
 
-    fn table(headings: impl Iterator<Item = f64>) -> TableRecord {
+    fn table(headings: impl Iterator<Item = f64>) -> TableLog {
         let attitude: Vec<_> = headings
             .map(|heading| from_pitch_roll_heading(0.0, 0.0, heading * DEGREE))
             .collect();
-        TableRecord {
+        TableLog {
             time: (0..attitude.len()).map(|k| k as f64).collect(),
             attitude,
             position_sigma: 0.0,

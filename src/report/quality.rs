@@ -3,14 +3,14 @@
 use super::number::{count, three_digits};
 use super::side_by_side::Table;
 use crate::calibration::{Measures, Quality, Spread};
-use crate::run::Run;
+use crate::recording::TableLog;
 use crate::units::{ARCSEC, DEGREE, MICRO_G, MILLI_G};
 
 const NONE: &str = "–";
 
 /// Each measure over the whole record and over what was held out; none where there is nothing to measure.
-pub(super) fn table(quality: &Quality, run: &Run) -> Option<Table> {
-    let turns = match run.table {
+pub(super) fn table(quality: &Quality, table: Option<&TableLog>) -> Option<Table> {
+    let turns = match table {
         Some(_) => "attitude after a turn, gyros less table",
         None => "labelled turns, gyros less label",
     };

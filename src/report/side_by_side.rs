@@ -9,7 +9,7 @@ use std::path::Path;
 use super::group::{Group, short_name};
 use super::number::{count, sigma, three_digits, value};
 use super::{ReportError, terminal, write_files};
-use crate::calibration::states::ParameterVector;
+use crate::calibration::ParameterVector;
 use crate::calibration::{ChiSquare, Comparison, Nees, Side};
 use crate::imu::{InstallationForm, Sensor};
 

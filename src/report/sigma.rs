@@ -5,7 +5,7 @@ use super::canvas::{INK, Pen, envelope};
 use super::group::{Group, axis_name};
 use super::panel::{Margins, Panel, all_fixed};
 use super::{Figure, Report, ReportError};
-use crate::calibration::outcome::Outcome;
+use crate::calibration::Outcome;
 
 /// Points of a line: more than the panel is wide in pixels would not show.
 const POINTS: usize = 300;

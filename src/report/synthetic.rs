@@ -11,15 +11,16 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{ClosedForm, Navigated, Report};
 use crate::attitude;
 use crate::calibration::AttitudePrior;
-use crate::calibration::outcome::*;
-use crate::calibration::states::{
+use crate::calibration::*;
+use crate::calibration::{
     PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter,
 };
 use crate::calibration::{Direction, Linearisation, Observability, Part};
 use crate::earth::Site;
 use crate::imu::*;
-use crate::run::record::TermRecord;
-use crate::run::{ImuRecord, Run, SET_BY_HAND, Standstill, TableRecord};
+use crate::calibration::result::TermRecord;
+use crate::recording::{ImuSamples, TableLog};
+use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::study::navigation::Mission;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G};
 
@@ -48,7 +49,8 @@ impl Synthetic {
         Report {
             title: "Calibration of a made-up instrument",
             run: &self.run,
-            body_frame: self.run.body_frame(),
+            aiding: self.run.aiding(),
+            body_frame: self.run.aiding().body_frame(),
             outcome: Some(&self.outcome),
             effects: &[],
             quality: None,
@@ -108,7 +110,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         }
     }
     Run {
-        further_sigma: Default::default(),
+        term_sigma: Default::default(),
         name: "three-axis-made-up".to_owned(),
         site: Site::with_normal_gravity(39.9 * DEGREE, 116.3 * DEGREE, 50.0),
         meta: BTreeMap::from([
@@ -118,7 +120,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
             ),
             ("operator".to_owned(), "nobody".to_owned()),
         ]),
-        imu: ImuRecord {
+        imu: ImuSamples {
             start: 0.0,
             period: PERIOD,
             continuous: true,
@@ -135,14 +137,14 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         noise: PerSensor {
             gyro: Noise {
                 random_walk: 0.001 * DEG_PER_SQRT_H,
-                instability: Some(Instability {
+                bias_variation: Some(BiasVariation {
                     sigma: 0.003 * DEG_PER_H,
                     correlation_time: 3600.0,
                 }),
             },
             accel: Noise {
                 random_walk: 5.0 * MICRO_G,
-                instability: None,
+                bias_variation: None,
             },
         },
         prior: prior(),
@@ -152,7 +154,7 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         },
         unit: PerSensor::from_fn(|_| "count".to_owned()),
         standstill: Standstill::default(),
-        table: Some(TableRecord {
+        table: Some(TableLog {
             time,
             attitude: angles,
             position_sigma: ARCSEC,
@@ -191,9 +193,9 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     let dwells = dwells();
     let prior_sigma = ParameterVector::from_fn(|i, _| {
         let (sensor, p) = sensor_and_parameter(i);
-        run.prior.get(sensor).sigma(form)[p]
+        run.instrument.prior.get(sensor).sigma(form)[p]
     });
-    let prior_mean = to_vector(&PerSensor::from_fn(|s| run.prior.get(s).mean(form)));
+    let prior_mean = to_vector(&PerSensor::from_fn(|s| run.instrument.prior.get(s).mean(form)));
     let final_sigma = ParameterVector::from_fn(|i, _| {
         let (sensor, p) = sensor_and_parameter(i);
         let kind = ParameterKind::ALL
@@ -213,8 +215,8 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     let seen: Vec<f64> = (0..PARAMETERS)
         .map(|i| DWELL * (1.0 + (i % 7) as f64))
         .collect();
-    let length = run.imu.duration();
-    let history: Vec<Moment> = (0..(length * 5.0) as usize)
+    let length = run.recording.imu.duration();
+    let history: Vec<Epoch> = (0..(length * 5.0) as usize)
         .map(|k| {
             let time = (k as f64 + 1.0) / 5.0;
             let sigma = ParameterVector::from_fn(|i, _| {
@@ -229,7 +231,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
                     .component_div(&final_sigma.map(|s| s.max(1e-300)))
                     .component_mul(&sigma)
                     * (1.0 + wander);
-            Moment {
+            Epoch {
                 time,
                 estimate,
                 sigma,
@@ -350,11 +352,11 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
 }
 
 /// The same with errors that feedback has made larger.
-fn live(history: &[Moment], truth: &ParameterVector) -> Vec<Moment> {
-    let widened = |m: &Moment| {
+fn live(history: &[Epoch], truth: &ParameterVector) -> Vec<Epoch> {
+    let widened = |m: &Epoch| {
         let gain = 1.6 + 1.2 * (m.time / 25.0).cos();
         let estimate = truth + (m.estimate - truth) * gain;
-        Moment { estimate, ..*m }
+        Epoch { estimate, ..*m }
     };
     history.iter().map(widened).collect()
 }

@@ -7,7 +7,7 @@ use super::further;
 use super::group::Group;
 use super::number::{self, count, sigma, three_digits, value};
 use super::side_by_side::Table;
-use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, Outcome, parameter_name};
+use crate::calibration::{Estimate, OBSERVED_BELOW, Outcome, parameter_name};
 use crate::imu::ParameterKind;
 
 /// Rows that belong together.
@@ -146,7 +146,7 @@ pub(super) fn estimates(report: &Report, estimate: &Estimate) -> Markup {
         rows.filter_map(|i| row(group, i)).collect()
     });
     let of_terms = report.outcome.map_or_else(Vec::new, |outcome| {
-        further::rows(&outcome.further, report.true_terms)
+        further::rows(&outcome.auxiliary, report.true_terms)
             .into_iter()
             .map(|row| {
                 let shown = format!("{} ± {}", row.value, row.sigma);
@@ -196,11 +196,11 @@ pub(super) fn passes(outcome: &Outcome) -> Markup {
     let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
         vec![
             (n + 1).to_string(),
-            if pass.live { "live, fed back" } else { "held" }.to_owned(),
+            if pass.feedback { "live, fed back" } else { "held" }.to_owned(),
             three_digits(pass.largest_step),
-            number::whole(pass.merit),
+            number::whole(pass.cost),
             count(pass.observations),
-            three_digits(pass.merit / pass.observations as f64),
+            three_digits(pass.cost / pass.observations as f64),
             count(pass.rejected),
         ]
     });
@@ -259,7 +259,7 @@ pub(super) fn consistency(outcome: &Outcome) -> Markup {
 mod tests {
     use super::super::synthetic::synthetic;
     use super::*;
-    use crate::calibration::outcome::{from_vector, to_vector};
+    use crate::calibration::{from_vector, to_vector};
     use crate::imu::InstallationForm;
     use crate::units::PPM;
 

@@ -7,7 +7,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use super::group::{Group, axis_name};
 use super::number::{count, sigma, three_digits, value};
 use super::{Report, blocks, further, navigation, quality, side_by_side};
-use crate::calibration::outcome::{Estimate, Nis, Outcome, to_vector};
+use crate::calibration::{Estimate, Nis, Outcome, to_vector};
 
 impl Report<'_> {
     /// The estimates with their σ, what the run taught, and warnings.
@@ -36,20 +36,21 @@ impl Report<'_> {
 
     /// What the calibration leaves of gravity and turns.
     pub(super) fn quality_table(&self) -> Option<side_by_side::Table> {
-        quality::table(self.quality?, self.run)
+        quality::table(self.quality?, self.table())
     }
 
     /// What a calibration engineer must know before using the figures.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let of_closed_form = self.closed_form.map_or(&[][..], |closed| closed.warnings);
-        let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.warnings);
-        let mut warnings = [of_closed_form, of_outcome].concat();
+        let of_closed_form = self.closed_form.map_or(&[][..], |closed| closed.findings);
+        let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.findings);
+        let findings = of_closed_form.iter().chain(of_outcome);
+        let mut warnings: Vec<String> = findings.map(ToString::to_string).collect();
         warnings.extend(blocks::advice(self.effects));
         warnings
     }
 
     fn heading(&self) -> String {
-        let imu = &self.run.imu;
+        let imu = &self.run.recording.imu;
         let mut text = format!(
             "{}: {} s, {} samples at {} Hz, {} dwells",
             self.title,
@@ -107,7 +108,7 @@ impl Report<'_> {
             }
         }
         if let Some(outcome) = self.outcome {
-            for row in further::rows(&outcome.further, self.true_terms) {
+            for row in further::rows(&outcome.auxiliary, self.true_terms) {
                 let mut cells = vec![
                     if row.first {
                         row.title.to_owned()

@@ -3,8 +3,8 @@
 use super::group::Group;
 use super::synthetic::synthetic;
 use super::*;
-use crate::calibration::outcome::{Nis, Observation, parameter_name};
-use crate::calibration::states::{PARAMETERS, ParameterMatrix};
+use crate::calibration::{Nis, Observation, parameter_name};
+use crate::calibration::{PARAMETERS, ParameterMatrix};
 use crate::imu::InstallationForm;
 use crate::navigation::NearPole;
 
@@ -151,9 +151,9 @@ fn a_closed_form_alone_is_reported() {
 #[test]
 fn a_run_without_a_table_is_reported() {
     let mut made_up = synthetic(InstallationForm::General);
-    made_up.run.table = None;
-    made_up.outcome.live_history.clear();
-    made_up.outcome.passes.retain(|pass| !pass.live);
+    made_up.run.recording.table = None;
+    made_up.outcome.feedback_history.clear();
+    made_up.outcome.passes.retain(|pass| !pass.feedback);
     let innovations = &mut made_up.outcome.innovations;
     innovations.retain(|i| i.observation == Observation::Velocity);
     made_up.outcome.consistency.table = Nis {
@@ -234,8 +234,8 @@ fn a_filter_that_saw_next_to_nothing_is_reported() {
             table.time.clear();
             table.attitude.clear();
         }
-        made_up.run.imu.gyro.truncate(moments);
-        made_up.run.imu.accel.truncate(moments);
+        made_up.run.recording.imu.gyro.truncate(moments);
+        made_up.run.recording.imu.accel.truncate(moments);
         let page = page::page(&made_up.report(), &made_up.report().figures().unwrap());
         assert!(!page.contains("NaN"));
         assert!(page.contains("NOT converged"));

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::earth::Site;
-use crate::imu::{self, FurtherVector, PerSensor, Sensor};
+use crate::imu::{self, TermVector, PerSensor, Sensor};
 use crate::turntable::Motion;
 
 /// How increments are integrated.
@@ -26,7 +26,7 @@ pub fn true_increments(
     motion: &Motion,
     site: &Site,
     integrator: &Integrator,
-    further: &FurtherVector,
+    further: &TermVector,
 ) -> PerSensor<Vec<Vector3<f64>>> {
     let &Integrator { period, .. } = integrator;
     let samples = (motion.duration() / period + 1e-6) as usize;
@@ -67,7 +67,7 @@ struct Sensed<'a> {
     earth_rate_n: Vector3<f64>,
     gravity_n: Vector3<f64>,
     lever_arm: Vector3<f64>,
-    further: FurtherVector,
+    further: TermVector,
 }
 
 impl<'a> Sensed<'a> {
@@ -75,7 +75,7 @@ impl<'a> Sensed<'a> {
         motion: &'a Motion,
         site: &Site,
         lever_arm: Vector3<f64>,
-        further: FurtherVector,
+        further: TermVector,
     ) -> Self {
         Self {
             motion,
@@ -95,7 +95,7 @@ impl<'a> Sensed<'a> {
         let r = self.lever_arm;
         let force = acceleration.cross(&r) + rate.cross(&rate.cross(&r))
             - state.attitude.tr_mul(&self.gravity_n);
-        if self.further == FurtherVector::zeros() {
+        if self.further == TermVector::zeros() {
             return (rate, force);
         }
         let sensed = imu::Sensed {
@@ -179,7 +179,7 @@ mod tests {
             &motion,
             &site,
             &integrator(Vector3::zeros(), 4),
-            &FurtherVector::zeros(),
+            &TermVector::zeros(),
         );
         for (start, end) in motion.dwells() {
             let still = sample(start) + 1..sample(end) - 1;
@@ -211,7 +211,7 @@ mod tests {
             period: MILLISECOND,
             ..integrator(lever_arm, 2)
         };
-        let ideal = true_increments(motion, site, &fine, &FurtherVector::zeros());
+        let ideal = true_increments(motion, site, &fine, &TermVector::zeros());
         let mut attitude = motion.at(0.0).attitude;
         let mut velocity = Vector3::zeros();
         let (mut last_angle, mut last_force) = (Vector3::zeros(), Vector3::zeros());
@@ -266,12 +266,12 @@ mod tests {
     fn increments_do_not_depend_on_the_step() {
         let (motion, site) = demo();
         let arm = Vector3::new(0.3, -0.2, 0.1);
-        let coarse = true_increments(&motion, &site, &integrator(arm, 4), &FurtherVector::zeros());
+        let coarse = true_increments(&motion, &site, &integrator(arm, 4), &TermVector::zeros());
         let fine = true_increments(
             &motion,
             &site,
             &integrator(arm, 16),
-            &FurtherVector::zeros(),
+            &TermVector::zeros(),
         );
         for (coarse, fine) in coarse.gyro.iter().zip(&fine.gyro) {
             assert!((coarse - fine).norm() < 1e-14);

@@ -12,12 +12,12 @@ mod trial;
 use rayon::prelude::*;
 
 use super::navigation::NavigationStudyError;
-use crate::calibration::outcome::Nis;
-use crate::calibration::states::{PARAMETERS, ParameterVector};
-use crate::calibration::{BlockEffect, CalibrationError, Group, mean_square_interval};
+use crate::calibration::Nis;
+use crate::calibration::{PARAMETERS, ParameterVector};
+use crate::calibration::{ErrorTermTest, CalibrationError, Group, mean_square_interval};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
-use crate::run::StateBlock;
+use crate::calibration::ErrorTerm;
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
@@ -38,7 +38,7 @@ pub struct AccuracyStudy {
     /// The filter's installation form; the truth has that of the scenario.
     pub form: InstallationForm,
     /// Blocks of states whose errors are there and that the filter does not have.
-    pub unmodelled: Vec<StateBlock>,
+    pub unmodelled: Vec<ErrorTerm>,
     /// Number of runs.
     pub runs: u64,
     /// Seed; each run has its own streams of it.
@@ -85,8 +85,8 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each block of constants beside the parameters that was estimated.
     pub further: Vec<FurtherAccuracy>,
-    /// What each block of states did to the filter in the first run: see [`crate::calibration::block_effects`].
-    pub effects: Vec<BlockEffect>,
+    /// What each block of states did to the filter in the first run: see [`crate::calibration::test_error_terms`].
+    pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
     /// NIS of table attitude over all runs.

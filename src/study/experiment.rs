@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::Ratio;
 use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
 use super::ratio::{bootstrap, median, quantile};
-use crate::calibration::states::{PARAMETERS, ParameterVector, parameter};
+use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::ModelError;
 use crate::navigation::{Sensitivity, Trajectory, sensed_errors};

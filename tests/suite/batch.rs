@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use turncal::attitude::exp;
-use turncal::calibration::states::PARAMETERS;
+use turncal::calibration::PARAMETERS;
 use turncal::calibration::{Outcome, batch_estimate, estimate};
 use turncal::imu::InstallationForm;
 use turncal::run::Run;
@@ -39,8 +39,8 @@ fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
 /// The first 200 s of the demo's run.
 fn short() -> Run {
     let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-    run.imu.gyro.truncate(20_000);
-    run.imu.accel.truncate(20_000);
+    run.recording.imu.gyro.truncate(20_000);
+    run.recording.imu.accel.truncate(20_000);
     if let Some(table) = &mut run.table {
         let readings = table.time.partition_point(|&t| t <= 200.0);
         table.time.truncate(readings);

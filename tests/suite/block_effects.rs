@@ -5,7 +5,8 @@ use turncal::calibration::{
     BlockEffect, CalibrationError, Outcome, batch_estimate, block_effects, estimate,
 };
 use turncal::imu::{InstallationForm, Term};
-use turncal::run::{Run, StateBlock};
+use turncal::calibration::StateBlock;
+use turncal::run::Run;
 use turncal::simulation::Scenario;
 
 /// Fixed before the first run was made.

@@ -65,7 +65,7 @@ fn sections_laid_end_to_end_are_refused_where_turns_must_be_navigated() {
     let mut run = read(&directory);
     let refused = estimate(&run, FORM, &|_| {}).unwrap_err();
     assert_eq!(refused, CalibrationError::NotContinuous);
-    run.segments.truncate(5);
+    run.recording.segments.truncate(5);
     let refused = six_position(&run, FORM).unwrap_err().to_string();
     assert!(
         refused.contains("`y_down`") && refused.contains("each axis up and down"),

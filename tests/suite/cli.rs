@@ -5,8 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use turncal::run::CalibrationRecord;
-use turncal::run::record::Method;
+use turncal::calibration::result::{Calibration, Method};
 
 fn turncal() -> Command {
     Command::new(env!("CARGO_BIN_EXE_turncal"))
@@ -83,7 +82,7 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
             .assert()
             .success();
         let document = &output.get_output().stdout;
-        let record: CalibrationRecord = serde_json::from_slice(document).unwrap();
+        let record: Calibration = serde_json::from_slice(document).unwrap();
         assert_eq!(record.parameters.len(), record.covariance.len());
         let sigma = record.sigma.unwrap();
         for (name, variance) in [
@@ -156,7 +155,7 @@ fn both_methods_may_follow_one_another_without_a_name_for_their_output() {
     here(&["calibrate", "mine/run.toml", "--method", "six-position"]);
     let method = |name: &str| {
         let path = directory.path().join(name).join("calibration.json");
-        let record = CalibrationRecord::read(&path).unwrap();
+        let record = Calibration::read(&path).unwrap();
         record.method
     };
     assert_eq!(method("mine-calibration"), Some(Method::Ekf));

@@ -7,7 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use turncal::calibration::{CalibrationError, Outcome, estimate};
 use turncal::imu::{InstallationForm, Output, Sensor};
-use turncal::run::{FaultKind, Run, write_run};
+use turncal::formats::write_run;
+use turncal::recording::FaultKind;
+use turncal::run::Run;
 use turncal::simulation::Scenario;
 
 use crate::shared::{read, shared};
@@ -171,7 +173,7 @@ fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
 
     let run = log.read();
     let of = |kind| {
-        run.imu
+        run.recording.imu
             .faults
             .iter()
             .filter(move |fault| fault.kind == kind)
@@ -190,8 +192,8 @@ fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
         assert!(fault.samples.start.abs_diff(start) <= 3, "{fault:?}");
         assert!(fault.samples.len().abs_diff(second) <= 5, "{fault:?}");
     }
-    assert_eq!(run.imu.len(), log.clean.imu.len());
-    assert_eq!(run.notes.len(), 4, "{:?}", run.notes);
+    assert_eq!(run.recording.imu.len(), log.clean.imu.len());
+    assert_eq!(run.recording.notes.len(), 4, "{:?}", run.recording.notes);
 
     let spoilt = calibrated(&run);
     let (rms, least, most) = against(&clean, &spoilt);

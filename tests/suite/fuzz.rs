@@ -11,13 +11,15 @@ use proptest::sample::{Index, select};
 use proptest::test_runner::{Config, TestRunner};
 use tempfile::TempDir;
 use turncal::calibration::{Correction, estimate, six_position};
-use turncal::draft::Draft;
+use turncal::formats::draft::Draft;
 use turncal::imu::{InstallationForm, Output};
 use turncal::models;
 use turncal::noise::Stretch;
 use turncal::noise::conventions::convert;
 use turncal::report::check::CheckReport;
-use turncal::run::{CalibrationRecord, Run, write_run};
+use turncal::formats::write_run;
+use turncal::calibration::result::Calibration;
+use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::survey::Survey;
 
@@ -330,7 +332,7 @@ fn spoilt_calibrations() {
     record.write(&path, false).unwrap();
     fuzz(&run, "calibration.json", |directory| {
         let path = directory.join("calibration.json");
-        let record = CalibrationRecord::read(&path).map_err(|error| error.to_string())?;
+        let record = Calibration::read(&path).map_err(|error| error.to_string())?;
         if let Ok(correction) = Correction::for_run(&record, &read) {
             let _ = correction.samples(&read).last();
         }

@@ -47,10 +47,10 @@ fn completed(draft: &str, known: &BTreeMap<&str, String>) -> String {
 /// What the file says in a row.
 fn raw(run: &Run, sensor: Sensor, k: usize) -> [f64; 3] {
     let samples = match sensor {
-        Sensor::Gyro => &run.imu.gyro,
-        Sensor::Accel => &run.imu.accel,
+        Sensor::Gyro => &run.recording.imu.gyro,
+        Sensor::Accel => &run.recording.imu.accel,
     };
-    samples[k].component_mul(&run.nominal.get(sensor).0).into()
+    samples[k].component_mul(&run.instrument.nominal.get(sensor).0).into()
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
             );
             for k in [0, 1000, 5000] {
                 let [found, given] =
-                    [&found, &given].map(|run| raw(run, sensor, k).map(|v| v / run.imu.period));
+                    [&found, &given].map(|run| raw(run, sensor, k).map(|v| v / run.recording.imu.period));
                 let same = found
                     .iter()
                     .zip(given)

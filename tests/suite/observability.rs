@@ -1,7 +1,7 @@
 //! What a path cannot observe is said, and nothing is invented.
 
-use turncal::calibration::outcome::parameter_name;
-use turncal::calibration::states::PARAMETERS;
+use turncal::calibration::parameter_name;
+use turncal::calibration::PARAMETERS;
 use turncal::imu::InstallationForm;
 use turncal::simulation::Scenario;
 

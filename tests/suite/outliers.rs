@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::attitude::exp;
-use turncal::calibration::outcome::{Observation, to_vector};
-use turncal::calibration::states::{PARAMETERS, ParameterVector};
+use turncal::calibration::{Observation, to_vector};
+use turncal::calibration::{PARAMETERS, ParameterVector};
 use turncal::calibration::{Outcome, estimate};
 use turncal::imu::InstallationForm;
 use turncal::run::Run;
@@ -35,10 +35,10 @@ fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng)
 /// none.
 fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
     // What a velocity is known to after a stretch: the walk since the last one, and a pulse's share.
-    let variance = run.noise.accel.random_walk.powi(2) * 0.1 + run.imu.pulse.accel.powi(2) / 12.0;
+    let variance = run.instrument.noise.accel.random_walk.powi(2) * 0.1 + run.recording.imu.pulse.accel.powi(2) / 12.0;
     let velocity = direction(rng) * (SIZE * variance.sqrt());
-    run.imu.accel[sample] += velocity;
-    run.imu.accel[sample + 1] -= velocity;
+    run.recording.imu.accel[sample] += velocity;
+    run.recording.imu.accel[sample + 1] -= velocity;
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {

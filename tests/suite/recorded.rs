@@ -1,10 +1,10 @@
 //! Records that other programs made, with known truth.
 
-use turncal::calibration::outcome::to_vector;
-use turncal::calibration::states::PARAMETERS;
+use turncal::calibration::to_vector;
+use turncal::calibration::PARAMETERS;
 use turncal::calibration::{Outcome, estimate, triads_of};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
-use turncal::run::CalibrationRecord;
+use turncal::calibration::result::Calibration;
 use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 use crate::shared::{read, shared};
@@ -13,9 +13,9 @@ use crate::shared::{read, shared};
 fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
-    let truth = CalibrationRecord::read(&directory.join("truth.json")).unwrap();
+    let truth = Calibration::read(&directory.join("truth.json")).unwrap();
     let outcome = estimate(&run, InstallationForm::General, &|_| {}).unwrap();
-    let truth = triads_of(&truth, &run.nominal, InstallationForm::General);
+    let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);
     let mut largest = [0f64; 6];
     for index in 0..PARAMETERS {

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use turncal::calibration::outcome::to_vector;
-use turncal::calibration::states::ParameterVector;
+use turncal::calibration::to_vector;
+use turncal::calibration::ParameterVector;
 use turncal::calibration::{Outcome, estimate, mean_square_interval};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::models::{InstallationModel, Place};

@@ -2,11 +2,13 @@
 
 use nalgebra::SMatrix;
 use rayon::prelude::*;
-use turncal::calibration::outcome::to_vector;
+use turncal::calibration::to_vector;
 use turncal::calibration::{Outcome, estimate, mean_square_interval};
 use turncal::imu::{FURTHER, FurtherVector, InstallationForm, Term};
-use turncal::run::record::{EQUATION, EQUATION_WITH_TERMS};
-use turncal::run::{CalibrationRecord, StateBlock, TABLE_GEOMETRY};
+use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
+use turncal::calibration::StateBlock;
+use turncal::calibration::result::Calibration;
+use turncal::turntable::TABLE_GEOMETRY;
 use turncal::simulation::{Scenario, Simulated};
 
 use crate::shared::{read, shared};
@@ -96,8 +98,8 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
     let scenario = Scenario::load(models.to_str().unwrap()).unwrap();
     let made = scenario.simulate(scenario.seed, 0).unwrap();
     let read = turncal::run::Run::read(&run.join("run.toml")).unwrap();
-    assert_eq!(read.further_sigma, made.run.further_sigma);
-    let truth = CalibrationRecord::read(&run.join("truth.json")).unwrap();
+    assert_eq!(read.further_sigma, made.run.instrument.further_sigma);
+    let truth = Calibration::read(&run.join("truth.json")).unwrap();
     let offset = made.further[Term::TimeOffset.parameters().start];
     assert_eq!(truth.terms["accel.time_offset"].value, offset);
     assert_eq!(truth.terms.len(), 1);
@@ -123,7 +125,7 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
 
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
-    run.further_sigma = FurtherVector::zeros();
+    run.instrument.further_sigma = FurtherVector::zeros();
     let outcome = estimate(&run, FORM, &|_| {}).unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
@@ -152,8 +154,8 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
         run.switch_on(StateBlock::Term(term));
     }
     let outcome = estimate(&run, FORM, &|_| {}).unwrap();
-    let truth = CalibrationRecord::read(&directory.join("truth.json")).unwrap();
-    let truth = turncal::calibration::triads_of(&truth, &run.nominal, FORM);
+    let truth = Calibration::read(&directory.join("truth.json")).unwrap();
+    let truth = turncal::calibration::triads_of(&truth, &run.instrument.nominal, FORM);
     let error = outcome.estimate.vector() - to_vector(&truth);
     for index in outcome.estimate.estimated() {
         let sigmas = error[index] / outcome.estimate.sigma()[index];

@@ -7,7 +7,7 @@ use turncal::imu::{
     InstallationForm, Output, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Triad,
 };
 use turncal::models::{InstallationModel, Instrument, Place};
-use turncal::run::record::BodyFrame;
+use turncal::imu::BodyFrame;
 use turncal::simulation::{Given, Scenario, Simulated};
 use turncal::units::{ARCSEC, DEGREE, PPM};
 
@@ -61,12 +61,12 @@ fn dwells_are_found_in_the_instruments_own_record_where_the_table_has_them() {
         assert_eq!(seen_by_imu.len(), seen_by_table.len(), "{name}");
         for (imu, table) in seen_by_imu.iter().zip(&seen_by_table) {
             // The table's dwells are cut by 0.2 s at each end.
-            let margin = (0.2 / run.imu.period).round() as usize;
+            let margin = (0.2 / run.recording.imu.period).round() as usize;
             let begin = table.samples.start.saturating_sub(margin);
             assert!(imu.samples.start >= begin, "{name}: {imu:?} {table:?}");
             assert!(imu.samples.end <= table.samples.end + margin, "{name}");
             let lost = table.samples.len() as f64 - imu.samples.len() as f64;
-            assert!(lost * run.imu.period < 1.5, "{name}: {imu:?} {table:?}");
+            assert!(lost * run.recording.imu.period < 1.5, "{name}: {imu:?} {table:?}");
         }
     }
 }
@@ -94,7 +94,7 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
             ..Given::default()
         });
         let mut run = without_table(&scenario, 0).run;
-        for prior in [&mut run.prior.gyro, &mut run.prior.accel] {
+        for prior in [&mut run.instrument.prior.gyro, &mut run.instrument.prior.accel] {
             prior.scale_sigma = Vector3::repeat(200.0 * PPM);
             prior.installation_sigma = Vector3::repeat(200.0 * ARCSEC);
         }

@@ -4,11 +4,10 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{DMatrix, Vector3};
 
-use super::super::outcome::to_vector;
-use super::super::states::{ParameterMatrix, ParameterVector, parameter};
+use super::super::model::Model;
+use super::super::parameters::{ParameterMatrix, ParameterVector, parameter, to_vector};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::Block;
-use crate::run::Run;
 
 /// An instrument without noise is still not better than this, rad or m/s: an equation needs a σ.
 const ROUNDING: f64 = 1e-9;
@@ -22,25 +21,23 @@ pub(super) struct Equations {
 
 impl Equations {
     /// The prior's equations, for these triads.
-    pub(super) fn new(run: &Run, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
-        let form = at.gyro.form;
-        let prior = to_vector(&run.prior_mean(form));
+    pub(super) fn new(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
         let at = to_vector(at);
-        let sigmas = run.prior_sigma(form);
         let mut equations = Self {
             unknown: Vec::new(),
             rows: Vec::new(),
         };
         for &sensor in sensors {
-            for (of_triad, &sigma) in sigmas.get(sensor).iter().enumerate() {
+            for of_triad in 0..PER_TRIAD {
                 let index = parameter(sensor, of_triad);
+                let sigma = model.prior_sigma[index];
                 if sigma > 0.0 {
                     let mut row = ParameterVector::zeros();
                     row[index] = 1.0 / sigma;
                     equations.unknown.push(index);
                     equations
                         .rows
-                        .push((row, (prior[index] - at[index]) / sigma));
+                        .push((row, (model.prior_mean[index] - at[index]) / sigma));
                 }
             }
         }

@@ -1,5 +1,5 @@
-use super::super::outcome::from_vector;
-use super::super::states::{ParameterMatrix, parameter};
+use super::super::parameters::from_vector;
+use super::super::parameters::{ParameterMatrix, parameter};
 use super::*;
 use crate::imu::Sensor;
 

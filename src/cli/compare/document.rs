@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use turncal::calibration::outcome::parameter_name;
-use turncal::calibration::states::ParameterVector;
+use turncal::calibration::ParameterVector;
+use turncal::calibration::parameter_name;
 use turncal::calibration::{ChiSquare, Comparison, Nees, Side};
+use turncal::imu::BodyFrame;
 use turncal::imu::InstallationForm;
 use turncal::report::group::Group;
-use turncal::run::record::BodyFrame;
 
 /// Differences are calibration less reference; units are those of the group that a key names.
 #[derive(Serialize)]

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
+use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
-use turncal::run::record::BodyFrame;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
 use super::super::calibrate::{Aiding, Installation};
-use super::super::error_term::ErrorTerm;
+use super::super::error_term::TermArgument;
 use super::super::input::{at_least_two, seed};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
@@ -48,10 +48,10 @@ pub struct Accuracy {
     truth_installation: Option<String>,
     /// Error terms to simulate and to estimate, beside those of the scenario
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
-    with: Vec<ErrorTerm>,
+    with: Vec<TermArgument>,
     /// Error terms to simulate and not to estimate
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
-    unmodelled: Vec<ErrorTerm>,
+    unmodelled: Vec<TermArgument>,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
@@ -77,7 +77,7 @@ impl Accuracy {
         }
         for term in self.with.iter().chain(&self.unmodelled) {
             term.needs_table(Some(self.aiding));
-            scenario = scenario.with_block(term.0);
+            scenario = scenario.with_error_term(term.0);
         }
         let study = AccuracyStudy {
             unmodelled: self.unmodelled.iter().map(|term| term.0).collect(),

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::facts::{passes, rejected};
 use super::merit::journey_name;
 use super::verdict::white_within;
-use crate::calibration::outcome::Nis;
+use crate::calibration::Nis;
 use crate::imu::InstallationForm;
-use crate::run::record::BlockRecord;
+use crate::calibration::result::BlockRecord;
 use crate::study::accuracy::{self, Region};
 use crate::study::navigation::{FORTY_HOURS, INTERVAL};
 use crate::study::{Accuracy, Figures, Ratio};
@@ -41,7 +41,7 @@ struct Document<'a> {
     /// Each block of states beside K, E and D that was estimated, in SI.
     blocks: BTreeMap<&'static str, Block>,
     /// What blocks of states did to the filter in the first run, or would have done.
-    block_effects: Vec<BlockRecord>,
+    test_error_terms: Vec<BlockRecord>,
     /// One for each mission.
     navigation: Vec<Navigation>,
 }
@@ -187,7 +187,7 @@ pub fn document(accuracy: &Accuracy) -> impl Serialize {
                 (of.block.name(), block)
             })
             .collect(),
-        block_effects: accuracy.effects.iter().map(BlockRecord::from).collect(),
+        test_error_terms: accuracy.effects.iter().map(BlockRecord::from).collect(),
         navigation: navigation(accuracy),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::super::further::title;
 use super::super::number::{count, minutes, three_digits, value};
-use crate::run::StateBlock;
+use crate::calibration::ErrorTerm;
 use crate::study::Accuracy;
 use crate::units::DEGREE;
 
@@ -77,9 +77,9 @@ pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
 /// Which blocks of states the filter had, and which it should have had.
 fn blocks(accuracy: &Accuracy) -> String {
     let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
-    let there = StateBlock::ALL.into_iter().filter(|&b| scenario.has(b));
+    let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
     let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
-    let named = |blocks: &[StateBlock]| {
+    let named = |blocks: &[ErrorTerm]| {
         let titles: Vec<&str> = blocks.iter().map(|&block| title(block)).collect();
         match titles[..] {
             [] => "none".to_owned(),

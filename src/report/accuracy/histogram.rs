@@ -11,7 +11,7 @@ use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
 use super::tables;
 use crate::calibration::Group;
-use crate::calibration::states::PARAMETERS;
+use crate::calibration::PARAMETERS;
 use crate::study::Accuracy;
 
 /// Half the width of the axis in σ, unless more than one error in twenty lies beyond.

@@ -6,7 +6,7 @@ use super::super::number::{count, interval, minutes, ratio, three_digits, value}
 use super::super::side_by_side::Table;
 use super::merit::{Merit, journey_name, merits, region_name};
 use super::verdict::white_within;
-use crate::calibration::outcome::Nis;
+use crate::calibration::Nis;
 use crate::study::accuracy::FurtherAccuracy;
 use crate::study::{Accuracy, Ratio};
 

@@ -5,7 +5,7 @@ use super::super::number::{count, interval, minutes, ratio, value};
 use super::super::study::Sentence;
 use super::merit::{journey_name, merits, region_name};
 use super::tables::{self, percent};
-use crate::calibration::outcome::Nis;
+use crate::calibration::Nis;
 use crate::imu::Output;
 use crate::study::accuracy::Containment;
 use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{CheckReport, words};
 use crate::imu::{AXES, PerSensor, Sensor};
-use crate::run::{Fault, LabelledMotion};
+use crate::recording::{Fault, LabelledMotion};
 use crate::survey::{LabelCheck, MethodOutlook, Rest, Turn, Verdict};
 use crate::units::DEGREE;
 
@@ -136,7 +136,7 @@ struct Method<'a> {
 
 pub(super) fn document<'a>(report: &CheckReport<'a>) -> impl Serialize + use<'a> {
     let (run, survey) = (report.run, report.survey);
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let mut fault_samples = BTreeMap::new();
     for fault in &imu.faults {
         *fault_samples.entry(fault.kind.name()).or_default() += fault.samples.len();
@@ -147,14 +147,14 @@ pub(super) fn document<'a>(report: &CheckReport<'a>) -> impl Serialize + use<'a>
         .enumerate()
         .map(|(way, rests)| (words::way_up(way / 2, way % 2 == 1), rests));
     Document {
-        run: &run.name,
+        run: &run.recording.name,
         samples: imu.len(),
         sample_period_s: imu.period,
         rate_hz: imu.period.recip(),
         duration_s: imu.duration(),
         continuous: imu.continuous,
-        table_readings: run.table.as_ref().map_or(0, |table| table.time.len()),
-        unit: &run.unit,
+        table_readings: run.recording.table.as_ref().map_or(0, |table| table.time.len()),
+        unit: &run.instrument.unit,
         log: log(report),
         faults: imu
             .faults
@@ -183,7 +183,7 @@ pub(super) fn document<'a>(report: &CheckReport<'a>) -> impl Serialize + use<'a>
 }
 
 fn log<'a>(report: &CheckReport<'a>) -> Option<Log<'a>> {
-    let log = report.run.imu.log.as_ref()?;
+    let log = report.run.recording.imu.log.as_ref()?;
     let columns = Sensor::ALL.into_iter().flat_map(|sensor| {
         let steps = report.survey.steps.get(sensor);
         log.columns.get(sensor).iter().zip(steps).zip(AXES).map(
@@ -214,7 +214,7 @@ fn log<'a>(report: &CheckReport<'a>) -> Option<Log<'a>> {
 }
 
 fn fault_facts<'a>(report: &CheckReport<'a>, fault: &Fault) -> FaultFacts<'a> {
-    let imu = &report.run.imu;
+    let imu = &report.run.recording.imu;
     FaultFacts {
         kind: fault.kind.name(),
         column: fault.axis.and_then(|(sensor, axis)| {
@@ -241,7 +241,7 @@ fn dwell(report: &CheckReport, rest: &Rest) -> Dwell {
 }
 
 fn motion(report: &CheckReport, turn: &Turn) -> Motion {
-    let (imu, rests) = (&report.run.imu, &report.survey.rests);
+    let (imu, rests) = (&report.run.recording.imu, &report.survey.rests);
     Motion {
         start_s: imu.time(turn.samples.start),
         end_s: imu.time(turn.samples.end),

@@ -29,7 +29,7 @@ pub(super) fn figure(report: &CheckReport) -> Result<Figure, ReportError> {
                        axis and angle, or angle alone if about several axes, where there is \
                        room."
         .to_owned();
-    if !report.run.imu.faults.is_empty() {
+    if !report.run.recording.imu.faults.is_empty() {
         caption += " Crosses: faults of the log in the triad's samples, missing and duplicate rows in both.";
     }
     Figure::draw("record.svg", "Record", caption, SIZE, |area| {
@@ -40,7 +40,7 @@ pub(super) fn figure(report: &CheckReport) -> Result<Figure, ReportError> {
 }
 
 fn triad(report: &CheckReport, area: &Area, sensor: Sensor) -> Result<(), DrawError> {
-    let imu = &report.run.imu;
+    let imu = &report.run.recording.imu;
     let (samples, unit, title) = match sensor {
         Sensor::Gyro => (&imu.gyro, DEGREE, "angular rate, °/s"),
         Sensor::Accel => (&imu.accel, 1.0, "specific force, m/s²"),
@@ -65,7 +65,7 @@ fn triad(report: &CheckReport, area: &Area, sensor: Sensor) -> Result<(), DrawEr
         (low.min(y), high.max(y))
     });
     let span = (high - low).max(1e-9);
-    let (start, end) = (imu.start, imu.start + imu.duration());
+    let (start, end) = (imu.start(), imu.start() + imu.duration());
     let (bottom, top) = (low - 0.12 * span, high + 0.3 * span);
     let dwells: Vec<_> = report
         .survey
@@ -127,7 +127,7 @@ fn triad(report: &CheckReport, area: &Area, sensor: Sensor) -> Result<(), DrawEr
 }
 
 fn turns(report: &CheckReport) -> Vec<(f64, String)> {
-    let imu = &report.run.imu;
+    let imu = &report.run.recording.imu;
     let middle =
         |samples: &std::ops::Range<usize>| 0.5 * (imu.time(samples.start) + imu.time(samples.end));
     let turns = report.survey.turns.iter();

@@ -6,7 +6,7 @@ use super::CheckReport;
 use super::words::{degrees, direction, of_label, signed, way_up};
 use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
-use crate::run::LabelledMotion;
+use crate::recording::LabelledMotion;
 use crate::survey::{Turn, Verdict};
 use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 
@@ -34,7 +34,7 @@ fn table(title: &'static str, headings: &[&str], rows: Vec<Vec<String>>, notes: 
 }
 
 fn columns(report: &CheckReport) -> Option<Table> {
-    let (run, log) = (report.run, report.run.imu.log.as_ref()?);
+    let (run, log) = (report.run, report.run.recording.imu.log.as_ref()?);
     let rows = Sensor::ALL.into_iter().flat_map(|sensor| {
         let columns = log
             .columns
@@ -53,7 +53,7 @@ fn columns(report: &CheckReport) -> Option<Table> {
                 count(column.at_smallest),
                 exactly(column.largest),
                 count(column.at_largest),
-                run.unit.get(sensor).clone(),
+                run.instrument.unit.get(sensor).clone(),
                 column.step.map_or(NONE.to_owned(), three_digits),
                 rate.map_or(NONE.to_owned(), |rate| {
                     format!("{} {symbol}", three_digits(rate / unit))
@@ -89,8 +89,8 @@ fn exactly(x: f64) -> String {
 }
 
 fn faults(report: &CheckReport) -> Option<Table> {
-    let imu = &report.run.imu;
-    let row = |fault: &crate::run::Fault| {
+    let imu = &report.run.recording.imu;
+    let row = |fault: &crate::recording::Fault| {
         let column = fault.axis.and_then(|(sensor, axis)| {
             Some(imu.log.as_ref()?.columns.get(sensor)[axis].name.clone())
         });
@@ -225,7 +225,7 @@ fn methods(report: &CheckReport) -> Table {
     headings.extend(Group::all().map(|group| format!("{}, {}", group.short(), group.unit())));
     let mut notes = vec![
         "RMS 1σ to be expected in the general form, from the prior's own σ on, linearised where the filter would begin; \
-         the closed form's from its equations. Further terms are not in it."
+         the closed form's from its equations. Auxiliary terms are not in it."
             .to_owned(),
     ];
     let mut rows = Vec::new();

@@ -21,7 +21,7 @@ fn a_sound_run_is_shown_with_nothing_to_change() {
 #[test]
 fn gyros_of_the_wrong_sign_or_unit_are_found_by_table_and_gravity() {
     let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-    for sample in &mut run.imu.gyro {
+    for sample in &mut run.recording.imu.gyro {
         sample.x = -sample.x;
     }
     let survey = Survey::of(&run);

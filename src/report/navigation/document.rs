@@ -5,8 +5,8 @@ use serde::{Serialize, Serializer};
 use super::quantity::Quantity;
 use super::{HOUR, Navigation, PAPER_HOURS};
 use crate::attitude::to_pitch_roll_heading;
-use crate::run::record::BodyFrame;
-use crate::study::navigation::{Moment, Motion};
+use crate::imu::BodyFrame;
+use crate::study::navigation::{Epoch, Motion};
 use crate::units::DEGREE;
 
 #[derive(Serialize)]
@@ -48,7 +48,7 @@ struct Row {
 struct Values([f64; 9]);
 
 impl Values {
-    fn largest<'m>(moments: impl Iterator<Item = &'m Moment>) -> Self {
+    fn largest<'m>(moments: impl Iterator<Item = &'m Epoch>) -> Self {
         let mut largest = [0f64; 9];
         for moment in moments {
             for (largest, quantity) in largest.iter_mut().zip(Quantity::ALL) {
@@ -65,7 +65,7 @@ impl Serialize for Values {
     }
 }
 
-fn row(moment: &Moment) -> Row {
+fn row(moment: &Epoch) -> Row {
     Row {
         t_h: moment.time / HOUR,
         errors: Values(Quantity::ALL.map(|quantity| quantity.error(&moment.error))),

@@ -6,7 +6,7 @@ use super::super::panel::{Margins, Panel};
 use super::super::{Figure, ReportError};
 use super::HOUR;
 use super::quantity::Quantity;
-use crate::study::navigation::Moment;
+use crate::study::navigation::Epoch;
 
 /// Points of a line: more than the panel is wide in pixels would not show.
 const POINTS: usize = 1000;
@@ -20,7 +20,7 @@ pub(in crate::report) struct Side<'a> {
     /// What its line is called.
     pub(in crate::report) name: &'a str,
     /// Its errors.
-    pub(in crate::report) moments: &'a [Moment],
+    pub(in crate::report) moments: &'a [Epoch],
 }
 
 /// Attitude, velocity and position, one figure each. Several navigations share the axes; one alone has

@@ -18,7 +18,7 @@ fn mission() -> Mission {
 }
 
 /// Errors that grow with time to two hours, σ half of them.
-fn moments(covariance: bool) -> Vec<Moment> {
+fn moments(covariance: bool) -> Vec<Epoch> {
     (0..=120)
         .map(|k| {
             let part = f64::from(k) / 120.0;
@@ -28,7 +28,7 @@ fn moments(covariance: bool) -> Vec<Moment> {
                 position: Vector3::new(3.0, 4.0, 0.0) * NAUTICAL_MILE * part,
             };
             let sigma = error.to_vector() * 0.5;
-            Moment {
+            Epoch {
                 time: f64::from(k) * INTERVAL,
                 error,
                 covariance: covariance
@@ -38,7 +38,7 @@ fn moments(covariance: bool) -> Vec<Moment> {
         .collect()
 }
 
-fn navigation<'a>(mission: &'a Mission, moments: &'a [Moment]) -> Navigation<'a> {
+fn navigation<'a>(mission: &'a Mission, moments: &'a [Epoch]) -> Navigation<'a> {
     Navigation {
         calibration: "monday",
         truth: "truth",

@@ -2,10 +2,10 @@
 
 use super::{Comparison, FLAGGED, NONE, Table};
 use crate::calibration::Canonical;
-use crate::calibration::further::{CONSTANTS, Constant, constant_name};
+use crate::calibration::{AUXILIARY, AuxiliaryKind, auxiliary_name};
 use crate::report::further::unit;
 use crate::report::number::{sigma, three_digits, value};
-use crate::run::record::TermRecord;
+use crate::calibration::result::TermRecord;
 
 /// The constants that any calibration has; none if none has any.
 pub(super) fn table(comparison: &Comparison) -> Option<Table> {
@@ -17,8 +17,8 @@ pub(super) fn table(comparison: &Comparison) -> Option<Table> {
             .any(|c| of(c, name).is_some())
     };
     let row = |index: usize| {
-        let name = constant_name(index)?;
-        let (unit, in_si) = unit(Constant::of(index)?.block());
+        let name = auxiliary_name(index)?;
+        let (unit, in_si) = unit(AuxiliaryKind::of(index)?.error_term());
         has(&name).then(|| {
             let own = of(reference, &name);
             let mut row = vec![
@@ -32,7 +32,7 @@ pub(super) fn table(comparison: &Comparison) -> Option<Table> {
             row
         })
     };
-    let rows: Vec<Vec<String>> = (0..CONSTANTS).filter_map(row).collect();
+    let rows: Vec<Vec<String>> = (0..AUXILIARY).filter_map(row).collect();
     let mut headings = vec![String::new(), reference.name.clone(), "unit".to_owned()];
     for side in sides() {
         headings.push(side.name.clone());
@@ -43,7 +43,7 @@ pub(super) fn table(comparison: &Comparison) -> Option<Table> {
         headings,
         sections: vec![rows],
         notes: vec![
-            "Further terms and errors of the table: values ± the 1σ that each calibration claims; z: \
+            "Auxiliary terms and errors of the table: values ± the 1σ that each calibration claims; z: \
              difference to the reference in its σ, where both have it."
                 .to_owned(),
         ],

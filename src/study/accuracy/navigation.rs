@@ -7,7 +7,7 @@ use statrs::function::erf::erf;
 
 use super::figures::Squares;
 use super::{Baseline, Figures, Trial};
-use crate::calibration::states::{PARAMETERS, ParameterMatrix, ParameterVector};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::{InstallationForm, PerSensor};
 use crate::models::{self, ModelError, Place};
 use crate::simulation::Scenario;
@@ -239,7 +239,7 @@ impl Containment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::outcome::{from_vector, to_vector};
+    use crate::calibration::{from_vector, to_vector};
     use crate::imu::Triad;
     use crate::study::navigation::Pair;
     use rand::{RngExt, SeedableRng};

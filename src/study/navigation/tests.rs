@@ -7,8 +7,8 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::*;
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::outcome::{from_vector, to_vector};
-use crate::calibration::states::{ParameterVector, sensor_and_parameter};
+use crate::calibration::{from_vector, to_vector};
+use crate::calibration::{ParameterVector, sensor_and_parameter};
 use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};

@@ -4,12 +4,14 @@ use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
 use turncal::imu::{Instability, Noise, Nominal, PerSensor, Prior, Sensor};
-use turncal::run::{ImuRecord, LabelledMotion, Run, Segment, Standstill, TableRecord};
+use turncal::recording::{LabelledMotion, Segment};
+use turncal::recording::{ImuSamples, TableLog};
+use turncal::run::{Run, Standstill};
 use turncal::units::DEGREE;
 
 /// A run that turns and stands, with every optional part.
 pub fn made_run(name: &str) -> Run {
-    let imu = ImuRecord {
+    let imu = ImuSamples {
         start: 3.25,
         period: 1.0 / 128.0,
         continuous: true,
@@ -67,7 +69,7 @@ pub fn made_run(name: &str) -> Run {
             velocity_sigma: Some(2e-6),
             position_sigma: 0.4,
         },
-        table: Some(TableRecord {
+        table: Some(TableLog {
             time: (0..20).map(|k| 3.25 + 0.125 * f64::from(k)).collect(),
             attitude: (0..20)
                 .map(|k| attitude::exp(Vector3::new(0.1, -0.2, 0.3) * f64::from(k)))
