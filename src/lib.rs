@@ -12,6 +12,11 @@
 //! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`], [`export`]
 //! writes what other programs read. [`draft`] looks at a log of which nothing is known, [`survey`] at a run
 //! before it is calibrated.
+//!
+//! # Features
+//! `report` (pages, figures, tables: [`report`]) and `cli` (the command `turncal`, with `report`) are on by
+//! default. Without them no crate of a user interface is compiled:
+//! `turncal = { version = "…", default-features = false }`.
 
 pub mod attitude;
 pub mod calibration;
@@ -22,6 +27,7 @@ pub mod models;
 pub mod navigation;
 pub mod noise;
 pub mod recording;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod run;
 pub mod simulation;

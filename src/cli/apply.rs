@@ -11,6 +11,7 @@ use turncal::imu::{Sensor, Term};
 use turncal::run::Run;
 use turncal::units::PPM;
 
+use super::input::run_file;
 use super::output::{keep, stream};
 use super::progress::Activity;
 
@@ -20,19 +21,19 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Turns a run's raw samples into angular rate and specific force
 ///
 /// Writes a row a sample: its begin and end in s, angular rate in rad/s and specific force in m/s², both
-/// mean over the sample, along right, front and up of the calibration's body frame. Auxiliary terms of
-/// the calibration are taken out, too; its time offset takes the inertial rate for that over the
-/// Earth. The file is itself a record for a run.toml: output = "rate", time_stamp = "end".
+/// mean over the sample, along right, front and up of the calibration's body frame. Error terms of
+/// the calibration are corrected, too; the correction of its time offset neglects Earth rate. The file is
+/// itself a record for a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal apply result/calibration.json my-run/run.toml -o calibrated.csv.gz
-  turncal apply result/calibration.json my-run/run.toml | head")]
+  turncal apply result/calibration.json run.toml -o calibrated.csv.gz
+  turncal apply result/calibration.json run.toml | head")]
 pub struct Apply {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
     /// The run's run.toml
-    #[arg(value_name = "RUN.toml")]
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
@@ -116,7 +117,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     }
     if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
         notes.push(
-            "the record is not continuous, so the size effect is taken out without its part by \
+            "the record is not continuous, so the size effect is corrected without its part by \
              angular acceleration"
                 .to_owned(),
         );

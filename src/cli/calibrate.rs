@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
@@ -17,23 +18,28 @@ use turncal::report::{self, Navigated, Report};
 use turncal::run::Run;
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
-use super::block::Block;
+use super::error_term::TermArgument;
+use super::input::run_file;
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 
 /// Estimates scale factors, installation and biases of a run
 ///
-/// Writes DIR/calibration.json and DIR/report/ and prints a summary.
+/// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
+/// failure.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate my-run/run.toml
-  turncal calibrate my-run/run.toml -o result --truth my-run/truth.json
+  turncal calibrate my-run/run.toml -o mine --truth my-run/truth.json
+  turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale")]
 pub struct Calibrate {
     /// The run's run.toml
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
-    /// Directory to write [default: NAME-calibration, or nothing with --json]
+    /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method;
+    /// nothing with --json]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// How to estimate
@@ -45,10 +51,10 @@ pub struct Calibrate {
     /// What is observed [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Blocks of states to estimate, beside those that the run switches on
-    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
-    with: Vec<Block>,
-    /// True calibration; the estimator never sees it, summary and report show errors against it
+    /// Error terms to estimate, beside those that the run switches on
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    with: Vec<TermArgument>,
+    /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Print the calibration as one JSON document and nothing else
@@ -80,9 +86,9 @@ pub enum Installation {
 /// What the filter observes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Aiding {
-    /// Standstill, and the attitude of the table
+    /// Zero velocity in every dwell, and the attitude of the table
     Table,
-    /// Standstill alone; the accelerometers fix the body axes
+    /// Zero velocity alone; the accelerometers define the body axes
     Velocity,
 }
 
@@ -116,6 +122,17 @@ impl From<Method> for calibration::Method {
 
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
+        if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
+            let message = format!(
+                "--with {}: --method six-position estimates scale factors, installation and biases only; \
+                 leave --with out, or estimate it by --method ekf\n",
+                term.0.name()
+            );
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
+        for term in &self.with {
+            term.needs_table(self.aiding);
+        }
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let run = Run::read(&self.run)?;
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
@@ -142,7 +159,10 @@ impl Calibrate {
         let target = match (&self.output, self.json) {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
-            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.recording.name))),
+            (None, false) => Some(PathBuf::from(match self.method {
+                Method::Ekf => format!("{}-calibration", run.recording.name),
+                Method::SixPosition => format!("{}-calibration-six-position", run.recording.name),
+            })),
         };
         let directory = target
             .as_deref()
@@ -242,7 +262,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
     };
     let minutes = closed_form.standing_time / 60.0;
     let digits = usize::from(minutes < 10.0);
-    format!("{from}, {minutes:.digits$} min of standing")
+    format!("{from}, {minutes:.digits$} min at rest")
 }
 
 /// Navigates 40 h standing level at the run's site by the calibration of each method.

@@ -12,7 +12,7 @@ use turncal::report::side_by_side;
 use super::names::short_names;
 use super::output::Delivery;
 
-/// Calibrations side by side, parameter by parameter, with their σ.
+/// Calibrations side by side, parameter by parameter, with their σ
 ///
 /// All are brought to the general installation form and to one body frame first. Without a truth the
 /// first is the reference. From three on, mean, scatter and χ² of the scatter against the claimed σ

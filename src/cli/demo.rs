@@ -9,6 +9,7 @@ use turncal::report::{self, Report};
 use turncal::simulation::{Scenario, Simulated};
 
 use super::calibrate::{dwell_times, navigate, note, solve, write_report};
+use super::input::seed;
 use super::output::{Overwrite, print};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
@@ -27,7 +28,7 @@ pub struct Demo {
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
     output: PathBuf,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     overwrite: Overwrite,

@@ -9,6 +9,7 @@ use turncal::formats::export;
 use turncal::formats::write_whole;
 use turncal::run::Run;
 
+use super::input::run_file;
 use super::output::{keep, print};
 
 /// Writes a calibration as what other programs read
@@ -18,8 +19,9 @@ use super::output::{keep, print};
 /// a format cannot hold is said in the file and on standard error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal export result/calibration.json --format c -o turncal_calibration.h
-  turncal export result/calibration.json --format kalibr --run my-run/run.toml -o imu.yaml
+  turncal export result/calibration.json --format c -o imu.h
+  turncal export result/calibration.json --format kalibr \\
+      --run my-run/run.toml -o imu.yaml
   turncal export result/calibration.json --format text")]
 pub struct Export {
     /// The calibration
@@ -29,7 +31,7 @@ pub struct Export {
     #[arg(long, value_enum)]
     format: Format,
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
-    #[arg(long, value_name = "RUN.toml")]
+    #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]

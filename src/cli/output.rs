@@ -12,7 +12,7 @@ use turncal::report::ReportError;
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Overwrite {
-    /// Replace the output directory if it exists
+    /// Replace the output directory if it exists and holds only what turncal wrote
     #[arg(long)]
     force: bool,
 }
@@ -102,6 +102,12 @@ pub fn keep<'a>(
         );
     }
     Ok(())
+}
+
+/// How wide standard output is: that of its terminal, else what COLUMNS says, else without limit.
+pub fn columns() -> Option<u16> {
+    let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
+    terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
 }
 
 /// Writes to standard output. A reader that has seen enough, such as `head`, is no failure.

@@ -11,13 +11,14 @@ use turncal::formats::write_run;
 use turncal::imu::{TERM_PARAMETERS, Term};
 use turncal::simulation::{Scenario, Simulated};
 
+use super::input::seed;
 use super::output::Overwrite;
 use super::progress::Activity;
 
 /// Makes a run directory with known truth from a scenario
 ///
-/// The scenario is a TOML file or the name of an embedded one: demo, demo-six-position,
-/// nineteen-position, two-axis, mems.
+/// Writes run.toml, the logs that it names and truth.json. The scenario is a TOML file or the name of an
+/// embedded one; turncal list shows them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7")]
 pub struct Simulate {
@@ -27,7 +28,7 @@ pub struct Simulate {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     overwrite: Overwrite,
@@ -47,7 +48,7 @@ impl Simulate {
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             eprintln!(
-                "note: the axes of the simulated table are not square, which the quaternions of its log \
+                "note: the axes of the simulated table are not orthogonal, which the quaternions of its log \
                  cannot tell: a calibration from these files will claim too small σ of installation. \
                  turncal study accuracy estimates their tilts."
             );

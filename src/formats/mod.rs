@@ -26,6 +26,6 @@ pub use error::{FileError, Place};
 pub(crate) use quantity::unit_scale;
 pub(crate) use sheet::Sheet;
 pub(crate) use whole::write_whole_with;
-pub use whole::{WholeDirectory, write_whole};
+pub use whole::{WholeDirectory, abandon_unfinished, write_whole};
 pub(crate) use write::write_rows;
 pub use write::write_run;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{Calibration, Method};
 
 fn turncal() -> Command {
     Command::new(env!("CARGO_BIN_EXE_turncal"))
@@ -129,25 +129,55 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
 }
 
 #[test]
-fn an_existing_output_is_kept_unless_forced() {
+fn an_existing_output_is_kept_unless_forced_and_a_users_file_in_any_case() {
     let directory = tempfile::tempdir().unwrap();
     let output = directory.path().join("out");
-    fs::create_dir(&output).unwrap();
-    fs::write(output.join("mine.txt"), "precious").unwrap();
-    let refused = turncal()
-        .args(["simulate", "demo", "-o"])
-        .arg(&output)
-        .assert();
-    let refused = refused.code(1);
-    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    let simulate = |arguments: &[&str]| {
+        let mut command = turncal();
+        command.args(["simulate", "demo", "-o"]).arg(&output);
+        command.args(arguments).assert()
+    };
+    let refusal = |arguments: &[&str]| {
+        let refused = simulate(arguments).code(1);
+        String::from_utf8_lossy(&refused.get_output().stderr).into_owned()
+    };
+    simulate(&[]).success();
+    let first = bytes_below(&output);
+    let message = refusal(&["--seed", "7"]);
     assert!(message.contains("--force"), "{message}");
-    assert!(output.join("mine.txt").exists());
-    turncal()
-        .args(["simulate", "demo", "--force", "-o"])
-        .arg(&output)
-        .assert()
-        .success();
-    assert!(output.join("truth.json").exists());
+    assert!(bytes_below(&output) == first);
+    simulate(&["--seed", "7", "--force"]).success();
+    let second = bytes_below(&output);
+    assert!(second.keys().eq(first.keys()) && second != first);
+
+    fs::write(output.join("mine.txt"), "precious").unwrap();
+    let message = refusal(&["--force"]);
+    assert!(message.contains("`mine.txt`"), "{message}");
+    assert_eq!(bytes_below(&output)["mine.txt"], b"precious");
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn both_methods_may_follow_one_another_without_a_name_for_their_output() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = |arguments: &[&str]| {
+        let mut command = turncal();
+        command.current_dir(&directory).args(arguments);
+        command.assert().success();
+    };
+    here(&["simulate", "demo", "-o", "mine"]);
+    here(&["calibrate", "mine/run.toml"]);
+    here(&["calibrate", "mine/run.toml", "--method", "six-position"]);
+    let method = |name: &str| {
+        let path = directory.path().join(name).join("calibration.json");
+        let record = Calibration::read(&path).unwrap();
+        record.method
+    };
+    assert_eq!(method("mine-calibration"), Some(Method::Ekf));
+    assert_eq!(
+        method("mine-calibration-six-position"),
+        Some(Method::SixPosition)
+    );
 }
 
 #[test]

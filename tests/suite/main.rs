@@ -12,8 +12,12 @@ mod compare;
 mod door;
 mod export;
 mod faults;
+mod features;
 mod fuzz;
+mod help;
 mod init;
+#[cfg(unix)]
+mod interrupted;
 mod modules;
 mod navigate;
 mod navigation;
@@ -25,4 +29,5 @@ mod simulated;
 mod study;
 mod table1;
 mod terms;
+mod threads;
 mod velocity;
