@@ -115,7 +115,7 @@ fn noise(file: &mut Document, source: &Source) {
         let noise: Option<&Noise> = source.run.map(|run| run.instrument.noise.get(sensor));
         // Over times short against its correlation time a Gauss–Markov bias walks like this.
         let walk = noise
-            .and_then(|noise| noise.bias_variation)
+            .and_then(|noise| noise.gauss_markov)
             .map(|bias| bias.sigma * (2.0 / bias.correlation_time).sqrt());
         let density = noise.map(|noise| noise.random_walk);
         key(

@@ -163,7 +163,7 @@ fn noise(file: &mut Document, source: &Source) {
     let wander = |sensor| {
         noise
             .as_ref()
-            .and_then(|noise| noise.get(sensor).bias_variation)
+            .and_then(|noise| noise.get(sensor).gauss_markov)
     };
     let mut key = |name: &str, value: Option<f64>, unit: &str| match value {
         Some(value) => {

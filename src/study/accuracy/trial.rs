@@ -88,7 +88,7 @@ impl AccuracyStudy {
         let duration = record.recording.imu.duration();
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
-        let bound = bound(&problem, &attainable, &simulated.further)
+        let bound = bound(&problem, &attainable, &simulated.terms)
             .map_err(|source| StudyError::Bound { run, source })?;
         for &term in &self.unmodelled {
             problem.model.switch_off(term);
@@ -98,7 +98,7 @@ impl AccuracyStudy {
             Ok(outcome) if run == 0 => test_error_terms(&problem, outcome).unwrap_or_default(),
             _ => Vec::new(),
         };
-        let further = auxiliary_vector(&simulated.geometry, &simulated.further);
+        let further = auxiliary_vector(&simulated.geometry, &simulated.terms);
         let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,

@@ -47,10 +47,9 @@ impl Variances {
         };
         Self {
             white: each(&|n| n.random_walk.powi(2)),
-            wander: each(&|n| n.bias_variation.map_or(0.0, |i| i.sigma.powi(2))),
+            wander: each(&|n| n.gauss_markov.map_or(0.0, |i| i.sigma.powi(2))),
             correlation_time: each(&|n| {
-                n.bias_variation
-                    .map_or(f64::INFINITY, |i| i.correlation_time)
+                n.gauss_markov.map_or(f64::INFINITY, |i| i.correlation_time)
             }),
         }
     }
