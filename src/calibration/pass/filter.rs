@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::measurement::Measurement;
 use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::{PerSensor, Sensor, TermVector};
@@ -21,19 +22,6 @@ pub(in crate::calibration) struct Filter {
     p: DMatrix<f64>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-}
-
-/// Uncertainty at the first sample of a stretch, 1σ, and the mean of its attitude error.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::calibration) struct Start {
-    /// Mean of φ₀, rad.
-    pub attitude: Vector3<f64>,
-    /// East, North and Up, rad.
-    pub attitude_sigma: Vector3<f64>,
-    /// m/s
-    pub velocity_sigma: f64,
-    /// m
-    pub position_sigma: f64,
 }
 
 impl Filter {
