@@ -236,7 +236,7 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
     sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
     sections.extend(terms_text(run));
     sections.push(format!(
-        "# how still the IMU is while the table stands\n[standstill]\nposition_sigma_m = {:?}\n",
+        "# how still the IMU is while the table is at rest\n[standstill]\nposition_sigma_m = {:?}\n",
         run.standstill.position_sigma
     ));
     if let Some(sigma) = run.standstill.velocity_sigma {
@@ -321,8 +321,7 @@ fn terms_text(run: &Run) -> Option<String> {
         (sigma > 0.0).then(line)
     });
     let lines: String = on.collect();
-    (!lines.is_empty())
-        .then(|| format!("# further error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
+    (!lines.is_empty()).then(|| format!("# error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
 }
 
 fn meta_text(meta: &BTreeMap<String, String>) -> String {
