@@ -38,6 +38,9 @@ impl Filter {
             x[state] = terms[index];
             p[(state, state)] = model.term_sigma[index].powi(2);
         }
+        if let Some(gravity) = layout.gravity() {
+            p[(gravity, gravity)] = model.gravity_sigma.powi(2);
+        }
         if let Some(base) = layout.table_base() {
             for axis in 0..3 {
                 p[(base + axis, base + axis)] = model.geometry.base[axis].powi(2);
@@ -156,15 +159,17 @@ impl Filter {
             of_triad(sensor, parameter)
         });
         let terms = block.terms.iter().map(|term| term.column.column(0));
+        // Stated gravity that is too small pulls the computed velocity down too little.
+        let t = block.duration;
+        let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
+        let gravity = self.layout.gravity().map(|_| pull);
         // A bias does the same whether it varies or stays.
         let varying = self.layout.varying_biases();
         let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        navigation
-            .chain(parameters)
-            .chain(terms)
-            .chain(varying)
-            .map(|column| std::array::from_fn(|row| column[row]))
-            .collect()
+        let known = navigation.chain(parameters).chain(terms);
+        let known = known.map(|column| std::array::from_fn(|row| column[row]));
+        let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
+        known.chain(gravity).chain(varying).collect()
     }
 
     /// Varying biases forget as time goes by, and are driven.
@@ -369,6 +374,12 @@ impl Filter {
     /// Covariance of two states' errors.
     pub fn covariance(&self, one: usize, other: usize) -> f64 {
         self.p[(one, other)]
+    }
+
+    /// Mean and 1σ of the error of gravity, true − stated; zero where it is no state.
+    pub fn gravity(&self) -> (f64, f64) {
+        let of = |state: usize| (self.x[state], self.p[(state, state)].max(0.0).sqrt());
+        self.layout.gravity().map_or((0.0, 0.0), of)
     }
 
     /// 1σ of the initial attitude error φ₀ of this stretch, East, North and Up.

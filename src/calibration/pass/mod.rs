@@ -63,6 +63,8 @@ pub(super) struct PassResult {
     pub covariance: ParameterMatrix,
     /// Parameters of error terms and table.
     pub auxiliary: Auxiliary,
+    /// Mean and 1σ of the error of gravity, true − stated, m/s².
+    pub gravity: (f64, f64),
     /// Of the initial attitude of the last stretch.
     pub attitude_covariance: AttitudeCovariance,
     /// 1σ of the initial attitude of the last stretch, East, North and Up.
@@ -431,6 +433,7 @@ impl Sums {
             estimate,
             covariance: filter.parameter_covariance(),
             auxiliary: auxiliary(filter, &self.at.terms, prior_sigma),
+            gravity: filter.gravity(),
             attitude_covariance,
             attitude_sigma,
             cost: self.cost,
