@@ -38,9 +38,6 @@ impl Filter {
             x[state] = terms[index];
             p[(state, state)] = model.term_sigma[index].powi(2);
         }
-        if let Some(gravity) = layout.gravity() {
-            p[(gravity, gravity)] = model.gravity_sigma.powi(2);
-        }
         if let Some(base) = layout.table_base() {
             for axis in 0..3 {
                 p[(base + axis, base + axis)] = model.geometry.base[axis].powi(2);
@@ -64,8 +61,8 @@ impl Filter {
 
     /// A stretch begins: navigation errors and the table's position start anew, `anew` tells whether the
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, as in another recording.
-    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool) {
+    /// 4th ed., §3.8) does, too, as in another recording; `gravity` is its 1σ at another site.
+    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude();
         for axis in 0..3 {
             for (first, mean, sigma) in [
@@ -84,6 +81,9 @@ impl Filter {
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
         self.redraw_table(table_sigma);
+        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+            self.redraw(state, 0.0, sigma);
+        }
         if anew {
             for k in 0..self.varying.len() {
                 let (state, sigma, _) = self.varying[k];

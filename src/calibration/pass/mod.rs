@@ -120,10 +120,12 @@ pub(super) fn pass(
             Mode::Held(_) => *prior,
         };
         let start = stretch.start(&known, &at.initial_attitudes[number]);
-        let anew = before != Some(stretch.recording);
-        before = Some(stretch.recording);
+        let anew = before.is_none_or(|b: &Stretch| b.recording != stretch.recording);
+        let moved = before.is_none_or(|b: &Stretch| b.run.site != stretch.run.site);
+        before = Some(stretch);
+        let gravity = moved.then_some(stretch.run.site.gravity_sigma);
         let table = model.position_sigma;
-        sums.filter.begin(&start, table, anew);
+        sums.filter.begin(&start, table, anew, gravity);
         let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
         one.run()?;
         sums = one.sums;
