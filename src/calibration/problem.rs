@@ -81,6 +81,7 @@ impl<'a> Problem<'a> {
         all.extend(stretches(run, others.len(), &self.model));
         Self {
             others,
+            model,
             stretches: all.into(),
             ..self.clone()
         }
