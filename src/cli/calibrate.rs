@@ -13,13 +13,14 @@ use turncal::calibration::{
     in_body_frame, triads_of,
 };
 use turncal::imu::{InstallationForm, PerSensor, Triad};
-use turncal::report::{self, Navigated, Report};
+use turncal::report::Document;
+use turncal::report::calibration::{self as of_calibration, Navigated, Report};
 use turncal::run::record::TermRecord;
 use turncal::run::{CalibrationRecord, Run};
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
 use super::block::Block;
-use super::output::{Overwrite, print};
+use super::output::{Overwrite, print, show};
 use super::progress::Activity;
 
 /// Estimates scale factors, installation and biases of a run
@@ -220,26 +221,29 @@ impl Calibrate {
             effects: &effects,
             quality: Some(&quality),
             true_terms: &true_terms,
-            closed_form: result.closed_form().map(|closed_form| report::ClosedForm {
-                estimate: &closed_form.estimate,
-                note: &note,
-                warnings: &closed_form.warnings,
-            }),
+            closed_form: result
+                .closed_form()
+                .map(|closed_form| of_calibration::ClosedForm {
+                    estimate: &closed_form.estimate,
+                    note: &note,
+                    warnings: &closed_form.warnings,
+                }),
             truth: truth_in_form.as_ref(),
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
+        let document = report.document();
         activity.next("writing");
         if let Some(directory) = directory {
             record.write(&directory.path().join("calibration.json"), false)?;
-            write_report(&report, &directory.path().join("report"))?;
+            write_report(&document, &directory.path().join("report"))?;
             directory.commit()?;
         }
         drop(activity);
         if self.json {
             return print(&record.to_json(Path::new("standard output"))?);
         }
-        print(report.summary().as_bytes())?;
+        show(&document, false)?;
         if let Some(target) = target {
             let page = target.join("report").join("index.html");
             eprintln!("\nreport: {}", page.display());
@@ -300,10 +304,10 @@ pub fn dwell_times(run: &Run) -> Vec<Range<f64>> {
 }
 
 /// Writes a report into a new directory.
-pub fn write_report(report: &Report, directory: &Path) -> anyhow::Result<()> {
+pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
     std::fs::create_dir(directory)
         .with_context(|| format!("cannot create {}", directory.display()))?;
-    Ok(report.write(directory)?)
+    Ok(turncal::report::write(document, directory)?)
 }
 
 /// In the general form, which can hold any truth, with the constants beside it that it states.

@@ -40,10 +40,6 @@ impl Check {
             run: &run,
             survey: &survey,
         };
-        begun.deliver(
-            |directory| report.write(directory),
-            || report.document(),
-            || report.summary(),
-        )
+        begun.deliver(&report.document())
     }
 }

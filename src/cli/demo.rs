@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use anyhow::Context;
 use turncal::calibration::{self, ClosedForm};
 use turncal::imu::InstallationForm;
-use turncal::report::{self, Report};
+use turncal::report::calibration::{self as of_calibration, Report};
 use turncal::simulation::{Scenario, Simulated};
 
 use super::calibrate::{dwell_times, filter, navigate, note, write_report};
-use super::output::{Overwrite, print};
+use super::output::{Overwrite, show};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
 
@@ -73,7 +73,7 @@ impl Demo {
             effects: &effects,
             quality: Some(&quality),
             true_terms: &BTreeMap::new(),
-            closed_form: Some(report::ClosedForm {
+            closed_form: Some(of_calibration::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
                 warnings: &closed_form.warnings,
@@ -82,6 +82,7 @@ impl Demo {
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
+        let document = report.document();
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;
@@ -97,11 +98,11 @@ impl Demo {
         record.write(&filtered.join("calibration.json"), false)?;
         let record = closed_form.record(&standing.run, &closed_form.quality(&standing.run)?);
         record.write(&closed.join("calibration.json"), false)?;
-        write_report(&report, &root.join("report"))?;
+        write_report(&document, &root.join("report"))?;
         directory.commit()?;
         drop(activity);
 
-        print(report.summary().as_bytes())?;
+        show(&document, false)?;
         let page = self.output.join("report").join("index.html");
         eprintln!("\nreport: {}", page.display());
         Ok(())

@@ -1,33 +1,23 @@
-//! The report of a navigation: one table for terminal and page, figures against time in the manner of
-//! the paper's Figures 2 to 10, the errors minute by minute as CSV, and one JSON document.
-
-mod document;
-mod figures;
-pub(super) mod outlook;
-mod quantity;
-#[cfg(test)]
-mod tests;
+//! The report of a navigation: errors with their predicted σ as table, as figures against time in the manner of
+//! the paper's Figures 2 to 10, minute by minute as CSV, and hour by hour as JSON.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use maud::html;
-use serde::Serialize;
+use serde_json::{Map, Value, json};
 
-use super::page::{document as html_document, drawn};
-use super::side_by_side::Table;
-use super::{ReportError, facts, number, terminal, write_files};
+use super::document::{Document, Facts, NONE, Table, cells};
+use super::number::{or_dash, three_digits, value};
+use super::plot::{Axis, Panel, Plot, Point, Series};
+use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::Sensor;
 use crate::run::record::BodyFrame;
 use crate::study::navigation::{INTERVAL, Mission, Moment, Motion};
 use crate::units::{DEGREE, NAUTICAL_MILE};
-use quantity::Quantity;
 
 const HOUR: f64 = 3600.0;
 /// Hours over which the paper gives the drift of position.
 const PAPER_HOURS: f64 = 40.0;
-const NONE: &str = "–";
 
 /// A navigation with what it was made of.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +28,7 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// False if the calibration says that its method did not converge.
     pub converged: bool,
-    /// Whether one of the two has further terms, which are not navigated.
+    /// Whether one of the two has error terms beside K, E and D, which are not navigated.
     pub terms: bool,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
@@ -53,73 +43,42 @@ pub struct Navigation<'a> {
 }
 
 impl Navigation<'_> {
-    /// The navigation as text.
-    pub fn summary(&self) -> String {
-        let mut text = format!("{}\n{}", self.title(), terminal::facts(&self.facts()));
-        for warning in self.warnings() {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "\nWarning: {warning}");
+    /// Everything that is said of the navigation.
+    pub fn document(&self) -> Document {
+        let (calibration, truth) = (self.calibration, self.truth);
+        let title = format!("Navigation error of {calibration} against {truth}");
+        let mut document = Document::new(title);
+        document.warnings.items = self.warnings();
+        document.both(self.facts());
+        document.both(self.table());
+        for plot in self.figures() {
+            document.page(plot);
         }
-        let _ = write!(text, "\n{}", terminal::columns(&self.table()));
-        text
-    }
-
-    /// The errors hour by hour, and their extremes, as one JSON document.
-    pub fn document(&self) -> impl Serialize {
-        document::document(self)
-    }
-
-    /// Writes `navigation.csv`, `index.html`, which needs nothing else, and every figure as an SVG file
-    /// of its own into an existing directory.
-    ///
-    /// # Errors
-    /// [`ReportError`] if a figure cannot be drawn or a file not be written.
-    pub fn write(&self, directory: &Path) -> Result<(), ReportError> {
-        let figures = figures::figures(&[figures::Side {
-            name: "error",
-            moments: self.moments,
-        }])?;
-        let path = directory.join("navigation.csv");
-        std::fs::write(&path, self.csv()).map_err(|source| ReportError::Write { path, source })?;
-        let title = self.title();
-        let body = html! {
-            header { h1 { (title) } }
-            @for warning in self.warnings() { p.warnings { (warning) } }
-            (super::tables::section(&self.table()))
-            @for figure in &figures { (drawn(figure)) }
-            section { h2 { "The navigation" } (facts::facts(&self.facts())) }
-        };
-        write_files(directory, &html_document(&title, &body), &figures)
-    }
-
-    fn title(&self) -> String {
-        format!(
-            "Navigation error of {} against {}",
-            self.calibration, self.truth
-        )
+        document.files = vec![("navigation.csv".to_owned(), self.csv())];
+        document.data = self.data();
+        document
     }
 
     fn hours(&self) -> f64 {
         f64::from(self.mission.intervals) * INTERVAL / HOUR
     }
 
-    fn facts(&self) -> Vec<(String, String)> {
-        let degrees = |angle: f64| number::value(angle / DEGREE, 0.01);
+    fn facts(&self) -> Facts {
+        let degrees = |angle: f64| value(angle / DEGREE, 0.01);
         let motion = match &self.mission.motion {
             Motion::Standing(at) => {
                 let [pitch, roll, heading] = to_pitch_roll_heading(&at.attitude).map(degrees);
                 format!(
-                    "standing at latitude {}°, height {} m; pitch {pitch}°, roll {roll}°, heading \
-                     {heading}°",
+                    "stationary at latitude {}°, height {} m; pitch {pitch}°, roll {roll}°, heading {heading}°",
                     degrees(at.latitude),
-                    number::value(at.height, 10.0),
+                    value(at.height, 10.0),
                 )
             }
             Motion::Moving(trajectory) => format!(
                 "{} from latitude {}°, height {} m",
                 self.trajectory.unwrap_or("a trajectory"),
                 degrees(trajectory.start().latitude),
-                number::value(trajectory.start().height, 10.0),
+                value(trajectory.start().height, 10.0),
             ),
         };
         let errors = match self.only {
@@ -127,47 +86,42 @@ impl Navigation<'_> {
             Some(Sensor::Gyro) => "of the gyros; the accelerometers are exact",
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
-        let hours = number::three_digits(self.hours());
-        [
+        let start = "perfect alignment, velocity and position; height is held to the true one";
+        let rows = [
             ("motion", motion),
-            ("duration", format!("{hours} h")),
+            ("duration", format!("{} h", three_digits(self.hours()))),
             ("errors", errors.to_owned()),
             ("body frame", self.body_frame.words().to_owned()),
-            (
-                "start",
-                "perfect alignment, velocity and position; height is held to the true one"
-                    .to_owned(),
-            ),
-        ]
-        .map(|(name, value)| (name.to_owned(), value))
-        .to_vec()
+            ("start", start.to_owned()),
+        ];
+        Facts::new("The navigation", rows)
     }
 
     fn warnings(&self) -> Vec<String> {
+        let name = self.calibration;
         let mut warnings = Vec::new();
         if !self.converged {
-            warnings.push(format!(
-                "{} did not converge: its σ mean nothing.",
-                self.calibration
-            ));
+            warnings.push(format!("{name} did not converge: its σ mean nothing."));
         }
         if self.moments.iter().any(|m| m.covariance.is_none()) {
-            warnings.push(format!(
-                "{} claims no σ, so none is predicted.",
-                self.calibration
-            ));
+            warnings.push(format!("{name} claims no σ, so none is predicted."));
         }
         if self.terms {
-            warnings.push(
-                "Further error terms are taken for exact: these are the errors that K, E and D leave."
-                    .to_owned(),
-            );
+            let text = "Error terms beside K, E and D are taken for exact: these are the errors that K, E and D \
+                        leave.";
+            warnings.push(text.to_owned());
         }
         warnings
     }
 
+    /// Position error at the end over the time, nmile/h.
+    fn drift(&self) -> Option<f64> {
+        let last = self.moments.last().filter(|last| last.time > 0.0)?;
+        Some(last.error.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
+    }
+
     fn table(&self) -> Table {
-        let headings = [
+        let columns = [
             "",
             "unit",
             "largest",
@@ -177,50 +131,94 @@ impl Navigation<'_> {
             "error/σ",
         ];
         let rows = Quantity::ALL.map(|quantity| self.row(quantity));
-        let [attitude, velocity, position] = [0..3, 3..6, 6..9].map(|r| rows[r].to_vec());
-        let mut notes = vec![
-            "Computed less true. σ: of the error at the end, predicted from the calibration's \
-             covariance; of horizontal errors the root of the mean square."
-                .to_owned(),
-        ];
-        if let Some(last) = self.moments.last().filter(|last| last.time > 0.0) {
-            let end = last.error.horizontal_position() / NAUTICAL_MILE;
-            let drift = end / (last.time / HOUR);
-            notes.push(format!(
+        let table = Table::new("Errors", columns)
+            .sections(rows.chunks(3).map(<[_]>::to_vec))
+            .note(
+                "Computed minus true. σ: of the error at the end, predicted from the calibration's covariance; \
+                 of horizontal errors the root of the mean square.",
+            );
+        match self.drift() {
+            None => table,
+            Some(drift) => table.note(format!(
                 "Position at the end over the time: {} nmile/h, {} nmile/{PAPER_HOURS} h.",
-                number::three_digits(drift),
-                number::three_digits(drift * PAPER_HOURS),
-            ));
-        }
-        Table {
-            title: "Errors",
-            headings: headings.map(str::to_owned).to_vec(),
-            sections: vec![attitude, velocity, position],
-            notes,
+                three_digits(drift),
+                three_digits(drift * PAPER_HOURS),
+            )),
         }
     }
 
     fn row(&self, quantity: Quantity) -> Vec<String> {
         let error = |moment: &Moment| quantity.error(&moment.error);
-        let size = |m: &&Moment| error(m).abs();
-        let largest = self
-            .moments
-            .iter()
-            .max_by(|a, b| size(a).total_cmp(&size(b)));
+        let magnitude = |m: &&Moment| error(m).abs();
+        let moments = self.moments.iter();
+        let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
         let last = self.moments.last();
         let sigma = last.and_then(|m| quantity.sigma(m)).filter(|s| *s > 0.0);
-        let shown =
-            |m: Option<&Moment>| m.map_or(NONE.to_owned(), |m| number::three_digits(error(m)));
         let ratio = last.zip(sigma).filter(|_| quantity.is_component());
-        vec![
-            quantity.name().to_owned(),
-            quantity.unit().to_owned(),
-            shown(largest),
-            largest.map_or(NONE.to_owned(), |m| number::value(m.time / HOUR, 1.0)),
-            shown(last),
-            sigma.map_or(NONE.to_owned(), number::three_digits),
-            ratio.map_or(NONE.to_owned(), |(m, s)| number::value(error(m) / s, 1.0)),
+        cells![
+            quantity.name(),
+            quantity.unit(),
+            or_dash(largest.map(error), three_digits),
+            or_dash(largest.map(|m| m.time / HOUR), |t| value(t, 1.0)),
+            or_dash(last.map(error), three_digits),
+            or_dash(sigma, three_digits),
+            ratio.map_or(NONE.to_owned(), |(m, s)| value(error(m) / s, 1.0)),
         ]
+    }
+
+    /// Attitude, velocity and position against time with their predicted σ as a band.
+    fn figures(&self) -> [Plot; 3] {
+        let horizontal =
+            " Horizontal: length of both components, with the root of its predicted mean square.";
+        let figures = [
+            ("attitude.svg", "Attitude error", ""),
+            ("velocity.svg", "Velocity error", horizontal),
+            ("position.svg", "Position error", horizontal),
+        ];
+        let mut quantities = Quantity::ALL.chunks(3);
+        figures.map(|(file, heading, more)| {
+            let quantities = quantities.next().unwrap_or_default().iter();
+            let panels = quantities.map(|&quantity| self.panel(quantity));
+            Plot::new(file, heading, (1, 210), panels).caption(format!(
+                "Computed minus true. Line: actual error by full navigation; band: ±1σ predicted from the \
+                 calibration's covariance by the linear model, within which the error of two calibrations in \
+                 three lies at any one time.{more}"
+            ))
+        })
+    }
+
+    fn panel(&self, quantity: Quantity) -> Panel {
+        let errors = self
+            .moments
+            .iter()
+            .map(|m| (m.time / HOUR, quantity.error(&m.error)));
+        let sigmas = self
+            .moments
+            .iter()
+            .filter_map(|m| Some((m.time / HOUR, quantity.sigma(m)?)));
+        let (mut errors, mut upper): (Vec<Point>, Vec<Point>) =
+            (errors.collect(), sigmas.collect());
+        let largest = errors
+            .iter()
+            .chain(&upper)
+            .map(|p| p.1.abs())
+            .fold(0.0, f64::max);
+        let (unit, scale) = quantity.readable_unit(largest);
+        for point in errors.iter_mut().chain(&mut upper) {
+            point.1 *= scale;
+        }
+        let sign = if quantity.is_component() { -1.0 } else { 0.0 };
+        let lower = upper.iter().map(|&(t, s)| (t, sign * s)).collect();
+        // Exactly zero everywhere has no range of its own.
+        let y = match largest > 0.0 {
+            true => Axis::linear("").including([0.0]).room(0.06, 0.06),
+            false => Axis::linear("").between(-1.0, 1.0),
+        };
+        let title = format!("{}, {unit}", quantity.name());
+        Panel::new(title, Axis::hours(self.hours()), y)
+            .with(Series::band(lower, upper).label("σ"))
+            .with(Series::zero())
+            .with(Series::line(errors).label("error"))
     }
 
     /// A row a minute: time, errors, predicted σ where there is one.
@@ -233,6 +231,7 @@ impl Navigation<'_> {
         }
         text.push('\n');
         for moment in self.moments {
+            // Writing to a string cannot fail.
             let _ = write!(text, "{}", moment.time / HOUR);
             let errors = Quantity::ALL.map(|q| Some(q.error(&moment.error)));
             let sigmas = Quantity::ALL.map(|q| q.sigma(moment));
@@ -242,5 +241,186 @@ impl Navigation<'_> {
             text.push('\n');
         }
         text
+    }
+
+    fn data(&self) -> Value {
+        let hourly = || {
+            self.moments
+                .iter()
+                .filter(|moment| moment.time % HOUR == 0.0)
+        };
+        let (latitude, height, attitude) = match &self.mission.motion {
+            Motion::Standing(at) => (
+                at.latitude,
+                at.height,
+                Some(to_pitch_roll_heading(&at.attitude)),
+            ),
+            Motion::Moving(path) => (path.start().latitude, path.start().height, None),
+        };
+        let mut data = json!({
+            "calibration": self.calibration,
+            "truth": self.truth,
+            "body_frame": self.body_frame,
+            "errors": self.only.map_or("both", |sensor| sensor.name()),
+        });
+        if let Some(name) = self.trajectory {
+            data["trajectory"] = name.into();
+        }
+        data["latitude_deg"] = (latitude / DEGREE).into();
+        data["height_m"] = height.into();
+        if let Some(angles) = attitude {
+            data["attitude_deg"] = json!(angles.map(|angle| angle / DEGREE));
+        }
+        data["hours"] = self.hours().into();
+        data["series"] = hourly().map(at).collect();
+        data["max_abs"] = largest(hourly());
+        data["max_abs_by_minute"] = largest(self.moments.iter());
+        data["final"] = self.moments.last().map(at).into();
+        data["drift_nmile_per_h"] = self.drift().into();
+        data["drift_nmile_per_40_h"] = self.drift().map(|drift| drift * PAPER_HOURS).into();
+        data
+    }
+}
+
+/// One number for each quantity under its key.
+fn by_key(of: impl Fn(Quantity) -> f64) -> Map<String, Value> {
+    let all = Quantity::ALL.into_iter();
+    all.map(|quantity| (quantity.key().to_owned(), of(quantity).into()))
+        .collect()
+}
+
+/// Errors and their predicted σ at one time.
+fn at(moment: &Moment) -> Value {
+    let mut row = Map::from_iter([("t_h".to_owned(), (moment.time / HOUR).into())]);
+    row.extend(by_key(|quantity| quantity.error(&moment.error)));
+    let sigma = moment.covariance.as_ref();
+    let sigma = sigma.map(|_| by_key(|quantity| quantity.sigma(moment).unwrap_or_default()));
+    row.insert("sigma".to_owned(), sigma.into());
+    row.into()
+}
+
+fn largest<'m>(moments: impl Iterator<Item = &'m Moment> + Clone) -> Value {
+    let of = |quantity: Quantity| {
+        moments
+            .clone()
+            .map(|m| quantity.error(&m.error).abs())
+            .fold(0.0, f64::max)
+    };
+    by_key(of).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector3};
+
+    use super::super::{svg, terminal};
+    use super::*;
+    use crate::navigation::{ErrorMatrix, NavigationError, Solution};
+    use crate::units::ARCSEC;
+
+    fn mission() -> Mission {
+        Mission {
+            motion: Motion::Standing(Solution {
+                attitude: Matrix3::identity(),
+                velocity: Vector3::zeros(),
+                latitude: 45.0 * DEGREE,
+                longitude: 0.0,
+                height: 0.0,
+            }),
+            intervals: 120,
+        }
+    }
+
+    /// Errors that grow with time to two hours, σ half of them.
+    fn moments(covariance: bool) -> Vec<Moment> {
+        let moment = |k: u32| {
+            let part = f64::from(k) / 120.0;
+            let error = NavigationError {
+                attitude: Vector3::new(3.0, -4.0, 5.0) * ARCSEC * part,
+                velocity: Vector3::new(0.3, -0.4, 0.0) * part,
+                position: Vector3::new(3.0, 4.0, 0.0) * NAUTICAL_MILE * part,
+            };
+            let variance = (error.to_vector() * 0.5).map(|sigma| sigma * sigma);
+            Moment {
+                time: f64::from(k) * INTERVAL,
+                error,
+                covariance: covariance.then(|| ErrorMatrix::from_diagonal(&variance)),
+            }
+        };
+        (0..=120).map(moment).collect()
+    }
+
+    fn document(moments: &[Moment]) -> Document {
+        let navigation = Navigation {
+            calibration: "monday",
+            truth: "truth",
+            converged: true,
+            terms: false,
+            body_frame: BodyFrame::Table,
+            only: None,
+            mission: &mission(),
+            trajectory: None,
+            moments,
+        };
+        navigation.document()
+    }
+
+    #[test]
+    fn data_are_hourly_and_have_lengths_of_components_and_of_their_sigma() {
+        let data = document(&moments(true)).data;
+        assert_eq!(data["series"].as_array().unwrap().len(), 3);
+        for (pointer, expected) in [
+            ("/series/1/t_h", 1.0),
+            ("/series/1/position_nmile", 2.5),
+            ("/series/2/velocity_m_s", 0.5),
+            ("/series/2/sigma/position_nmile", 2.5),
+            ("/max_abs/roll_deg", 4.0 / 3600.0),
+            ("/final/position_north_nmile", 4.0),
+            ("/drift_nmile_per_h", 2.5),
+            ("/drift_nmile_per_40_h", 100.0),
+        ] {
+            let found = data.pointer(pointer).and_then(Value::as_f64).unwrap();
+            assert!((found - expected).abs() < 1e-9, "{pointer}: {found}");
+        }
+    }
+
+    #[test]
+    fn without_covariance_nothing_is_predicted_and_that_is_said() {
+        let document = document(&moments(false));
+        assert!(document.warnings.items[0].contains("monday claims no σ"));
+        assert!(document.data["series"][0]["sigma"].is_null());
+        assert!(!document.files[0].1.contains("sigma"));
+    }
+
+    #[test]
+    fn a_row_of_the_csv_has_as_many_numbers_as_the_heading_has_names() {
+        let document = document(&moments(true));
+        let mut lines = document.files[0]
+            .1
+            .lines()
+            .map(|line| line.split(',').count());
+        assert_eq!(lines.next(), Some(19));
+        assert!(lines.clone().count() == 121 && lines.all(|count| count == 19));
+    }
+
+    #[test]
+    fn a_navigation_is_shown_with_its_predicted_sigma() {
+        insta::assert_snapshot!(terminal::text(&document(&moments(true)), Some(80)));
+    }
+
+    #[test]
+    fn figures_are_in_readable_units_and_drawn_of_a_start_alone() {
+        for moments in [&moments(true)[..], &moments(true)[..1]] {
+            let document = document(moments);
+            let drawn: Vec<String> = document
+                .plots()
+                .map(|plot| svg::draw(plot).unwrap())
+                .collect();
+            assert_eq!(drawn.len(), 3);
+            svg::assert_sound(&drawn);
+            if moments.len() > 1 {
+                assert!(drawn[0].contains("pitch, ″") && drawn[2].contains("position east, nmile"));
+            }
+        }
     }
 }

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{ClosedForm, Navigated, Report};
+use super::calibration::{ClosedForm, Navigated, Report};
 use crate::attitude;
 use crate::calibration::AttitudePrior;
 use crate::calibration::outcome::*;

@@ -227,8 +227,9 @@ fn runs_that_make_no_sense_are_looked_at_all_the_same() {
                 run: &run,
                 survey: &survey,
             };
-            let _ = report.summary();
-            serde_json::to_string(&report.document()).unwrap();
+            let document = report.document();
+            let _ = turncal::report::terminal::text(&document, Some(80));
+            let _ = turncal::report::json(&document);
             Ok(())
         });
     }

@@ -1,10 +1,9 @@
 //! What the figures say, in sentences.
 
-use super::super::blocks;
-use super::super::number::{count, interval, minutes, ratio, value};
-use super::super::study::Sentence;
-use super::merit::{journey_name, merits, region_name};
+use super::super::effects;
+use super::super::number::{count, interval, minutes, value, with_interval};
 use super::tables::{self, percent};
+use super::{compared, journey_name, region_name};
 use crate::calibration::outcome::Nis;
 use crate::imu::Output;
 use crate::study::accuracy::Containment;
@@ -17,30 +16,42 @@ const SIGMAS_99: f64 = 2.576;
 /// NIS that whole pulses leave a filter, whose noise is taken for Gaussian.
 const PULSES: (f64, f64) = (0.9, 1.1);
 
-/// Every sentence, the most important first.
-pub(super) fn verdict(accuracy: &Accuracy) -> Vec<Sentence> {
-    let mut sentences = vec![convergence(accuracy), against_bound(accuracy)];
-    sentences.push(nees(accuracy));
+/// One thing that a study says.
+struct Sentence {
+    /// Whether it is as one would wish; if not, a user must know it before trusting the figures.
+    good: bool,
+    text: String,
+}
+
+/// What is as one would wish, and what a user must know before trusting the figures; the most important first.
+pub(super) fn verdict(accuracy: &Accuracy) -> (Vec<String>, Vec<String>) {
+    let mut sentences = vec![
+        convergence(accuracy),
+        against_bound(accuracy),
+        nees(accuracy),
+    ];
     sentences.extend(observations(accuracy).map(|(name, nis)| innovations(accuracy, name, nis)));
     sentences.extend(observations(accuracy).map(|(name, nis)| whiteness(name, nis)));
     sentences.extend(accuracy.navigation.iter().filter_map(containment));
     sentences.extend(not_navigated(accuracy));
     sentences.extend(form(accuracy));
-    sentences.extend(blocks::advice(&accuracy.effects).map(|advice| Sentence {
+    sentences.extend(effects::advice(&accuracy.effects).map(|advice| Sentence {
         good: false,
         text: format!("In the first run: {advice}"),
     }));
     sentences.extend(gain(accuracy));
     if accuracy.trials.len() < FEW {
+        let runs = accuracy.trials.len();
         sentences.push(Sentence {
             good: false,
             text: format!(
-                "{} runs are few: the intervals of the ratios are rough below {FEW}.",
-                accuracy.trials.len()
+                "{runs} runs are few: the intervals of the ratios are rough below {FEW}."
             ),
         });
     }
-    sentences
+    let (good, bad): (Vec<_>, Vec<_>) = sentences.into_iter().partition(|s| s.good);
+    let texts = |of: Vec<Sentence>| of.into_iter().map(|s| s.text).collect();
+    (texts(good), texts(bad))
 }
 
 /// What the lag-one correlation of white innovations stays within in 99 of 100 studies.
@@ -93,12 +104,12 @@ fn named(
     of: impl Fn(&Figures) -> Option<Ratio>,
     chosen: impl Fn(&Ratio) -> bool,
 ) -> Vec<String> {
-    let merits = merits(accuracy).into_iter();
-    let with_ratio = merits.filter_map(|m| Some((of(m.figures)?, m.title)));
+    let all = compared(accuracy).into_iter();
+    let with_ratio = all.filter_map(|m| Some((of(m.figures)?, m.title)));
     with_ratio
         .filter(|(ratio, _)| chosen(ratio))
         .map(|(r, title)| {
-            let [by, interval] = ratio(&r);
+            let [by, interval] = with_interval(r.value, r.interval);
             format!("{title} {by} ({interval})")
         })
         .collect()

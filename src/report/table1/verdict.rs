@@ -1,6 +1,6 @@
 //! What can be said of the paper's figures, in words.
 
-use super::tables::title;
+use super::title;
 use crate::imu::InstallationForm;
 use crate::study::Table1;
 use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};

@@ -1,0 +1,320 @@
+//! Panels in rows: scales, margins, frames, ticks, titles, tags and notes.
+
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::super::plot::{Grid, Panel, Point, Scale};
+use super::canvas::{
+    Canvas, DrawError, GRID, INK, LETTER, QUIET, SHADE, SMALL, rgb, shortened, width,
+};
+use super::{WIDTH, series};
+
+/// Above the axes, for the title.
+const TOP: f64 = 26.0;
+/// Between one line of text and the next.
+const LINE: f64 = 17.0;
+/// Letters of tags.
+const TAG: f64 = 0.85;
+/// Of a panel's width, the most that names at the ends of lines may take.
+const LABELS: f64 = 0.3;
+
+/// A panel laid out: where its axes are.
+pub(super) struct Frame<'p> {
+    /// The panel.
+    pub(super) panel: &'p Panel,
+    /// Horizontal scale.
+    pub(super) x: Scale,
+    /// Vertical scale.
+    pub(super) y: Scale,
+    /// Left and right end of the axes.
+    pub(super) across: (f64, f64),
+    /// Upper and lower end.
+    pub(super) down: (f64, f64),
+}
+
+impl Frame<'_> {
+    /// Where a point is drawn.
+    pub(super) fn at(&self, (x, y): Point) -> Point {
+        (self.at_x(x), self.at_y(y))
+    }
+
+    fn at_x(&self, x: f64) -> f64 {
+        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
+    }
+
+    /// Where a height is drawn.
+    pub(super) fn at_y(&self, y: f64) -> f64 {
+        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
+    }
+}
+
+fn rows(grid: &Grid) -> usize {
+    grid.panels.len().div_ceil(grid.columns).max(1)
+}
+
+pub(super) fn height(grid: &Grid) -> u32 {
+    grid.height * rows(grid) as u32
+}
+
+pub(super) fn draw(on: &Canvas, grid: &Grid) -> Result<(), DrawError> {
+    let panel_width = f64::from(WIDTH) / grid.columns as f64;
+    let heights: Vec<f64> = match grid.same_y {
+        true => grid.panels.iter().flat_map(Panel::heights).collect(),
+        false => Vec::new(),
+    };
+    let scales: Vec<(Scale, Scale)> = grid
+        .panels
+        .iter()
+        .map(|panel| {
+            let y = panel
+                .y
+                .scale(panel.heights().chain(heights.iter().copied()));
+            (panel.x.scale(panel.widths()), y)
+        })
+        .collect();
+    for column in 0..grid.columns {
+        let of_column = || {
+            let all = grid.panels.iter().zip(&scales).enumerate();
+            all.filter(move |(k, (panel, _))| k % grid.columns == column && !panel.blank)
+        };
+        let margin = |of: &dyn Fn(&Panel, &(Scale, Scale)) -> f64| {
+            let margins = of_column().map(|(_, (panel, scales))| of(panel, scales));
+            margins.fold(14.0, f64::max)
+        };
+        let left = margin(&|_, (_, y)| widest(&y.ticks) + 14.0);
+        let right = margin(&|panel, (x, _)| right(panel, x, panel_width));
+        let origin = panel_width * column as f64;
+        let across = (origin + left, origin + panel_width - right);
+        let column_panels = grid.panels.iter().enumerate();
+        for (k, panel) in column_panels.filter(|(k, _)| k % grid.columns == column) {
+            let top = f64::from(grid.height) * (k / grid.columns) as f64;
+            let (x, y) = scales[k].clone();
+            if panel.blank {
+                on.text(
+                    &panel.title,
+                    (across.0, top + 6.0),
+                    (HPos::Left, VPos::Top),
+                    INK,
+                    1.0,
+                )?;
+                continue;
+            }
+            let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
+            let lines = match panel.x.places.is_empty() {
+                true => 1,
+                false => names.iter().map(Vec::len).max().unwrap_or(1),
+            };
+            let title = if panel.x.title.is_empty() {
+                4.0
+            } else {
+                LINE + 4.0
+            };
+            let bottom = top + f64::from(grid.height) - 8.0 - LINE * lines as f64 - title;
+            let frame = Frame {
+                panel,
+                x,
+                y,
+                across,
+                down: (top + TOP, bottom),
+            };
+            of_panel(on, &frame, &names)?;
+        }
+    }
+    Ok(())
+}
+
+fn widest(ticks: &[(f64, String)]) -> f64 {
+    let widths = ticks.iter().map(|(_, label)| width(label, SMALL));
+    widths.fold(0.0, f64::max)
+}
+
+/// Room for names at the ends of lines, or for half of the last tick's label.
+fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
+    let labels = panel
+        .series
+        .iter()
+        .filter_map(|series| series.label.as_ref());
+    let widest = labels
+        .map(|(_, text)| width(text, SMALL) + 18.0)
+        .fold(0.0, f64::max);
+    let last = x.ticks.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    let half = last.filter(|_| panel.x.places.is_empty());
+    let half = half.map_or(0.0, |(_, label)| 0.5 * width(label, SMALL) + 4.0);
+    widest.min(LABELS * panel_width).max(half)
+}
+
+/// Labels of the horizontal ticks, names of places in as many lines as they need.
+fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
+    let letters = (room / (0.6 * LETTER * SMALL)).max(3.0) as usize;
+    let labels = x.ticks.iter();
+    labels
+        .map(|(_, label)| {
+            let lines = textwrap::wrap(label, textwrap::Options::new(letters).break_words(false));
+            lines.into_iter().map(|line| line.into_owned()).collect()
+        })
+        .collect()
+}
+
+fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
+    let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
+    for range in &panel.shading {
+        let (start, end) = (range.start.max(frame.x.low), range.end.min(frame.x.high));
+        if end > start {
+            let corners = [(frame.at_x(start), top), (frame.at_x(end), bottom)];
+            on.rectangle(corners, SHADE)?;
+        }
+    }
+    ticks(on, frame, names)?;
+    on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75)?;
+    let title_at = (left, frame.down.0 - TOP + 6.0);
+    on.text(&panel.title, title_at, (HPos::Left, VPos::Top), INK, 1.0)?;
+    keys(on, frame, title_at.1)?;
+    for series in &panel.series {
+        series::draw(on, frame, series)?;
+    }
+    tags(on, frame)?;
+    let (x, side) = match panel.notes_left {
+        true => (left + 6.0, HPos::Left),
+        false => (right - 6.0, HPos::Right),
+    };
+    for (line, note) in panel.notes.iter().enumerate() {
+        let at = (x, top + 6.0 + LINE * line as f64);
+        on.text(note, at, (side, VPos::Top), INK, SMALL)?;
+    }
+    labels(on, frame)
+}
+
+fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
+    let ((left, right), (top, bottom)) = (frame.across, frame.down);
+    let mut taken: Vec<f64> = Vec::new();
+    for (value, label) in &frame.y.ticks {
+        let y = frame.at_y(*value);
+        if taken.iter().any(|other| (other - y).abs() < LETTER) {
+            continue;
+        }
+        taken.push(y);
+        on.stroke(&[(left, y), (right, y)], GRID, 0.75)?;
+        on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75)?;
+        on.text(
+            label,
+            (left - 6.0, y),
+            (HPos::Right, VPos::Center),
+            INK,
+            SMALL,
+        )?;
+    }
+    let mut taken: Vec<(f64, f64)> = Vec::new();
+    for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
+        let x = frame.at_x(*value);
+        let half = 0.5
+            * lines
+                .iter()
+                .map(|line| width(line, SMALL))
+                .fold(0.0, f64::max);
+        let near = |&(other, of): &(f64, f64)| (other - x).abs() < half + of + 6.0;
+        on.stroke(&[(x, top), (x, bottom)], GRID, 0.75)?;
+        on.stroke(&[(x, bottom), (x, bottom + 3.0)], QUIET, 0.75)?;
+        if frame.panel.x.places.is_empty() && taken.iter().any(near) {
+            continue;
+        }
+        taken.push((x, half));
+        for (n, line) in lines.iter().enumerate() {
+            let at = (x, bottom + 6.0 + LINE * n as f64);
+            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL)?;
+        }
+    }
+    let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
+    let at = (0.5 * (left + right), bottom + 6.0 + LINE * lines);
+    let title = &frame.panel.x.title;
+    if title.is_empty() {
+        return Ok(());
+    }
+    on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
+}
+
+/// Names with a sample of their colour, from the right end of the title's line.
+fn keys(on: &Canvas, frame: &Frame, y: f64) -> Result<(), DrawError> {
+    let mut x = frame.across.1;
+    for series in frame.panel.series.iter().rev() {
+        let Some(key) = &series.key else { continue };
+        x -= width(key, SMALL);
+        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL)?;
+        let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
+        on.rectangle(sample, rgb(series.pen.color))?;
+        x -= 34.0;
+    }
+    Ok(())
+}
+
+/// Tags in the first of some lines that has room; those for which there is none are left out.
+fn tags(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+    let (left, right) = frame.across;
+    let mut taken = vec![f64::NEG_INFINITY; frame.panel.tag_lines];
+    for (x, text) in &frame.panel.tags {
+        let half = 0.5 * width(text, TAG);
+        if half > 0.5 * (right - left) {
+            continue;
+        }
+        let at = frame.at_x(*x).clamp(left + half, right - half);
+        let Some(line) = taken.iter().position(|end| *end < at - half) else {
+            continue;
+        };
+        taken[line] = at + half + 6.0;
+        let place = (at, frame.down.0 + 3.0 + 15.0 * line as f64);
+        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG)?;
+    }
+    Ok(())
+}
+
+/// Names at the ends of lines, pushed apart where they would overlap, each with a leader to its line.
+fn labels(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+    let named = frame.panel.series.iter();
+    let named = named.filter_map(|series| series.label.as_ref().zip(Some(rgb(series.pen.color))));
+    let mut labels: Vec<_> = named
+        .map(|((y, text), color)| (frame.at_y(*y), text, color))
+        .collect();
+    labels.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let heights: Vec<f64> = labels.iter().map(|label| label.0).collect();
+    let right = frame.across.1;
+    let room = LABELS * f64::from(WIDTH);
+    for ((y, text, color), shown_at) in labels.into_iter().zip(spread(&heights, frame.down)) {
+        on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75)?;
+        let text = shortened(text, room.min(frame.label_room()));
+        let at = (right + 11.0, shown_at);
+        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL)?;
+    }
+    Ok(())
+}
+
+impl Frame<'_> {
+    /// From the axes to the end of the panel's column, for a name.
+    fn label_room(&self) -> f64 {
+        let labels = self
+            .panel
+            .series
+            .iter()
+            .filter_map(|series| series.label.as_ref());
+        let widest = labels
+            .map(|(_, text)| width(text, SMALL))
+            .fold(0.0, f64::max);
+        let panel = (self.across.1 - self.across.0) / (1.0 - LABELS);
+        widest.min(LABELS * panel - 11.0)
+    }
+}
+
+/// Ascending heights moved until they are a line apart, within the frame while there is room.
+fn spread(heights: &[f64], (top, bottom): (f64, f64)) -> Vec<f64> {
+    let most = (bottom - top) / heights.len().max(1) as f64;
+    let spacing = LETTER.min(most);
+    let mut heights = heights.to_vec();
+    let mut free = top;
+    for height in &mut heights {
+        *height = height.max(free);
+        free = *height + spacing;
+    }
+    let mut free = bottom;
+    for height in heights.iter_mut().rev() {
+        *height = height.min(free);
+        free = *height - spacing;
+    }
+    heights
+}
