@@ -2,23 +2,23 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Document, Table, cells};
+use super::document::{Document, Facts};
 use crate::noise::conventions::{Conversion, Line};
 
-/// How the figure was taken, and a row for each convention.
+/// How the figure was taken, and a line for each convention.
 pub fn document(conversion: &Conversion) -> Document {
     let given = &conversion.given;
     let at = conversion
         .rate
         .map_or(String::new(), |rate| format!(" at {rate} Hz"));
     let mut document = Document::new(format!("{} {}{at}", given.value, given.unit));
-    document.lead = vec![format!(
-        "Read as {}: {}.",
-        conversion.quantity, given.meaning
-    )];
-    let rows = conversion.lines.iter();
-    let rows = rows.map(|line| cells![line.meaning, digits(line.value), line.unit]);
-    document.both(Table::new("", ["", "value", "unit"]).section(rows));
+    document.lead = vec![format!("Read as {}. The same is:", given.meaning)];
+    let name = |line: &Line| format!("{:>11} {}", digits(line.value), line.unit);
+    let rows = conversion
+        .lines
+        .iter()
+        .map(|line| (name(line), line.meaning));
+    document.both(Facts::new("", rows));
     document.data = json!({
         "quantity": conversion.quantity,
         "sensor": conversion.sensor.name(),

@@ -3,7 +3,7 @@
 
 use super::document::{Block, Document, Table};
 use super::number::{self, three_digits};
-use super::plot::{Axis, Color, Panel, Plot, Point, Series};
+use super::plot::{Axis, Panel, Plot, Point, Series};
 use super::quantity::Quantity;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
@@ -228,7 +228,7 @@ fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
     for (sign, name) in [(1.0, "+σ"), (-1.0, "−σ")] {
         let end = last.and_then(|of| points(of, sign, false).last().copied());
         let end = end.filter(|_| known).map_or(f64::NAN, |end| end.1 * scale);
-        panel = panel.with(Series::line([]).color(Color::Quiet).label_at(end, name));
+        panel = panel.with(Series::name(end, name));
     }
     for of in navigated {
         let lines = match known {

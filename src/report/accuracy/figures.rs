@@ -254,10 +254,7 @@ fn nees(accuracy: &Accuracy) -> Plot {
             interval(of.interval_95)
         );
         let level = |y: f64| vec![(first, y), (last, y)];
-        let end = |(y, name): (f64, &str)| {
-            let label = format!("{name}: {}", value(y, 0.1));
-            Series::line([]).color(Color::Quiet).label_at(y, label)
-        };
+        let end = |(y, name)| Series::name(y, format!("{name}: {}", value(y, 0.1)));
         panel = panel
             .with(Series::band(level(one.0), level(one.1)))
             .with_all([(one.0, "2.5 %"), (one.1, "97.5 %")].map(end))
@@ -375,6 +372,7 @@ fn of_mission(of: &NavigationAccuracy, cloud: Vec<Point>, reach: f64) -> Panel {
         .with(Series::marks(Mark::Dot, cloud).width(1.0))
         .noted(notes);
     panel.notes_left = true;
+    panel.square = true;
     panel
 }
 

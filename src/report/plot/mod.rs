@@ -40,8 +40,6 @@ pub struct Grid {
     pub height: u32,
     /// The panels; a row may be closed by [`Panel::blank`].
     pub panels: Vec<Panel>,
-    /// Whether all have the ends of the widest vertical axis.
-    pub same_y: bool,
 }
 
 /// Coefficients between −1 and 1, symmetric.
@@ -78,6 +76,8 @@ pub struct Panel {
     pub notes: Vec<String>,
     /// Whether they stand in the left corner instead of the right one.
     pub notes_left: bool,
+    /// Whether both axes have the same length.
+    pub square: bool,
     /// Whether only the title is drawn.
     pub blank: bool,
 }
@@ -89,8 +89,8 @@ pub struct Series {
     pub shape: Shape,
     /// How.
     pub pen: Pen,
-    /// Name at its right end, at this height.
-    pub label: Option<(f64, String)>,
+    /// Name at the right end of the panel, with the point that it belongs to.
+    pub label: Option<(Point, String)>,
     /// Name in the line of the title.
     pub key: Option<String>,
 }
@@ -205,7 +205,6 @@ impl Plot {
             columns: columns.max(1),
             height,
             panels: panels.into_iter().collect(),
-            same_y: false,
         };
         Self::of(file, heading, Body::Panels(grid))
     }
@@ -227,14 +226,6 @@ impl Plot {
     /// How to read it.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
-        self
-    }
-
-    /// One vertical axis for all panels.
-    pub fn same_y(mut self) -> Self {
-        if let Body::Panels(grid) = &mut self.body {
-            grid.same_y = true;
-        }
         self
     }
 }
@@ -324,14 +315,15 @@ impl Shape {
         }
     }
 
-    /// Height of its right end.
-    fn end(&self) -> Option<f64> {
+    /// Its right end.
+    fn end(&self) -> Option<Point> {
         match self {
-            Self::Line(points) | Self::Marks(_, points) | Self::Band(_, points) => {
-                let finite = points.iter().rev().map(|point| point.1);
-                finite.into_iter().find(|y| y.is_finite())
-            }
-            Self::Level(y) => Some(*y),
+            Self::Line(points) | Self::Marks(_, points) | Self::Band(_, points) => points
+                .iter()
+                .rev()
+                .copied()
+                .find(|point| point.1.is_finite()),
+            Self::Level(y) => Some((f64::INFINITY, *y)),
             _ => None,
         }
     }
@@ -425,17 +417,16 @@ impl Series {
     }
 
     /// Names its right end.
-    pub fn label(self, text: impl Into<String>) -> Self {
-        match self.shape.end() {
-            Some(y) => self.label_at(y, text),
-            None => self,
-        }
+    pub fn label(mut self, text: impl Into<String>) -> Self {
+        self.label = self.shape.end().map(|end| (end, text.into()));
+        self
     }
 
-    /// Names it at a height.
-    pub fn label_at(mut self, y: f64, text: impl Into<String>) -> Self {
-        self.label = y.is_finite().then(|| (y, text.into()));
-        self
+    /// Names a height alone.
+    pub fn name(y: f64, text: impl Into<String>) -> Self {
+        let mut series = Self::line([]).color(Color::Quiet);
+        series.label = y.is_finite().then(|| ((f64::INFINITY, y), text.into()));
+        series
     }
 
     /// Names it in the line of the title.

@@ -29,6 +29,8 @@ pub(super) struct Frame<'p> {
     pub(super) across: (f64, f64),
     /// Upper and lower end.
     pub(super) down: (f64, f64),
+    /// Right end of the panel.
+    end: f64,
 }
 
 impl Frame<'_> {
@@ -39,6 +41,11 @@ impl Frame<'_> {
 
     fn at_x(&self, x: f64) -> f64 {
         self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
+    }
+
+    fn title(&self, on: &Canvas) -> Result<(), DrawError> {
+        let at = (self.across.0, self.down.0 - TOP + 6.0);
+        on.text(&self.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
     }
 
     /// Where a height is drawn.
@@ -57,66 +64,37 @@ pub(super) fn height(grid: &Grid) -> u32 {
 
 pub(super) fn draw(on: &Canvas, grid: &Grid) -> Result<(), DrawError> {
     let panel_width = f64::from(WIDTH) / grid.columns as f64;
-    let heights: Vec<f64> = match grid.same_y {
-        true => grid.panels.iter().flat_map(Panel::heights).collect(),
-        false => Vec::new(),
-    };
-    let scales: Vec<(Scale, Scale)> = grid
-        .panels
-        .iter()
-        .map(|panel| {
-            let y = panel
-                .y
-                .scale(panel.heights().chain(heights.iter().copied()));
-            (panel.x.scale(panel.widths()), y)
-        })
-        .collect();
     for column in 0..grid.columns {
-        let of_column = || {
-            let all = grid.panels.iter().zip(&scales).enumerate();
-            all.filter(move |(k, (panel, _))| k % grid.columns == column && !panel.blank)
-        };
-        let margin = |of: &dyn Fn(&Panel, &(Scale, Scale)) -> f64| {
-            let margins = of_column().map(|(_, (panel, scales))| of(panel, scales));
-            margins.fold(14.0, f64::max)
-        };
-        let left = margin(&|_, (_, y)| widest(&y.ticks) + 14.0);
-        let right = margin(&|panel, (x, _)| right(panel, x, panel_width));
+        let panels = grid.panels.iter().skip(column).step_by(grid.columns);
+        let scaled = panels.map(|p| (p, p.x.scale(p.widths()), p.y.scale(p.heights())));
+        let scaled: Vec<(&Panel, Scale, Scale)> = scaled.collect();
+        // All panels of a column have the same margins.
+        let drawn = || scaled.iter().filter(|(panel, ..)| !panel.blank);
+        let left = drawn().map(|(_, _, y)| widest(&y.ticks) + 14.0);
+        let right = drawn().map(|(panel, x, _)| right(panel, x, panel_width));
+        let [left, right] = [left.fold(14.0, f64::max), right.fold(14.0, f64::max)];
         let origin = panel_width * column as f64;
         let across = (origin + left, origin + panel_width - right);
-        let column_panels = grid.panels.iter().enumerate();
-        for (k, panel) in column_panels.filter(|(k, _)| k % grid.columns == column) {
-            let top = f64::from(grid.height) * (k / grid.columns) as f64;
-            let (x, y) = scales[k].clone();
-            if panel.blank {
-                on.text(
-                    &panel.title,
-                    (across.0, top + 6.0),
-                    (HPos::Left, VPos::Top),
-                    INK,
-                    1.0,
-                )?;
-                continue;
-            }
+        for (row, (panel, x, y)) in scaled.into_iter().enumerate() {
             let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
-            let lines = match panel.x.places.is_empty() {
-                true => 1,
-                false => names.iter().map(Vec::len).max().unwrap_or(1),
-            };
-            let title = if panel.x.title.is_empty() {
-                4.0
-            } else {
-                LINE + 4.0
-            };
-            let bottom = top + f64::from(grid.height) - 8.0 - LINE * lines as f64 - title;
+            let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
+            let lines = lines + usize::from(!panel.x.title.is_empty());
+            let top = f64::from(grid.height) * row as f64;
+            let bottom = top + f64::from(grid.height) - 12.0 - LINE * lines as f64;
+            let down = (top + TOP, bottom);
+            let square = (across.0, across.0 + down.1 - down.0);
             let frame = Frame {
                 panel,
                 x,
                 y,
-                across,
-                down: (top + TOP, bottom),
+                across: if panel.square { square } else { across },
+                down,
+                end: origin + panel_width,
             };
-            of_panel(on, &frame, &names)?;
+            match panel.blank {
+                true => frame.title(on)?,
+                false => of_panel(on, &frame, &names)?,
+            }
         }
     }
     Ok(())
@@ -145,13 +123,14 @@ fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
 /// Labels of the horizontal ticks, names of places in as many lines as they need.
 fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
     let letters = (room / (0.6 * LETTER * SMALL)).max(3.0) as usize;
-    let labels = x.ticks.iter();
-    labels
-        .map(|(_, label)| {
-            let lines = textwrap::wrap(label, textwrap::Options::new(letters).break_words(false));
-            lines.into_iter().map(|line| line.into_owned()).collect()
-        })
-        .collect()
+    let lines = |label: &String| {
+        if width(label, SMALL) < room {
+            return vec![label.clone()];
+        }
+        let lines = textwrap::wrap(label, textwrap::Options::new(letters).break_words(false));
+        lines.into_iter().map(|line| line.into_owned()).collect()
+    };
+    x.ticks.iter().map(|(_, label)| lines(label)).collect()
 }
 
 fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
@@ -165,9 +144,8 @@ fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), Dra
     }
     ticks(on, frame, names)?;
     on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75)?;
-    let title_at = (left, frame.down.0 - TOP + 6.0);
-    on.text(&panel.title, title_at, (HPos::Left, VPos::Top), INK, 1.0)?;
-    keys(on, frame, title_at.1)?;
+    frame.title(on)?;
+    keys(on, frame, top - TOP + 6.0)?;
     for series in &panel.series {
         series::draw(on, frame, series)?;
     }
@@ -240,7 +218,7 @@ fn keys(on: &Canvas, frame: &Frame, y: f64) -> Result<(), DrawError> {
         on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL)?;
         let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
         on.rectangle(sample, rgb(series.pen.color))?;
-        x -= 34.0;
+        x -= 28.0;
     }
     Ok(())
 }
@@ -267,38 +245,22 @@ fn tags(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
 
 /// Names at the ends of lines, pushed apart where they would overlap, each with a leader to its line.
 fn labels(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
-    let named = frame.panel.series.iter();
-    let named = named.filter_map(|series| series.label.as_ref().zip(Some(rgb(series.pen.color))));
-    let mut labels: Vec<_> = named
-        .map(|((y, text), color)| (frame.at_y(*y), text, color))
+    let labelled = frame.panel.series.iter();
+    let labelled = labelled.filter_map(|s| Some((s.label.as_ref()?, rgb(s.pen.color))));
+    let mut labels: Vec<_> = labelled
+        .map(|((point, text), color)| (frame.at(*point), text, color))
         .collect();
-    labels.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let heights: Vec<f64> = labels.iter().map(|label| label.0).collect();
+    labels.sort_by(|a, b| a.0.1.total_cmp(&b.0.1));
+    let heights: Vec<f64> = labels.iter().map(|label| label.0.1).collect();
     let right = frame.across.1;
-    let room = LABELS * f64::from(WIDTH);
-    for ((y, text, color), shown_at) in labels.into_iter().zip(spread(&heights, frame.down)) {
+    for (((x, y), text, color), shown_at) in labels.into_iter().zip(spread(&heights, frame.down)) {
+        on.stroke(&[(x, y), (right, y)], color, 0.4)?;
         on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75)?;
-        let text = shortened(text, room.min(frame.label_room()));
+        let text = shortened(text, frame.end - right - 12.0);
         let at = (right + 11.0, shown_at);
         on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL)?;
     }
     Ok(())
-}
-
-impl Frame<'_> {
-    /// From the axes to the end of the panel's column, for a name.
-    fn label_room(&self) -> f64 {
-        let labels = self
-            .panel
-            .series
-            .iter()
-            .filter_map(|series| series.label.as_ref());
-        let widest = labels
-            .map(|(_, text)| width(text, SMALL))
-            .fold(0.0, f64::max);
-        let panel = (self.across.1 - self.across.0) / (1.0 - LABELS);
-        widest.min(LABELS * panel - 11.0)
-    }
 }
 
 /// Ascending heights moved until they are a line apart, within the frame while there is room.
