@@ -96,6 +96,16 @@ impl Document {
         }
     }
 
+    /// Says what the figures show: a conclusion if it is as one would wish, else a warning.
+    pub fn say(&mut self, good: bool, text: impl Into<String>) {
+        let list = if good {
+            &mut self.conclusions
+        } else {
+            &mut self.warnings
+        };
+        list.items.push(text.into());
+    }
+
     /// Adds what page and terminal show; what is empty is left out.
     pub fn both(&mut self, block: impl Into<Block>) {
         self.add(Medium::Both, block.into());

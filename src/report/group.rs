@@ -67,6 +67,12 @@ impl Group {
         }
     }
 
+    /// Those of some parameters that are in the group.
+    pub fn among(self, parameters: &[usize]) -> Vec<usize> {
+        let all = parameters.iter().copied();
+        all.filter(|&index| Self::of(index) == self).collect()
+    }
+
     /// Largest magnitude and root mean square of some of a vector's entries, in the group's unit;
     /// `None` if there are none.
     pub fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {

@@ -3,13 +3,11 @@
 
 use super::document::{Block, Document, Table};
 use super::number::{self, three_digits};
-use super::plot::{Axis, Panel, Plot, Point, Series};
+use super::plot::{Panel, Plot, Point, Series};
 use super::quantity::Quantity;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 const HOUR: f64 = 3600.0;
-/// Errors of two methods this many times apart share an axis that is logarithmic.
-const APART: f64 = 20.0;
 const HEADING: &str = "Navigation with this calibration";
 
 /// The navigation errors that one method's calibration leads to, stationary and level at the run's site.
@@ -185,74 +183,30 @@ pub(super) fn figure(navigated: &[Navigated]) -> Option<Plot> {
 
 fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
     let known = is_known(navigated);
-    let points = |of: &Navigated, sign: f64, of_error: bool| -> Vec<Point> {
+    let sigma = |of: &Navigated, sign: f64| -> Vec<Point> {
         let moments = of.outlook.iter();
-        let points = moments.filter_map(|m| {
-            let (error, sigma) = both(quantity, m);
-            Some((m.time / HOUR, if of_error { error? } else { sign * sigma }))
-        });
+        let points = moments.map(|m| (m.time / HOUR, sign * both(quantity, m).1));
         points.collect()
     };
-    let size = |line: &[Point]| line.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
-    let sizes = navigated.iter().map(|of| size(&points(of, 1.0, known)));
-    let last = navigated.last();
-    let sizes: Vec<f64> = sizes
-        .chain(last.map(|of| size(&points(of, 1.0, false))))
-        .collect();
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let smallest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
-    let (unit, scale) = quantity.readable_unit(largest);
-    let scaled = |line: Vec<Point>| line.into_iter().map(|(t, y)| (t, y * scale)).collect();
-    let reach = 1.08 * scale * if largest > 0.0 { largest } else { 1.0 };
-    let (y, kind) = match smallest > 0.0 && largest > APART * smallest {
-        true => (
-            Axis::symlog(0.3 * smallest * scale),
-            ", logarithmic to both sides",
-        ),
-        false => (Axis::linear(""), ""),
-    };
-    let title = format!("{}, {unit}{kind}", quantity.name());
-    let mut panel = Panel::new(
-        title,
-        Axis::hours(hours(navigated)),
-        y.between(-reach, reach),
-    );
-    if let Some(of) = last {
-        let (lower, upper) = (
-            scaled(points(of, -1.0, false)),
-            scaled(points(of, 1.0, false)),
-        );
-        panel = panel.with(Series::band(lower, upper));
-    }
-    panel = panel.with(Series::zero());
-    for (sign, name) in [(1.0, "+σ"), (-1.0, "−σ")] {
-        let end = last.and_then(|of| points(of, sign, false).last().copied());
-        let end = end.filter(|_| known).map_or(f64::NAN, |end| end.1 * scale);
-        panel = panel.with(Series::name(end, name));
-    }
-    for of in navigated {
+    let lines = navigated.iter().flat_map(|of| {
+        let errors = of.outlook.iter();
+        let errors = errors.filter_map(|m| Some((m.time / HOUR, both(quantity, m).0?)));
         let lines = match known {
-            true => vec![points(of, 1.0, true)],
-            false => vec![points(of, -1.0, false), points(of, 1.0, false)],
+            true => vec![Series::line(errors).label(of.method)],
+            false => {
+                let name = format!("σ of {}", of.method);
+                vec![
+                    Series::line(sigma(of, 1.0)).label(name),
+                    Series::line(sigma(of, -1.0)),
+                ]
+            }
         };
-        let name = if known {
-            of.method.to_owned()
-        } else {
-            format!("σ of {}", of.method)
+        let styled = |line: Series| match of.method {
+            "EKF" => line,
+            _ => line.nth(1).dashed(),
         };
-        for (n, line) in lines.into_iter().enumerate() {
-            let series = Series::line(scaled(line)).width(1.5);
-            let series = if of.method == "EKF" {
-                series
-            } else {
-                series.nth(1).dashed()
-            };
-            panel = panel.with(if n == 0 {
-                series.label(name.clone())
-            } else {
-                series
-            });
-        }
-    }
-    panel
+        lines.into_iter().map(styled)
+    });
+    let band = navigated.last().map_or_else(Vec::new, |of| sigma(of, 1.0));
+    quantity.panel(hours(navigated), &band, lines.collect())
 }

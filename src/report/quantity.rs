@@ -2,6 +2,8 @@
 
 use nalgebra::SVector;
 
+use super::plot::{Axis, Panel, Point, Series, Shape};
+
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
 use crate::study::navigation::Moment;
@@ -9,6 +11,8 @@ use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
 const KILOMETRE: f64 = 1000.0;
 const CENTIMETRE: f64 = 0.01;
+/// Lines this many times apart share an axis that is logarithmic.
+const APART: f64 = 20.0;
 
 /// A component of the error, or the horizontal length of two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,5 +153,55 @@ impl Quantity {
             None => sigma[self.kind.first()].hypot(sigma[self.kind.first() + 1]),
         };
         si / self.unit_value()
+    }
+
+    /// Lines against hours over a band of ±σ, all given in the usual unit and drawn in a readable one.
+    pub(super) fn panel(self, hours: f64, sigma: &[Point], mut lines: Vec<Series>) -> Panel {
+        let size = |points: &[Point]| points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
+        let of_line = |series: &Series| match &series.shape {
+            Shape::Line(points) => size(points),
+            _ => 0.0,
+        };
+        let sizes = lines.iter().map(of_line).chain([size(sigma)]);
+        let (smallest, largest) = sizes
+            .filter(|size| *size > 0.0)
+            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), size| {
+                (low.min(size), high.max(size))
+            });
+        let (unit, scale) = self.readable_unit(largest);
+        let (y, kind) = match largest > APART * smallest {
+            true => (
+                Axis::symlog(0.3 * smallest * scale),
+                ", logarithmic to both sides",
+            ),
+            false if largest > 0.0 => (Axis::linear("").including([0.0]).room(0.06, 0.06), ""),
+            // Exactly zero everywhere has no range of its own.
+            false => (Axis::linear("").between(-1.0, 1.0), ""),
+        };
+        for line in &mut lines {
+            let label = line.label.iter_mut().map(|(at, _)| at);
+            let points = match &mut line.shape {
+                Shape::Line(points) => &mut points[..],
+                _ => &mut [],
+            };
+            points
+                .iter_mut()
+                .chain(label)
+                .for_each(|point| point.1 *= scale);
+        }
+        let sigma = |sign: f64| -> Vec<Point> {
+            sigma.iter().map(|&(t, s)| (t, sign * s * scale)).collect()
+        };
+        let lowest = if self.is_component() { -1.0 } else { 0.0 };
+        let names = [(1.0, "+σ"), (-1.0, "−σ")].into_iter();
+        let names = names
+            .filter(|(sign, _)| *sign >= lowest)
+            .filter_map(|(sign, name)| Some(Series::name(sigma(sign).last()?.1, name)));
+        let title = format!("{}, {unit}{kind}", self.name());
+        Panel::new(title, Axis::hours(hours), y)
+            .with(Series::band(sigma(lowest), sigma(1.0)))
+            .with(Series::zero())
+            .with_all(names)
+            .with_all(lines)
     }
 }

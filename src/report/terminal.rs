@@ -14,39 +14,35 @@ const GAP: usize = 2;
 /// Lines are at most `width` letters long; without a width, as for a file or a pipe, they are as long as they
 /// are, so that each row and each sentence is one line.
 pub fn text(document: &Document, width: Option<usize>) -> String {
-    let mut parts = vec![[vec![document.title.clone()], document.lead.clone()].concat()];
+    let paragraphs = |texts: &[&str]| -> Vec<String> {
+        let texts = texts.iter().filter(|text| !text.is_empty());
+        texts.flat_map(|text| wrapped(text, "", width)).collect()
+    };
+    let lead = document.lead.iter().map(String::as_str);
+    let lead: Vec<&str> = std::iter::once(document.title.as_str())
+        .chain(lead)
+        .collect();
+    let mut parts = vec![paragraphs(&lead)];
     for (medium, block) in &document.blocks {
         if *medium == Medium::Page {
             continue;
         }
-        match block {
-            Block::Facts(of) => parts.push(facts(of, width)),
-            Block::Table(of) => parts.push(table(of, width)),
-            Block::List(of) => parts.push(list(of, "  ", width)),
-            Block::Text(heading, text) => parts.push(vec![heading.clone(), text.clone()]),
-            Block::Code(heading, code) => {
-                let lines = code.lines().map(str::to_owned);
-                parts.push(std::iter::once(heading.clone()).chain(lines).collect());
-            }
-            Block::Plot(_) => {}
-        }
+        parts.push(match block {
+            Block::Facts(of) => facts(of, width),
+            Block::Table(of) => table(of, width),
+            Block::List(of) => list(of, "  ", width),
+            Block::Text(heading, text) => paragraphs(&[heading, text]),
+            Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
+            Block::Plot(_) => continue,
+        });
     }
     parts.push(list(&document.conclusions, "  ", width));
     parts.push(list(&document.warnings, "! ", width));
-    let mut text = String::new();
-    for part in parts {
-        let mut lines = part.iter().filter(|line| !line.is_empty()).peekable();
-        if lines.peek().is_some() && !text.is_empty() {
-            text.push('\n');
-        }
-        for line in lines {
-            for line in wrapped(line, "", width) {
-                text.push_str(line.trim_end());
-                text.push('\n');
-            }
-        }
-    }
-    text
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    let parts: Vec<String> = parts.map(|part| part.join("\n")).collect();
+    let text = parts.join("\n\n");
+    let lines = text.lines().map(|line| line.trim_end().to_owned() + "\n");
+    lines.collect()
 }
 
 /// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
@@ -68,7 +64,7 @@ fn list(of: &List, mark: &str, width: Option<usize>) -> Vec<String> {
     }
     let items = of.items.iter();
     let items = items.flat_map(|item| wrapped(&format!("{mark}{item}"), "  ", width));
-    std::iter::once(of.heading.clone()).chain(items).collect()
+    headed(&of.heading, items)
 }
 
 /// Values below each other.
@@ -79,13 +75,19 @@ fn facts(of: &Facts, width: Option<usize>) -> Vec<String> {
     let rows = of.rows.iter();
     let rows = rows
         .flat_map(|(name, value)| wrapped(&format!("  {name:<longest$}  {value}"), &indent, width));
-    std::iter::once(of.heading.clone()).chain(rows).collect()
+    headed(&of.heading, rows)
+}
+
+/// Lines below a heading, if there is one.
+fn headed(heading: &str, lines: impl Iterator<Item = String>) -> Vec<String> {
+    let heading = Some(heading.to_owned()).filter(|heading| !heading.is_empty());
+    heading.into_iter().chain(lines).collect()
 }
 
 /// A table that is made narrower step by step: headings in several lines, then without the columns that it can
 /// do without, at last in parts below each other that repeat the first column.
 fn table(of: &Table, width: Option<usize>) -> Vec<String> {
-    let mut lines = vec![of.heading.clone()];
+    let mut lines = headed(&of.heading, std::iter::empty());
     let all: Vec<usize> = (0..of.columns.len()).collect();
     let Some(width) = width else {
         lines.extend(laid_out(of, &all, false));
@@ -115,6 +117,9 @@ fn table(of: &Table, width: Option<usize>) -> Vec<String> {
         }
         let later = rest.split_off(count);
         lines.extend(laid_out(of, &[first.as_slice(), &rest].concat(), broken));
+        if !later.is_empty() {
+            lines.push(String::new());
+        }
         rest = later;
     }
     lines.extend(

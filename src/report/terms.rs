@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::document::NONE;
 use super::number::{plus_minus, three_digits, value};
 use crate::calibration::further::{Constant, Further, constant_name};
+use crate::calibration::outcome::OBSERVED_BELOW;
 use crate::imu::Term;
 use crate::run::StateBlock;
 use crate::run::record::TermRecord;
@@ -48,7 +49,7 @@ pub(super) fn rows(
             plus_minus(of / in_si, own / in_si),
             unit.to_owned(),
             three_digits(prior / in_si),
-            super::calibration::improvement(prior, own),
+            improvement(prior, own),
         ];
         if errors {
             row.extend(truth.map_or([NONE; 2].map(str::to_owned), |error| {
@@ -58,4 +59,16 @@ pub(super) fn rows(
         Some(row)
     };
     further.estimated().filter_map(row).collect()
+}
+
+/// Prior over posterior σ, with words where the data did not observe the parameter.
+pub(super) fn improvement(prior: f64, posterior: f64) -> String {
+    let ratio = prior / posterior;
+    if !ratio.is_finite() {
+        NONE.to_owned()
+    } else if ratio * OBSERVED_BELOW < 1.0 {
+        format!("{}, not observed", value(ratio, 0.1))
+    } else {
+        three_digits(ratio)
+    }
 }

@@ -16,7 +16,7 @@ use turncal::imu::{InstallationForm, Output};
 use turncal::models;
 use turncal::noise::Stretch;
 use turncal::noise::conventions::convert;
-use turncal::report::check::CheckReport;
+use turncal::report::check;
 use turncal::run::{CalibrationRecord, Run, write_run};
 use turncal::simulation::Scenario;
 use turncal::survey::Survey;
@@ -223,11 +223,7 @@ fn runs_that_make_no_sense_are_looked_at_all_the_same() {
         fuzz(&run, file, |directory| {
             let run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
             let survey = Survey::of(&run);
-            let report = CheckReport {
-                run: &run,
-                survey: &survey,
-            };
-            let document = report.document();
+            let document = check::document(&run, &survey);
             let _ = turncal::report::terminal::text(&document, Some(80));
             let _ = turncal::report::json(&document);
             Ok(())

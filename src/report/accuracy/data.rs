@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
+use super::compared::white_within;
 use super::facts::{passes, rejected};
-use super::verdict::white_within;
 use crate::calibration::outcome::Nis;
 use crate::run::record::BlockRecord;
 use crate::study::accuracy::{Containment, Journey, Region};

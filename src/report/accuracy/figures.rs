@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use super::super::number::{count, interval, minutes, value, with_interval};
 use super::super::plot::{Anchor, Axis, Color, Mark, Panel, Plot, Point, Series, Shape};
+use super::compared::{compared, journey_name};
 use super::tables::{self, percent};
-use super::{compared, journey_name};
 use crate::calibration::Group;
 use crate::calibration::states::PARAMETERS;
 use crate::study::accuracy::{Position, Region};

@@ -3,8 +3,7 @@
 use super::super::document::{NONE, Table, cells};
 use super::super::number::{count, interval, minutes, or_dash, three_digits, value, with_interval};
 use super::super::terms::{title, unit};
-use super::verdict::white_within;
-use super::{Compared, compared, journey_name, region_name};
+use super::compared::{Compared, compared, journey_name, region_name, white_within};
 use crate::calibration::outcome::Nis;
 use crate::study::accuracy::{Containment, FurtherAccuracy};
 use crate::study::{Accuracy, Ratio};

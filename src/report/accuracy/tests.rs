@@ -80,11 +80,7 @@ fn summary(accuracy: &Accuracy) -> String {
 fn every_figure_is_drawn_whether_the_filter_works_or_not() {
     for accuracy in [small(), all_failed()] {
         let document = document(&accuracy);
-        let drawn: Vec<String> = document
-            .plots()
-            .map(|plot| svg::draw(plot).unwrap())
-            .collect();
-        svg::assert_sound(&drawn);
+        assert_eq!(svg::drawn(document.plots()).len(), 6);
         let names: Vec<&str> = document.plots().map(|plot| plot.file.as_str()).collect();
         let expected = ["errors", "ratio", "nees", "gain", "time", "position"];
         assert_eq!(names, expected.map(|name| format!("{name}.svg")));

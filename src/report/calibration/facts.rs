@@ -2,7 +2,7 @@
 
 use super::super::document::Facts;
 use super::super::number::{count, sigma, three_digits, value};
-use super::Report;
+use super::report::Report;
 use crate::imu::{Noise, Sensor};
 use crate::run::Run;
 use crate::units::{

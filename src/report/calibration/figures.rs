@@ -4,7 +4,8 @@ use super::super::group::{Group, axis_name, short_name};
 use super::super::number::{count, value};
 use super::super::outlook;
 use super::super::plot::{Axis, Color, Mark, Matrix, Panel, Plot, Series};
-use super::{Report, path};
+use super::path;
+use super::report::Report;
 use crate::calibration::outcome::{Estimate, Innovation, Moment, Nis, Observation, Outcome};
 use crate::calibration::states::{ParameterVector, sensor_and_parameter};
 

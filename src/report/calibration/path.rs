@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::super::plot::{Axis, Panel, Plot, Point, Series};
-use super::Report;
+use super::report::Report;
 use crate::imu::AXES;
 use crate::run::{ImuRecord, TableRecord};
 use crate::units::DEGREE;

@@ -3,8 +3,8 @@
 use super::super::document::{NONE, Table, cells};
 use super::super::group::Group;
 use super::super::number::{self, count, plus_minus, sigma, three_digits, value};
-use super::super::terms;
-use super::{Report, improvement};
+use super::super::terms::{self, improvement};
+use super::report::Report;
 use crate::calibration::outcome::{Estimate, Nis, Outcome, parameter_name};
 use crate::calibration::{Measures, Quality, Spread};
 use crate::imu::ParameterKind;

@@ -7,11 +7,12 @@ use super::super::group::Group;
 use super::super::synthetic::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
-use crate::calibration::outcome::{Nis, Observation, from_vector, parameter_name};
+use crate::calibration::outcome::{Nis, Observation, from_vector, parameter_name, to_vector};
 use crate::calibration::states::{PARAMETERS, ParameterMatrix};
-use crate::imu::InstallationForm;
+use crate::imu::{Instability, InstallationForm};
 use crate::navigation::NearPole;
-use crate::units::PPM;
+use crate::study::navigation::NavigationStudyError;
+use crate::units::{DEG_PER_H, PPM};
 
 /// Every file of a report, by name.
 fn written(report: &Report) -> Vec<(String, String)> {
@@ -93,12 +94,17 @@ fn a_nis_outside_its_interval_is_called_so() {
 
 #[test]
 fn noise_is_given_in_the_units_of_data_sheets() {
-    let page = page(&synthetic(InstallationForm::General).report());
+    let mut made_up = synthetic(InstallationForm::General);
+    made_up.run.noise.gyro.instability = Some(Instability {
+        sigma: 0.003 * DEG_PER_H,
+        correlation_time: 3600.0,
+    });
+    let page = page(&made_up.report());
     for fact in [
         "random walk 0.0010 °/√h, Gauss–Markov bias 0.0030 °/h over 3600 s",
         "random walk 5.0 µg/√Hz",
         "position 1.0 ″",
-        "latitude 39.90000°",
+        "latitude 34.00000°",
     ] {
         assert!(page.contains(fact), "{fact}");
     }

@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use super::{CheckReport, words};
+use super::tables::column_of;
+use super::words;
 use crate::imu::{AXES, Sensor};
-use crate::run::{Fault, LabelledMotion};
-use crate::survey::{LabelCheck, MethodOutlook, Rest, Turn, Verdict};
+use crate::run::{Fault, LabelledMotion, Run};
+use crate::survey::{LabelCheck, MethodOutlook, Rest, Survey, Turn, Verdict};
 use crate::units::DEGREE;
 
-pub(super) fn data(report: &CheckReport) -> Value {
-    let (run, survey, imu) = (report.run, report.survey, &report.run.imu);
+pub(super) fn data(run: &Run, survey: &Survey) -> Value {
+    let imu = &run.imu;
     let mut fault_samples: BTreeMap<&str, usize> = BTreeMap::new();
     for fault in &imu.faults {
         *fault_samples.entry(fault.kind.name()).or_default() += fault.samples.len();
@@ -32,24 +33,24 @@ pub(super) fn data(report: &CheckReport) -> Value {
         "table_readings": run.table.as_ref().map_or(0, |table| table.time.len()),
         "unit": run.unit,
     });
-    if let Some(log) = log(report) {
+    if let Some(log) = log(run, survey) {
         data["log"] = log;
     }
-    data["faults"] = imu.faults.iter().map(|of| fault(report, of)).collect();
+    data["faults"] = imu.faults.iter().map(|of| fault(run, of)).collect();
     data["fault_samples"] = json!(fault_samples);
     data["standing_s"] = survey.standing.total.into();
     data["longest_dwell_s"] = survey.standing.longest.into();
-    data["dwells"] = survey
-        .rests
+    data["dwells"] = survey.rests.iter().map(|rest| dwell(run, rest)).collect();
+    data["turns"] = survey
+        .turns
         .iter()
-        .map(|rest| dwell(report, rest))
+        .map(|of| turn(run, survey, of))
         .collect();
-    data["turns"] = survey.turns.iter().map(|of| turn(report, of)).collect();
     data["ways_up"] = json!(ways);
     data["up_directions"] = survey.directions.into();
     data["segments"] = survey.labels.iter().map(section).collect();
     data["methods"] = survey.methods.iter().map(method).collect();
-    data["findings"] = words::findings(report).into();
+    data["findings"] = words::findings(run, survey).into();
     data
 }
 
@@ -64,10 +65,10 @@ fn degrees(angle: f64) -> f64 {
     angle / DEGREE
 }
 
-fn log(report: &CheckReport) -> Option<Value> {
-    let log = report.run.imu.log.as_ref()?;
+fn log(run: &Run, survey: &Survey) -> Option<Value> {
+    let log = run.imu.log.as_ref()?;
     let columns = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let steps = report.survey.steps.get(sensor);
+        let steps = survey.steps.get(sensor);
         let columns = log.columns.get(sensor).iter().zip(steps).zip(AXES);
         columns.map(move |((column, step_si), axis)| {
             json!({
@@ -96,19 +97,19 @@ fn log(report: &CheckReport) -> Option<Value> {
     Some(data)
 }
 
-fn fault(report: &CheckReport, fault: &Fault) -> Value {
+fn fault(run: &Run, fault: &Fault) -> Value {
     json!({
         "kind": fault.kind.name(),
-        "column": report.column(fault),
+        "column": column_of(run, fault),
         "line": fault.line,
-        "start_s": report.run.imu.time(fault.samples.start),
+        "start_s": run.imu.time(fault.samples.start),
         "samples": fault.samples.len(),
         "bridged": fault.bridged,
     })
 }
 
-fn dwell(report: &CheckReport, rest: &Rest) -> Value {
-    let [start, end] = rest.times(report.run);
+fn dwell(run: &Run, rest: &Rest) -> Value {
+    let [start, end] = rest.times(run);
     let mut data = json!({
         "start_s": start,
         "end_s": end,
@@ -121,8 +122,8 @@ fn dwell(report: &CheckReport, rest: &Rest) -> Value {
     data
 }
 
-fn turn(report: &CheckReport, turn: &Turn) -> Value {
-    let (imu, rests) = (&report.run.imu, &report.survey.rests);
+fn turn(run: &Run, survey: &Survey, turn: &Turn) -> Value {
+    let imu = &run.imu;
     let mut data = json!({
         "start_s": imu.time(turn.samples.start),
         "end_s": imu.time(turn.samples.end),
@@ -131,12 +132,12 @@ fn turn(report: &CheckReport, turn: &Turn) -> Value {
         "axis": <[f64; 3]>::from(turn.axis),
         "angle_deg": degrees(turn.angle),
         "fastest_deg_s": degrees(turn.fastest),
-        "off_gravity_deg": turn.off_gravity(rests).map(degrees),
+        "off_gravity_deg": turn.off_gravity(&survey.rests).map(degrees),
     });
     put(
         &mut data,
         "off_table_deg",
-        turn.off_table(rests).map(degrees),
+        turn.off_table(&survey.rests).map(degrees),
     );
     data
 }

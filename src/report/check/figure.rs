@@ -1,25 +1,26 @@
 //! The record: what the gyros and accelerometers say against time, with dwells, turns and faults.
 
 use super::super::plot::{Axis, Color, Mark, Panel, Plot, Series};
-use super::{CheckReport, words};
+use super::words;
 use crate::imu::{AXES, Sensor};
-use crate::survey::{Rest, Turn};
+use crate::run::Run;
+use crate::survey::{Rest, Survey, Turn};
 use crate::units::DEGREE;
 
-pub(super) fn figure(report: &CheckReport) -> Plot {
+pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {
     let mut caption = "Gyro rates and specific force along body axes by nominal scales, as they stand in the file. \
                        Grey: dwells, numbered as in the table and with the axis that is up; above the rates: \
                        turns, by axis and angle, or angle alone if about several axes, where there is room."
         .to_owned();
-    if !report.run.imu.faults.is_empty() {
+    if !run.imu.faults.is_empty() {
         caption += " Crosses: faults of the log in the triad's samples, missing and duplicate rows in both.";
     }
-    let panels = Sensor::ALL.map(|sensor| panel(report, sensor));
+    let panels = Sensor::ALL.map(|sensor| panel(run, survey, sensor));
     Plot::new("record.svg", "Record", (1, 310), panels).caption(caption)
 }
 
-fn panel(report: &CheckReport, sensor: Sensor) -> Panel {
-    let (run, imu) = (report.run, &report.run.imu);
+fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
+    let imu = &run.imu;
     let (samples, unit, title) = match sensor {
         Sensor::Gyro => (&imu.gyro, DEGREE, "angular rate, °/s"),
         Sensor::Accel => (&imu.accel, 1.0, "specific force, m/s²"),
@@ -31,21 +32,16 @@ fn panel(report: &CheckReport, sensor: Sensor) -> Panel {
         let points = points.map(|(k, sample)| (middle(k), sample[axis] / imu.period / unit));
         Series::line(points).nth(axis).width(1.0).label(AXES[axis])
     };
-    let rests = report.survey.rests.iter();
+    let rests = survey.rests.iter();
     let dwells: Vec<_> = rests
         .map(|rest| rest.times(run))
         .map(|[from, to]| from..to)
         .collect();
     let tags: Vec<(f64, String)> = match sensor {
-        Sensor::Gyro => report
-            .survey
-            .turns
-            .iter()
-            .map(|turn| of_turn(report, turn))
-            .collect(),
+        Sensor::Gyro => survey.turns.iter().map(|turn| of_turn(run, turn)).collect(),
         Sensor::Accel => {
-            let rests = report.survey.rests.iter().enumerate();
-            rests.map(|(k, rest)| of_dwell(report, k, rest)).collect()
+            let rests = survey.rests.iter().enumerate();
+            rests.map(|(k, rest)| of_dwell(run, k, rest)).collect()
         }
     };
     let faults = imu
@@ -67,14 +63,14 @@ fn panel(report: &CheckReport, sensor: Sensor) -> Panel {
         .with(Series::marks(Mark::Cross, faults.into_iter().map(|t| (t, foot))).color(Color::Ink))
 }
 
-fn of_turn(report: &CheckReport, turn: &Turn) -> (f64, String) {
-    let imu = &report.run.imu;
+fn of_turn(run: &Run, turn: &Turn) -> (f64, String) {
+    let imu = &run.imu;
     let (start, end) = (imu.time(turn.samples.start), imu.time(turn.samples.end));
     (0.5 * (start + end), words::turn(turn))
 }
 
-fn of_dwell(report: &CheckReport, k: usize, rest: &Rest) -> (f64, String) {
-    let [from, to] = rest.times(report.run);
+fn of_dwell(run: &Run, k: usize, rest: &Rest) -> (f64, String) {
+    let [from, to] = rest.times(run);
     let up = match rest.up.is_upright() {
         true => format!(" {}", words::way_up(rest.up.axis, rest.up.down)),
         false => String::new(),

@@ -10,40 +10,29 @@ use super::number::{count, three_digits, value};
 use crate::run::Run;
 use crate::survey::Survey;
 
-/// What a run holds, to be shown.
-#[derive(Debug, Clone, Copy)]
-pub struct CheckReport<'a> {
-    /// The run.
-    pub run: &'a Run,
-    /// What was found in it.
-    pub survey: &'a Survey,
-}
-
-impl CheckReport<'_> {
-    /// Everything that is said of the run.
-    pub fn document(&self) -> Document {
-        let imu = &self.run.imu;
-        let mut document = Document::new(format!(
-            "Check of {}: {} s, {} samples at {} Hz, {}, {}",
-            self.run.name,
-            value(imu.duration(), 10.0),
-            count(imu.len()),
-            three_digits(imu.period.recip()),
-            several(self.survey.rests.len(), "dwell"),
-            several(self.survey.turns.len(), "turn"),
-        ));
-        document.lead = vec![words::log(self)];
-        document.warnings.heading = "What to look at".to_owned();
-        document.warnings.items = words::findings(self);
-        document.page(figure::figure(self));
-        document.both(tables::columns(self));
-        document.both(tables::faults(self));
-        document.both(tables::dwells(self));
-        document.both(tables::labels(self));
-        document.both(tables::methods(self));
-        document.data = data::data(self);
-        document
-    }
+/// Everything that is said of a run and what was found in it.
+pub fn document(run: &Run, survey: &Survey) -> Document {
+    let imu = &run.imu;
+    let mut document = Document::new(format!(
+        "Check of {}: {} s, {} samples at {} Hz, {}, {}",
+        run.name,
+        value(imu.duration(), 10.0),
+        count(imu.len()),
+        three_digits(imu.period.recip()),
+        several(survey.rests.len(), "dwell"),
+        several(survey.turns.len(), "turn"),
+    ));
+    document.lead = vec![words::log(run, survey)];
+    document.warnings.heading = "What to look at".to_owned();
+    document.warnings.items = words::findings(run, survey);
+    document.page(figure::figure(run, survey));
+    document.both(tables::columns(run, survey));
+    document.both(tables::faults(run));
+    document.both(tables::dwells(run, survey));
+    document.both(tables::labels(survey));
+    document.both(tables::methods(survey));
+    document.data = data::data(run, survey);
+    document
 }
 
 /// Such as `3 turns`.
@@ -58,30 +47,21 @@ mod tests {
     use super::*;
     use crate::simulation::Scenario;
 
-    fn document(run: &Run) -> Document {
-        let survey = Survey::of(run);
-        CheckReport {
-            run,
-            survey: &survey,
-        }
-        .document()
+    fn checked(run: &Run) -> Document {
+        document(run, &Survey::of(run))
     }
 
     #[test]
     fn a_sound_run_is_shown_with_nothing_to_change() {
         let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let document = document(&run);
+        let document = checked(&run);
         assert!(
             document.warnings.items.is_empty(),
             "{:?}",
             document.warnings
         );
         insta::assert_snapshot!(terminal::text(&document, Some(120)));
-        let drawn: Vec<String> = document
-            .plots()
-            .map(|plot| svg::draw(plot).unwrap())
-            .collect();
-        svg::assert_sound(&drawn);
+        let drawn = svg::drawn(document.plots());
         assert!(drawn[0].contains("angular rate") && drawn[0].contains("z up"));
     }
 
@@ -91,7 +71,7 @@ mod tests {
         for sample in &mut run.imu.gyro {
             sample.x = -sample.x;
         }
-        let said = terminal::text(&document(&run), None);
+        let said = terminal::text(&checked(&run), None);
         for said_so in ["the table's log", "gravity's direction"] {
             let expected = format!("Gyros and {said_so} do not turn alike");
             assert!(said.contains(&expected), "{said}");

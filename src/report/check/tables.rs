@@ -2,18 +2,17 @@
 
 use super::super::document::{NONE, Table, cells};
 use super::super::number::{count, or_dash, sigma, three_digits, value, whole};
-use super::CheckReport;
 use super::words::{degrees, direction, of_label, signed, way_up};
 use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
-use crate::run::{Fault, LabelledMotion};
+use crate::run::{Fault, LabelledMotion, Run};
 use crate::survey::{LabelCheck, Rest, Survey, Turn, Verdict};
 use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 
 /// Faults beyond so many are not listed one by one.
 const LISTED: usize = 20;
 
-pub(super) fn columns(report: &CheckReport) -> Table {
+pub(super) fn columns(run: &Run, survey: &Survey) -> Table {
     let headings = [
         "column",
         "body axis",
@@ -25,10 +24,9 @@ pub(super) fn columns(report: &CheckReport) -> Table {
         "step",
         "as a rate",
     ];
-    let run = report.run;
     let rows = run.imu.log.iter().flat_map(|log| {
         Sensor::ALL.into_iter().flat_map(|sensor| {
-            let steps = report.survey.steps.get(sensor);
+            let steps = survey.steps.get(sensor);
             let columns = log.columns.get(sensor).iter().zip(steps).zip(AXES);
             columns.map(move |((column, &rate), axis)| {
                 let (unit, symbol) = match sensor {
@@ -66,10 +64,10 @@ fn exactly(x: f64) -> String {
     }
 }
 
-pub(super) fn faults(report: &CheckReport) -> Table {
-    let imu = &report.run.imu;
+pub(super) fn faults(run: &Run) -> Table {
+    let imu = &run.imu;
     let row = |fault: &Fault| {
-        let column = report.column(fault).unwrap_or("rows");
+        let column = column_of(run, fault).unwrap_or("rows");
         cells![
             fault.kind.name(),
             column,
@@ -90,16 +88,13 @@ pub(super) fn faults(report: &CheckReport) -> Table {
     }
 }
 
-impl CheckReport<'_> {
-    /// The file's column in which a fault is; none if it is in whole rows.
-    pub(super) fn column(&self, fault: &Fault) -> Option<&str> {
-        let (sensor, axis) = fault.axis?;
-        Some(&self.run.imu.log.as_ref()?.columns.get(sensor)[axis].name)
-    }
+/// The file's column in which a fault is; none if it is in whole rows.
+pub(super) fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
+    let (sensor, axis) = fault.axis?;
+    Some(&run.imu.log.as_ref()?.columns.get(sensor)[axis].name)
 }
 
-pub(super) fn dwells(report: &CheckReport) -> Table {
-    let (run, survey) = (report.run, report.survey);
+pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
     let after = |k: usize| survey.turns.iter().find(|turn| turn.from == Some(k));
     let row = |(k, rest): (usize, &Rest)| {
         let [begin, end] = rest.times(run);
@@ -152,7 +147,7 @@ fn moved(turn: &Turn, survey: &Survey) -> [String; 4] {
     [about, by, value(turn.fastest / DEGREE, 1.0), off]
 }
 
-pub(super) fn labels(report: &CheckReport) -> Table {
+pub(super) fn labels(survey: &Survey) -> Table {
     let row = |check: &LabelCheck| {
         let found = match (&check.verdict, check.segment.motion) {
             (Verdict::Position { off, moving }, _) if *moving > 0.0 => {
@@ -188,10 +183,10 @@ pub(super) fn labels(report: &CheckReport) -> Table {
         "Labelled sections",
         ["label", "from, s", "to, s", "found", "agrees"],
     )
-    .section(report.survey.labels.iter().map(row))
+    .section(survey.labels.iter().map(row))
 }
 
-pub(super) fn methods(report: &CheckReport) -> Table {
+pub(super) fn methods(survey: &Survey) -> Table {
     let groups = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let columns = std::iter::once(String::new()).chain(groups);
     let mut table = Table::new("What each method could observe, 1σ", columns).note(
@@ -199,7 +194,7 @@ pub(super) fn methods(report: &CheckReport) -> Table {
          begin; the closed form's from its equations. Further error terms are not in it.",
     );
     let mut rows = Vec::new();
-    for method in &report.survey.methods {
+    for method in &survey.methods {
         let words = method.path.words();
         let mut row = cells![words];
         match &method.expected {

@@ -1,9 +1,8 @@
 //! What has to be said of a run before it is calibrated.
 
 use super::super::number::{count, three_digits, value};
-use super::CheckReport;
 use crate::imu::AXES;
-use crate::run::LabelledMotion;
+use crate::run::{LabelledMotion, Run};
 use crate::survey::{APART, LabelCheck, Survey, Turn, Verdict};
 use crate::units::DEGREE;
 
@@ -52,8 +51,7 @@ pub(super) fn signed(angle: f64) -> String {
 }
 
 /// The log in a sentence or two.
-pub(super) fn log(report: &CheckReport) -> String {
-    let (run, survey) = (report.run, report.survey);
+pub(super) fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
         "Stands for {} s in all, at most {} s at a time; {}.",
         three_digits(survey.standing.total),
@@ -84,18 +82,17 @@ pub(super) fn log(report: &CheckReport) -> String {
 }
 
 /// What to look at and what to change, a sentence or two each.
-pub(super) fn findings(report: &CheckReport) -> Vec<String> {
-    let mut findings = report.run.notes.clone();
-    findings.extend(of_units(report));
-    findings.extend(report.survey.labels.iter().filter_map(of_label));
-    findings.extend(of_motion(report));
-    findings.extend(of_methods(report.survey));
+pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
+    let mut findings = run.notes.clone();
+    findings.extend(of_units(run, survey));
+    findings.extend(survey.labels.iter().filter_map(of_label));
+    findings.extend(of_motion(survey));
+    findings.extend(of_methods(survey));
     findings
 }
 
 /// Signs of a wrong unit, scale or frame.
-fn of_units(report: &CheckReport) -> Vec<String> {
-    let (run, survey) = (report.run, report.survey);
+fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     let rests = &survey.rests;
     let mut findings = Vec::new();
     let wrong = |force: f64| (force / run.site.gravity - 1.0).abs() > WRONG_FORCE;
@@ -210,8 +207,7 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
 }
 
 /// What positions and turns lack.
-fn of_motion(report: &CheckReport) -> Vec<String> {
-    let survey = report.survey;
+fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
         findings.push(

@@ -4,7 +4,6 @@
 use serde_json::{Map, Value, json};
 
 use super::super::group::Group;
-use super::of_group;
 use crate::calibration::outcome::parameter_name;
 use crate::calibration::states::ParameterVector;
 use crate::calibration::{ChiSquare, Comparison, Side};
@@ -60,7 +59,7 @@ fn name(index: usize) -> String {
 
 /// Of a group's differences.
 fn spread(comparison: &Comparison, group: Group, side: &Side) -> Value {
-    let indices = of_group(comparison, group);
+    let indices = group.among(&comparison.parameters);
     let of = |v: &ParameterVector| group.spread(v, &indices);
     let difference = of(&side.difference);
     json!({

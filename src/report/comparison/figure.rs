@@ -2,7 +2,6 @@
 
 use super::super::group::{Group, axis_name};
 use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
-use super::of_group;
 use crate::calibration::Comparison;
 use crate::imu::InstallationForm;
 
@@ -20,7 +19,7 @@ pub(super) fn figure(comparison: &Comparison) -> Plot {
 }
 
 fn panel(comparison: &Comparison, group: Group) -> Panel {
-    let (indices, unit) = (of_group(comparison, group), group.unit_value());
+    let (indices, unit) = (group.among(&comparison.parameters), group.unit_value());
     let sides: Vec<(&str, Vec<(f64, f64)>)> = comparison
         .sides
         .iter()

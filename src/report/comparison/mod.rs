@@ -42,12 +42,6 @@ pub fn document(comparison: &Comparison) -> Document {
     document
 }
 
-/// Indices of the compared parameters of a group.
-fn of_group(comparison: &Comparison, group: Group) -> Vec<usize> {
-    let all = comparison.parameters.iter().copied();
-    all.filter(|&index| Group::of(index) == group).collect()
-}
-
 fn name(index: usize) -> String {
     short_name(InstallationForm::General, index)
 }
@@ -97,7 +91,13 @@ fn parameters(comparison: &Comparison) -> Table {
         }
         row
     };
-    let sections = by_triad(|group| of_group(comparison, group).into_iter().map(row).collect());
+    let sections = by_triad(|group| {
+        group
+            .among(&comparison.parameters)
+            .into_iter()
+            .map(row)
+            .collect()
+    });
     let table = Table::new("Parameters", beside_reference(comparison))
         .sections(sections)
         .note("Calibrations: difference to the reference ± the 1σ that the calibration claims.")
@@ -153,7 +153,7 @@ fn groups(comparison: &Comparison) -> Table {
         columns.extend(cells![largest, "RMS", "RMS σ"]);
     }
     let row = |group: Group| {
-        let indices = of_group(comparison, group);
+        let indices = group.among(&comparison.parameters);
         let spread = |v: &ParameterVector| group.spread(v, &indices);
         let mut row = cells![group.title(), group.unit()];
         let finest = finest(comparison, &indices).map(|s| s / group.unit_value());

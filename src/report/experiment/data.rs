@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
+use super::names::{HOUR, hours, miles, navigated};
 use super::tables::PAPER;
-use super::{HOUR, hours, miles, navigated};
 use crate::imu::Sensor;
 use crate::study::Experiment;
 use crate::study::experiment::{ALIGNMENT_TIME, Estimator, Situation, Spread, Worth};

@@ -2,8 +2,8 @@
 
 use super::super::number::{sigma, three_digits};
 use super::super::plot::{Anchor, Axis, Color, Dash, Mark, Panel, Plot, Point, Series, Shape};
+use super::names::{HOUR, estimator_name, hours, in_general, method_name, miles, situation_name};
 use super::tables::nmile;
-use super::{HOUR, estimator_name, hours, in_general, method_name, miles, situation_name};
 use crate::calibration::Group;
 use crate::imu::InstallationForm;
 use crate::study::Experiment;

@@ -2,29 +2,25 @@
 
 mod data;
 mod figures;
+mod names;
 mod tables;
 mod verdict;
 
-use super::document::{Document, Facts, List};
+use super::document::{Document, Facts};
 use super::number::{count, minutes, three_digits};
-use crate::imu::InstallationForm;
 use crate::study::Experiment;
-use crate::study::experiment::{ALIGNMENT_TIME, Estimator, Method, Navigated, Situation, Worth};
-use crate::study::navigation::INTERVAL;
-use crate::units::{DEGREE, NAUTICAL_MILE};
-
-const HOUR: f64 = 3600.0;
-/// Hours of the paper's experiment.
-const PAPER_HOURS: f64 = 40.0;
+use crate::study::experiment::{ALIGNMENT_TIME, Estimator};
+use crate::units::DEGREE;
+use names::{hours, method_kind, timed};
 
 /// Everything that is said of the experiment.
 pub fn document(experiment: &Experiment) -> Document {
     let instruments = count(experiment.trials.len());
     let title = format!("The turntable experiment with {instruments} simulated instruments");
     let mut document = Document::new(title);
-    let (good, bad) = verdict::verdict(experiment);
-    document.conclusions = List::new("What holds", good);
-    document.warnings = List::new("To be noted", bad);
+    document.conclusions.heading = "What holds".to_owned();
+    document.warnings.heading = "To be noted".to_owned();
+    verdict::say(&mut document, experiment);
     document.both(facts(experiment));
     for table in tables::tables(experiment) {
         document.both(table);
@@ -86,63 +82,6 @@ fn facts(experiment: &Experiment) -> Facts {
     Facts::new("The experiment", rows)
 }
 
-fn hours(experiment: &Experiment) -> f64 {
-    f64::from(experiment.study.intervals) * INTERVAL / HOUR
-}
-
-/// Every method with its table time, s.
-fn timed(experiment: &Experiment) -> impl Iterator<Item = (Method, f64)> {
-    Method::all().zip(experiment.table_times.iter().copied())
-}
-
-/// Such as `EKF 10 min, six-angle`.
-fn method_name(experiment: &Experiment, method: Method) -> String {
-    let estimator = estimator_name(experiment, method.estimator);
-    format!("{estimator}, {}", method.form.name())
-}
-
-fn method_kind(estimator: Estimator) -> &'static str {
-    match estimator {
-        Estimator::ClosedForm => "closed form",
-        Estimator::Filter | Estimator::LongFilter => "EKF",
-    }
-}
-
-/// Such as `EKF 10 min`, to the minute: the facts hold the rest.
-fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
-    let time = timed(experiment).find(|(method, _)| method.estimator == estimator);
-    let minutes = time.map_or(f64::NAN, |(_, time)| time / 60.0);
-    format!("{} {minutes:.0} min", method_kind(estimator))
-}
-
-fn situation_name(situation: Situation) -> &'static str {
-    match situation {
-        Situation::SelfAligned => "stationary, self-aligned",
-        Situation::Aligned => "stationary, alignment given",
-        Situation::Moving => "moving, alignment given",
-    }
-}
-
-fn miles(metres: f64) -> f64 {
-    metres / NAUTICAL_MILE
-}
-
-/// What a method is worth in the general form.
-fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<&Worth> {
-    let general = Method {
-        estimator,
-        form: InstallationForm::General,
-    };
-    navigated.methods.iter().find(|w| w.method == general)
-}
-
-fn navigated(experiment: &Experiment, situation: Situation) -> Option<&Navigated> {
-    experiment
-        .navigations
-        .iter()
-        .find(|n| n.situation == situation)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{svg, terminal};
@@ -150,6 +89,7 @@ mod tests {
     use crate::models::{Place, trajectory};
     use crate::simulation::Scenario;
     use crate::study::ExperimentStudy;
+    use crate::study::experiment::Method;
 
     #[test]
     fn an_experiment_is_reported_whole_whether_its_filter_works_or_not() {
@@ -171,12 +111,8 @@ mod tests {
         };
         for experiment in [&with_two, &none.run(&|| {}).unwrap()] {
             let document = document(experiment);
-            let drawn: Vec<String> = document
-                .plots()
-                .map(|plot| svg::draw(plot).unwrap())
-                .collect();
+            let drawn = svg::drawn(document.plots());
             assert_eq!(drawn.len(), 3);
-            svg::assert_sound(&drawn);
             let text = terminal::text(&document, Some(100));
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         }

@@ -2,7 +2,7 @@
 
 use super::super::document::{NONE, Table, cells};
 use super::super::number::{or_dash, three_digits, value, with_interval};
-use super::{
+use super::names::{
     PAPER_HOURS, estimator_name, hours, in_general, method_name, miles, navigated, situation_name,
 };
 use crate::calibration::Group;

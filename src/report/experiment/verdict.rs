@@ -1,8 +1,9 @@
 //! What the experiment says, in sentences.
 
+use super::super::document::Document;
 use super::super::number::{count, three_digits, value, with_interval};
+use super::names::{estimator_name, hours, in_general, method_name, navigated, situation_name};
 use super::tables::nmile;
-use super::{estimator_name, hours, in_general, method_name, navigated, situation_name};
 use crate::study::Experiment;
 use crate::study::experiment::{Budget, Estimator, Method, Situation};
 
@@ -14,17 +15,20 @@ const COMPARED: [(Situation, Estimator); 4] = [
     (Situation::Moving, Estimator::Filter),
 ];
 
-/// What is as one would wish, and what a user must know before trusting the figures.
-pub(super) fn verdict(experiment: &Experiment) -> (Vec<String>, Vec<String>) {
-    let (mut good, mut bad) = (Vec::new(), failures(experiment));
+/// Says what is better, what makes most of the error, and which calibrations failed.
+pub(super) fn say(document: &mut Document, experiment: &Experiment) {
+    for text in failures(experiment) {
+        document.say(false, text);
+    }
     for (situation, estimator) in COMPARED {
         if let Some((better, text)) = compared(experiment, situation, estimator) {
-            if better { &mut good } else { &mut bad }.push(text);
+            document.say(better, text);
         }
     }
     let limits = [Situation::SelfAligned, Situation::Moving].into_iter();
-    good.extend(limits.filter_map(|situation| limit(experiment, situation)));
-    (good, bad)
+    for text in limits.filter_map(|situation| limit(experiment, situation)) {
+        document.say(true, text);
+    }
 }
 
 fn compared(

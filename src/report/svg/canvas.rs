@@ -11,6 +11,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::super::plot::{Color, Dash, Pen, Point};
 
+/// Width of every figure.
+pub(super) const WIDTH: u32 = 1200;
 /// Drawn pixels in one shown pixel.
 const FINE: f64 = 8.0;
 /// Size of the letters.

@@ -2,11 +2,12 @@
 
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::super::plot::{Grid, Panel, Point, Scale};
+use super::super::plot::{Grid, Panel, Scale};
 use super::canvas::{
-    Canvas, DrawError, GRID, INK, LETTER, QUIET, SHADE, SMALL, rgb, shortened, width,
+    Canvas, DrawError, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
 };
-use super::{WIDTH, series};
+use super::frame::Frame;
+use super::series;
 
 /// Above the axes, for the title.
 const TOP: f64 = 26.0;
@@ -16,43 +17,6 @@ const LINE: f64 = 17.0;
 const TAG: f64 = 0.85;
 /// Of a panel's width, the most that names at the ends of lines may take.
 const LABELS: f64 = 0.3;
-
-/// A panel laid out: where its axes are.
-pub(super) struct Frame<'p> {
-    /// The panel.
-    pub(super) panel: &'p Panel,
-    /// Horizontal scale.
-    pub(super) x: Scale,
-    /// Vertical scale.
-    pub(super) y: Scale,
-    /// Left and right end of the axes.
-    pub(super) across: (f64, f64),
-    /// Upper and lower end.
-    pub(super) down: (f64, f64),
-    /// Right end of the panel.
-    end: f64,
-}
-
-impl Frame<'_> {
-    /// Where a point is drawn.
-    pub(super) fn at(&self, (x, y): Point) -> Point {
-        (self.at_x(x), self.at_y(y))
-    }
-
-    fn at_x(&self, x: f64) -> f64 {
-        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
-    }
-
-    fn title(&self, on: &Canvas) -> Result<(), DrawError> {
-        let at = (self.across.0, self.down.0 - TOP + 6.0);
-        on.text(&self.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
-    }
-
-    /// Where a height is drawn.
-    pub(super) fn at_y(&self, y: f64) -> f64 {
-        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
-    }
-}
 
 fn rows(grid: &Grid) -> usize {
     grid.panels.len().div_ceil(grid.columns).max(1)
@@ -92,7 +56,7 @@ pub(super) fn draw(on: &Canvas, grid: &Grid) -> Result<(), DrawError> {
                 end: origin + panel_width,
             };
             match panel.blank {
-                true => frame.title(on)?,
+                true => title(on, &frame)?,
                 false => of_panel(on, &frame, &names)?,
             }
         }
@@ -133,6 +97,11 @@ fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
     x.ticks.iter().map(|(_, label)| lines(label)).collect()
 }
 
+fn title(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+    let at = (frame.across.0, frame.down.0 - TOP + 6.0);
+    on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
+}
+
 fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
     let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
     for range in &panel.shading {
@@ -144,7 +113,7 @@ fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), Dra
     }
     ticks(on, frame, names)?;
     on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75)?;
-    frame.title(on)?;
+    title(on, frame)?;
     keys(on, frame, top - TOP + 6.0)?;
     for series in &panel.series {
         series::draw(on, frame, series)?;

@@ -2,6 +2,7 @@
 //! overlap, ticks that leave each other room.
 
 mod canvas;
+mod frame;
 mod grid;
 mod matrix;
 mod series;
@@ -11,10 +12,7 @@ mod tests;
 use super::plot::{Body, Plot};
 
 #[cfg(test)]
-pub(super) use tests::assert_sound;
-
-/// Width of every figure in pixels.
-const WIDTH: u32 = 1200;
+pub(super) use tests::{assert_sound, drawn};
 
 /// A plot that could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -32,8 +30,12 @@ pub struct DrawError {
 /// [`DrawError`] if the drawing library fails.
 pub fn draw(plot: &Plot) -> Result<String, DrawError> {
     let drawn = match &plot.body {
-        Body::Panels(grid) => canvas::draw((WIDTH, grid::height(grid)), |on| grid::draw(on, grid)),
-        Body::Matrix(of) => canvas::draw((WIDTH, matrix::height(of)), |on| matrix::draw(on, of)),
+        Body::Panels(grid) => canvas::draw((canvas::WIDTH, grid::height(grid)), |on| {
+            grid::draw(on, grid)
+        }),
+        Body::Matrix(of) => canvas::draw((canvas::WIDTH, matrix::height(of)), |on| {
+            matrix::draw(on, of)
+        }),
     };
     drawn.map_err(|error| DrawError {
         file: plot.file.clone(),

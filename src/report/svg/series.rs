@@ -4,7 +4,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::plot::{Anchor, Mark, Pen, Point, Series, Shape};
 use super::canvas::{BAND, Canvas, DrawError, SMALL, rgb};
-use super::grid::Frame;
+use super::frame::Frame;
 
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;

@@ -31,7 +31,15 @@ fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
             Some("end") => x - width,
             _ => x,
         };
-        (text, [start, start + width, y - size, y + size])
+        let foot = match attribute(tag, "dy") {
+            Some("0.76em") => y + 0.76 * size,
+            Some(_) => y + 0.25 * size,
+            None => y,
+        };
+        (
+            text,
+            [start, start + width, foot - 0.8 * size, foot + 0.25 * size],
+        )
     })
     .collect()
 }
@@ -55,7 +63,7 @@ pub(in crate::report) fn assert_sound(figures: &[String]) {
             assert!(!svg.contains(bad), "{bad}");
         }
         for (text, [left, right, top, bottom]) in texts(svg) {
-            let inside = left >= -4.0 && right <= 1204.0 && top >= -4.0 && bottom <= height + 12.0;
+            let inside = left >= 0.0 && right <= 1200.0 && top >= 0.0 && bottom <= height;
             assert!(
                 inside,
                 "`{text}` from {left} to {right}, {top} to {bottom} of {height}"
@@ -64,13 +72,20 @@ pub(in crate::report) fn assert_sound(figures: &[String]) {
     }
 }
 
-fn drawn(panels: impl IntoIterator<Item = Panel>) -> String {
+/// Figures that were drawn and found sound.
+pub(in crate::report) fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
+    let figures: Vec<String> = plots.map(|plot| draw(plot).unwrap()).collect();
+    assert_sound(&figures);
+    figures
+}
+
+fn of(panels: impl IntoIterator<Item = Panel>) -> String {
     draw(&Plot::new("a.svg", "A", (2, 200), panels)).unwrap()
 }
 
 #[test]
 fn a_figure_is_shown_at_its_size_and_drawn_finer() {
-    let svg = drawn([]);
+    let svg = of([]);
     assert!(svg.starts_with(r#"<svg width="1200" height="200" viewBox="0 0 9600 1600""#));
 }
 
@@ -93,7 +108,7 @@ fn names_at_the_ends_of_lines_never_overlap_and_long_ones_are_cut() {
     let panel = Panel::new("title", Axis::linear("x"), Axis::linear(""))
         .with_all((0..8).map(|n| line(n).label(format!("line {n}"))))
         .with(line(9).label(long));
-    let svg = drawn([panel.clone(), panel]);
+    let svg = of([panel.clone(), panel]);
     assert_sound(std::slice::from_ref(&svg));
     let mut names: Vec<_> = texts(&svg)
         .into_iter()
@@ -123,7 +138,7 @@ fn numbers_that_are_none_are_drawn_as_gaps() {
         .with(Series::marks(Mark::Ring, points))
         .with(Series::band(vec![nan; 3], vec![nan; 3]))
         .with(Series::level(2.0).label("level"));
-    assert_sound(&[drawn([panel, Panel::blank("nothing to show")])]);
+    assert_sound(&[of([panel, Panel::blank("nothing to show")])]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::super::number::count;
 use super::super::plot::{Axis, Color, Panel, Plot, Point, Series};
-use super::title;
+use super::verdict::title;
 use crate::imu::{InstallationForm, Sensor};
 use crate::study::Table1;
 use crate::study::table1::{Column, Quantity};

@@ -7,9 +7,8 @@ use serde_json::{Map, Value, json};
 
 use super::document::{Block, Document, Facts, List, Table, cells};
 use super::number::{count, three_digits, value};
-use crate::imu::{InstallationForm, Sensor};
 use crate::study::Table1;
-use crate::study::table1::paper::{self, Published};
+use crate::study::table1::paper;
 use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row};
 use crate::units::DEGREE;
 
@@ -83,17 +82,6 @@ fn notes(table: &Table1) -> Vec<String> {
     notes
 }
 
-fn title(published: &Published) -> &'static str {
-    match (published.sensor, published.form) {
-        (Sensor::Gyro, InstallationForm::ThreeAngle) => "Gyros, three-angle form (Eq. 10)",
-        (Sensor::Gyro, _) => "Gyros, six-angle form (Eq. 8)",
-        (Sensor::Accel, InstallationForm::ThreeAngle) => {
-            "Accelerometers, three-angle form (Eq. 10)"
-        }
-        (Sensor::Accel, _) => "Accelerometers, six-angle form (Eq. 8)",
-    }
-}
-
 /// A figure in the unit of its quantity.
 fn figure(quantity: Quantity, figure: f64) -> String {
     let shown = figure / quantity.unit_value();
@@ -128,7 +116,7 @@ fn of_column(table: &Table1, column: &Column) -> Block {
         ));
         lines
     });
-    Table::new(title(column.published), headings)
+    Table::new(verdict::title(column.published), headings)
         .section(pair(&paper_name, &column.published.moments(), ""))
         .sections(sections)
         .into()
@@ -238,11 +226,7 @@ mod tests {
     #[test]
     fn every_figure_of_the_paper_is_drawn() {
         let document = document(small());
-        let drawn: Vec<String> = document
-            .plots()
-            .map(|plot| svg::draw(plot).unwrap())
-            .collect();
-        svg::assert_sound(&drawn);
+        let drawn = svg::drawn(document.plots());
         let names: Vec<&str> = document.plots().map(|plot| plot.file.as_str()).collect();
         assert_eq!(
             names,
