@@ -18,6 +18,11 @@ impl Group {
         format!("{} {kind}", self.sensor().name())
     }
 
+    /// Its title with the unit.
+    pub fn titled(self) -> String {
+        format!("{}, {}", self.title(), self.unit())
+    }
+
     /// Such as `gyro K`.
     pub fn short(self) -> String {
         let letter = match self.kind() {

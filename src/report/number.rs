@@ -32,7 +32,7 @@ pub(super) fn sigma(sigma: f64) -> String {
 
 /// A quantity to three digits.
 pub(super) fn three_digits(x: f64) -> String {
-    if x.is_finite() && x.abs() >= 1000.0 {
+    if x.is_finite() && x.abs() >= 999.5 {
         let last = 10f64.powf(x.abs().log10().floor() - 2.0);
         return whole((x / last).round() * last);
     }

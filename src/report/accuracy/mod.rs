@@ -4,6 +4,7 @@ mod compared;
 mod data;
 mod facts;
 mod figures;
+mod normalised;
 mod tables;
 #[cfg(test)]
 mod tests;

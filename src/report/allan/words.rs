@@ -26,7 +26,7 @@ pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
     if !analysis.stretch.stands {
         warnings.push(format!(
-            "The instrument does not stand all through {}: these are figures of its motion and its noise \
+            "The instrument is not stationary all through {}: these are figures of its motion and its noise \
              together.",
             analysis.stretch.name
         ));

@@ -2,6 +2,7 @@
 
 mod facts;
 mod figures;
+mod methods;
 mod path;
 mod report;
 mod tables;

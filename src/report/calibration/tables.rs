@@ -75,10 +75,11 @@ impl Report<'_> {
     /// σ and errors of each group by each method: the answer at a glance.
     pub(super) fn groups(&self) -> Table {
         let (methods, truth) = (self.methods(), self.truth_vector());
-        let mut columns = vec![String::new(), "unit".to_owned()];
+        let (mut columns, mut optional) = (cells!["", "unit"], Vec::new());
         for (name, _) in &methods {
             columns.push(format!("{name}: RMS σ"));
             if truth.is_some() {
+                optional.push(columns.len());
                 columns.extend(["RMS error", "largest"].map(str::to_owned));
             }
         }
@@ -116,6 +117,7 @@ impl Report<'_> {
         let mut table = Table::new("Accuracy of each group", columns)
             .sections(rows.chunks(ParameterKind::ALL.len()).map(<[_]>::to_vec))
             .note("RMS σ: root mean square of the 1σ that the method claims in the group.");
+        table.optional = optional;
         if truth.is_some() {
             table = table.note("Errors are estimate minus truth.");
         }

@@ -53,7 +53,7 @@ pub(super) fn signed(angle: f64) -> String {
 /// The log in a sentence or two.
 pub(super) fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
-        "Stands for {} s in all, at most {} s at a time; {}.",
+        "Stationary for {} s in all, at most {} s at a time; {}.",
         three_digits(survey.standing.total),
         three_digits(survey.standing.longest),
         match (&run.table, run.segments.len()) {
@@ -113,7 +113,7 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     );
     if !tilted.is_empty() {
         findings.push(format!(
-            "In {} the accelerometers see another axis up than the table's log: check body_axes, the order of \
+            "In {} the accelerometers observe another axis up than the table's log: check body_axes, the order of \
              quaternion or angles, and that the table's zero is as C_b_n = I has it.",
             dwells(&tilted)
         ));
@@ -194,7 +194,7 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
             value(*moving, 1.0)
         ),
         (Verdict::Turn { cut: true, .. }, _) => {
-            "begins or ends within the turn: draw its borders wider, to where it stands".to_owned()
+            "begins or ends within the turn: draw its borders wider, to where it is stationary".to_owned()
         }
         (Verdict::Turn { angle, .. }, Some(LabelledMotion::Turns { angle: said, .. })) => format!(
             "turns by {}° about its axis, not {}°: correct axis, sign or angle of the label, or the gyros' scale",
@@ -211,7 +211,7 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
         findings.push(
-            "There are fewer than two dwells: let the instrument stand for a second or more between turns; if it does, \
+            "There are fewer than two dwells: leave the instrument stationary for a second or more between turns; if it was, \
              check bias_sigma of the gyros and the noise figures."
                 .to_owned(),
         );
