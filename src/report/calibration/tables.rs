@@ -222,34 +222,28 @@ pub(super) fn residuals(quality: &Quality, run: &Run) -> Table {
         Some(_) => "attitude after a turn, gyros minus table",
         None => "labelled turns, gyros minus label",
     };
-    let of: [(&str, &[(&str, f64)], fn(&Measures) -> &Spread); 3] = [
-        ("|f| minus g in dwells", &FORCE, |m| &m.gravity),
-        ("up after a turn, gyros minus accels", &ANGLE, |m| {
-            &m.direction
-        }),
-        (turns, &ANGLE, |m| &m.turns),
+    let named = [
+        ("|f| minus g in dwells", FORCE),
+        ("up after a turn, gyros minus accels", ANGLE),
+        (turns, ANGLE),
     ];
-    let rows = of.into_iter().filter_map(|(name, units, of)| {
-        let all = of(&quality.all);
+    let of = |m: &Measures| [m.gravity, m.direction, m.turns];
+    let held_out = quality.held_out.as_ref().map(of);
+    let all = named.into_iter().zip(of(&quality.all)).enumerate();
+    let rows = all.filter_map(|(k, ((name, units), all))| {
         // The smallest unit in which the figure is below a thousand, else the largest.
         let fits = units.iter().find(|(_, size)| all.rms < 1000.0 * size);
         let &(unit, size) = fits.or(units.last()).filter(|_| all.count > 0)?;
         let cells = |of: &Spread| match of.count {
             0 => [NONE; 3].map(str::to_owned),
-            n => [
-                count(n),
-                three_digits(of.rms / size),
-                three_digits(of.largest / size),
-            ],
+            n => {
+                let [rms, largest] = [of.rms, of.largest].map(|x| three_digits(x / size));
+                [count(n), rms, largest]
+            }
         };
         let mut row = cells![name, unit];
-        row.extend(cells(all));
-        row.extend(
-            quality
-                .held_out
-                .iter()
-                .flat_map(|held_out| cells(of(held_out))),
-        );
+        row.extend(cells(&all));
+        row.extend(held_out.iter().flat_map(|of| cells(&of[k])));
         Some(row)
     });
     let mut columns = vec!["", "unit", "number", "RMS", "largest"];

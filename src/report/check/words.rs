@@ -194,7 +194,8 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
             value(*moving, 1.0)
         ),
         (Verdict::Turn { cut: true, .. }, _) => {
-            "begins or ends within the turn: draw its borders wider, to where it is stationary".to_owned()
+            "begins or ends within the turn: draw its borders wider, to where it is stationary"
+                .to_owned()
         }
         (Verdict::Turn { angle, .. }, Some(LabelledMotion::Turns { angle: said, .. })) => format!(
             "turns by {}° about its axis, not {}°: correct axis, sign or angle of the label, or the gyros' scale",
