@@ -3,13 +3,13 @@
 mod allan;
 mod apply;
 mod batch;
-mod block_effects;
 mod by_hand;
 mod calibration_file;
 mod check;
 mod cli;
 mod compare;
 mod door;
+mod error_terms;
 mod export;
 mod faults;
 mod features;

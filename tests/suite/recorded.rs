@@ -1,9 +1,7 @@
 //! Records that other programs made, with known truth.
 
-use turncal::calibration::PARAMETERS;
 use turncal::calibration::result::Calibration;
-use turncal::calibration::to_vector;
-use turncal::calibration::{Outcome, estimate, triads_of};
+use turncal::calibration::{Options, Outcome, PARAMETERS, Problem, estimate, to_vector, triads_of};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
@@ -14,14 +12,7 @@ fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
     let truth = Calibration::read(&directory.join("truth.json")).unwrap();
-    let outcome = estimate(
-        &Problem::new(
-            &run,
-            &Options::default().installation(InstallationForm::General),
-        ),
-        &|_| {},
-    )
-    .unwrap();
+    let outcome = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
     let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);
     let mut largest = [0f64; 6];
