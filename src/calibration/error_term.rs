@@ -7,7 +7,7 @@ use crate::turntable::AXIS_TILTS;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorTerm {
     /// Biases that vary as first-order Gauss–Markov processes.
-    BiasVariation,
+    GaussMarkovBias,
     /// Level and north of the table's base.
     TableBase,
     /// Tilts of the table's axes within the outermost.
@@ -19,7 +19,7 @@ pub enum ErrorTerm {
 impl ErrorTerm {
     /// Every error term.
     pub const ALL: [Self; 8] = [
-        Self::BiasVariation,
+        Self::GaussMarkovBias,
         Self::TableBase,
         Self::TableAxes,
         Self::Instrument(Term::AccelSecondOrder),
@@ -32,13 +32,13 @@ impl ErrorTerm {
     /// Those that are constant over a run.
     pub fn constant() -> impl Iterator<Item = Self> {
         let all = Self::ALL.into_iter();
-        all.filter(|&term| term != Self::BiasVariation)
+        all.filter(|&term| term != Self::GaussMarkovBias)
     }
 
     /// The name that files and commands use.
     pub fn name(self) -> &'static str {
         match self {
-            Self::BiasVariation => "wandering-bias",
+            Self::GaussMarkovBias => "gauss-markov-bias",
             Self::TableBase => "table-base",
             Self::TableAxes => "table-axes",
             Self::Instrument(term) => term.name(),
@@ -48,7 +48,7 @@ impl ErrorTerm {
     /// How many states it has.
     pub fn states(self) -> usize {
         match self {
-            Self::BiasVariation => 6,
+            Self::GaussMarkovBias => 6,
             Self::TableBase => 3,
             Self::TableAxes => AXIS_TILTS,
             Self::Instrument(term) => term.parameters().len(),

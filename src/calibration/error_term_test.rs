@@ -81,7 +81,7 @@ pub fn test_error_terms(
     let scalars = 3.0 * outcome.innovations.len() as f64;
     let mut everything = model.clone();
     ErrorTerm::constant().for_each(|term| everything.switch_on(term));
-    let varying = ErrorTerm::BiasVariation;
+    let varying = ErrorTerm::GaussMarkovBias;
     let mut otherwise = model.clone();
     if model.has(varying) {
         otherwise.switch_off(varying);

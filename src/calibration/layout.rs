@@ -48,7 +48,7 @@ pub(super) struct Layout {
 
 impl Layout {
     pub fn new(model: &Model) -> Self {
-        let varies = |sensor: &Sensor| model.noise.get(*sensor).bias_variation.is_some();
+        let varies = |sensor: &Sensor| model.noise.get(*sensor).gauss_markov.is_some();
         let triads = Sensor::ALL.into_iter().filter(varies);
         Self {
             parameters: (0..PARAMETERS)
@@ -157,7 +157,7 @@ mod tests {
         let with = |term| size(Options::default().with(term)) - plain;
         assert_eq!(with(ErrorTerm::Instrument(Term::TimeOffset)), 1);
         assert_eq!(with(ErrorTerm::Instrument(Term::SizeEffect)), 6);
-        assert_eq!(with(ErrorTerm::BiasVariation), 6);
+        assert_eq!(with(ErrorTerm::GaussMarkovBias), 6);
         assert_eq!(with(ErrorTerm::TableBase), 3);
         // Three parameters fix the body frame, and there is no table.
         let velocity = size(Options::default().aiding(crate::run::Aiding::Velocity));

@@ -6,7 +6,7 @@ use super::error_term::ErrorTerm;
 use super::options::Options;
 use super::parameters::{ParameterVector, parameter, to_vector};
 use crate::imu::{
-    BiasVariation, InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, TermVector,
+    GaussMarkov, InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, TermVector,
     Triad,
 };
 use crate::run::{Aiding, Run};
@@ -104,8 +104,8 @@ impl Model {
     /// Whether an error term is on.
     pub fn has(&self, term: ErrorTerm) -> bool {
         match term {
-            ErrorTerm::BiasVariation => {
-                let varies = |sensor| self.noise.get(sensor).bias_variation.is_some();
+            ErrorTerm::GaussMarkovBias => {
+                let varies = |sensor| self.noise.get(sensor).gauss_markov.is_some();
                 Sensor::ALL.into_iter().any(varies)
             }
             ErrorTerm::TableBase => self.geometry.base != Vector3::zeros(),
@@ -120,7 +120,7 @@ impl Model {
         match term {
             ErrorTerm::TableBase => self.aiding == Aiding::Table,
             ErrorTerm::TableAxes => self.table_axes > 0,
-            ErrorTerm::BiasVariation | ErrorTerm::Instrument(_) => true,
+            ErrorTerm::GaussMarkovBias | ErrorTerm::Instrument(_) => true,
         }
     }
 
@@ -131,9 +131,9 @@ impl Model {
             return;
         }
         match term {
-            ErrorTerm::BiasVariation => {
+            ErrorTerm::GaussMarkovBias => {
                 for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.bias_variation = Some(usual_variation(noise));
+                    noise.gauss_markov = Some(usual_variation(noise));
                 }
             }
             ErrorTerm::TableBase => {
@@ -153,9 +153,9 @@ impl Model {
     /// Switches an error term off.
     pub fn switch_off(&mut self, term: ErrorTerm) {
         match term {
-            ErrorTerm::BiasVariation => {
+            ErrorTerm::GaussMarkovBias => {
                 for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.bias_variation = None;
+                    noise.gauss_markov = None;
                 }
             }
             ErrorTerm::TableBase => self.geometry.base = Vector3::zeros(),
@@ -170,8 +170,8 @@ impl Model {
 }
 
 /// How a bias may vary where nothing better is known than the white noise.
-pub(crate) fn usual_variation(noise: &Noise) -> BiasVariation {
-    BiasVariation {
+pub(crate) fn usual_variation(noise: &Noise) -> GaussMarkov {
+    GaussMarkov {
         sigma: USUAL_VARIATION * noise.random_walk / USUAL_CORRELATION.sqrt(),
         correlation_time: USUAL_CORRELATION,
     }

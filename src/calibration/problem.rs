@@ -6,10 +6,9 @@ use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::finding::Finding;
-use super::linearisation::AttitudePrior;
+use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
-use super::pass::Start;
 use super::schedule::{Step, first_reading, steps};
 use super::standstill::velocity_sigma;
 use crate::attitude::to_tilt_and_heading;

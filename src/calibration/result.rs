@@ -4,11 +4,12 @@
 //! + bias`, with `u` in rad/s or m/s² along right-front-up.
 
 use std::collections::BTreeMap;
+use std::ops::Index;
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::imu::{BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
+use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
 /// The version of the format.
@@ -72,7 +73,7 @@ pub struct Calibration {
     /// What it leaves of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<QualityRecord>,
-    /// What blocks of states beside the triads' parameters did, or would do.
+    /// What error terms did, or would do.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
@@ -168,7 +169,7 @@ pub struct QualityRecord {
 /// Departures from gravity and from known turns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MeasuresRecord {
-    /// Size of specific force at rest less gravity.
+    /// Magnitude of specific force at rest minus gravity.
     pub gravity_m_s2: SpreadRecord,
     /// Angle between up as gyros carry it over a turn and as accelerometers see it after.
     pub direction_rad: SpreadRecord,
@@ -187,7 +188,7 @@ pub struct SpreadRecord {
     pub largest: f64,
 }
 
-/// A block of states against the same run without it.
+/// An error term against the same run without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
     /// Its name, such as `accel-second-order`.
@@ -197,7 +198,7 @@ pub struct BlockRecord {
     /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; none where there is
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
-    /// By how much the merit, −2 ln of likelihood and prior, falls with the block.
+    /// By how much the cost, −2 ln of likelihood and prior, falls with it.
     pub merit_gain: f64,
     /// What that stays below in 9999 runs of 10000 where the block's errors are not there.
     pub merit_gain_limit: f64,
@@ -241,7 +242,52 @@ pub struct TestVector {
     pub calibrated: [f64; 6],
 }
 
+/// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
+///
+/// # Panics
+/// As a map does, if there is no parameter of that name; `get` does not.
+impl Index<&str> for Calibration {
+    type Output = f64;
+
+    fn index(&self, name: &str) -> &f64 {
+        match self.get(name) {
+            Some(value) => value,
+            None => panic!("no parameter `{name}` in this calibration"),
+        }
+    }
+}
+
 impl Calibration {
+    /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity,
+    /// `gyro.installation.xy` the entry of the installation matrix in that row and column, the same for
+    /// `accel`; then parameters of error terms such as `accel.time_offset`, in SI.
+    pub fn get(&self, name: &str) -> Option<&f64> {
+        let in_triad = |sensor: &str| match sensor {
+            "gyro" => Some(&self.gyro),
+            "accel" => Some(&self.accel),
+            _ => None,
+        };
+        let mut parts = name.splitn(3, '.');
+        let (sensor, kind) = (parts.next()?, parts.next()?);
+        let found = in_triad(sensor).zip(parts.next());
+        let found = found.and_then(|(triad, axes)| entry(triad, kind, axes));
+        found.or_else(|| self.terms.get(name).map(|term| &term.value))
+    }
+
+    /// 1σ of a parameter by name, zero where it was not estimated; none if no σ is claimed.
+    pub fn sigma_of(&self, name: &str) -> Option<&f64> {
+        let sigma = self.sigma.as_ref()?;
+        let mut parts = name.splitn(3, '.');
+        let triad = match parts.next()? {
+            "gyro" => Some(&sigma.gyro),
+            "accel" => Some(&sigma.accel),
+            _ => None,
+        };
+        let found = triad.zip(parts.next()).zip(parts.next());
+        let found = found.and_then(|((triad, kind), axes)| entry(triad, kind, axes));
+        found.or_else(|| self.terms.get(name)?.sigma.as_ref())
+    }
+
     /// A record of the two triads and nothing else, as a truth is.
     pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
         Self {
@@ -274,6 +320,19 @@ impl Calibration {
     }
 }
 
+fn entry<'a>(triad: &'a TriadRecord, kind: &str, axes: &str) -> Option<&'a f64> {
+    let mut axes = axes
+        .chars()
+        .map(|axis| AXES.iter().position(|&a| a == axis));
+    let (first, second, more) = (axes.next()??, axes.next(), axes.next());
+    match (kind, second, more) {
+        ("scale", None, None) => Some(&triad.scale[first]),
+        ("bias", None, None) => Some(&triad.bias[first]),
+        ("installation", Some(Some(column)), None) => Some(&triad.installation[first][column]),
+        _ => None,
+    }
+}
+
 /// Both triads of a record, normalised by these nominal scales and split in a form. A record may
 /// hold any installation matrix, so the split goes through `K C`, which all forms share.
 pub fn triads_of(
@@ -291,4 +350,34 @@ pub fn triads_of(
         let bias = Vector3::from(triad.bias).component_div(&nominal);
         Triad::from_sensitivity(form, &a, bias)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_have_names() {
+        let triad = |k: f64| TriadRecord {
+            scale: [k, k + 1.0, k + 2.0],
+            installation: [[1.0, k * 1e-3, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            bias: [0.0, 0.0, -k],
+        };
+        let calibration = Calibration::new(triad(5.0), triad(7.0));
+        assert_eq!(calibration["gyro.scale.y"], 6.0);
+        assert_eq!(calibration["accel.bias.z"], -7.0);
+        assert_eq!(calibration["gyro.installation.xy"], 5e-3);
+        for other in [
+            "gyro",
+            "gyro.scale",
+            "gyro.scale.w",
+            "gyro.scale.xy",
+            "gyro.bias.",
+            "x.y.z",
+            "",
+        ] {
+            assert_eq!(calibration.get(other), None, "{other}");
+        }
+        assert_eq!(calibration.sigma_of("gyro.scale.y"), None);
+    }
 }

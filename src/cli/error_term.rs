@@ -17,7 +17,7 @@ pub struct TermArgument(pub ErrorTerm);
 impl ValueEnum for TermArgument {
     fn value_variants<'a>() -> &'a [Self] {
         const ALL: [TermArgument; ErrorTerm::ALL.len()] = {
-            let mut all = [TermArgument(ErrorTerm::BiasVariation); ErrorTerm::ALL.len()];
+            let mut all = [TermArgument(ErrorTerm::GaussMarkovBias); ErrorTerm::ALL.len()];
             let mut k = 0;
             while k < all.len() {
                 all[k] = TermArgument(ErrorTerm::ALL[k]);
@@ -29,8 +29,8 @@ impl ValueEnum for TermArgument {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.0.name()).help(match self.0 {
-            ErrorTerm::BiasVariation => "Gauss–Markov biases",
+        let value = PossibleValue::new(self.0.name()).help(match self.0 {
+            ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
             ErrorTerm::TableBase => "Level and north of the table",
             ErrorTerm::TableAxes => "Non-orthogonality of the table's axes",
             ErrorTerm::Instrument(Term::AccelSecondOrder) => {
@@ -46,7 +46,11 @@ impl ValueEnum for TermArgument {
                 "Accelerometers: delay of their samples behind the gyros'"
             }
             ErrorTerm::Instrument(Term::GSensitivity) => "Gyros: sensitivity to specific force",
-        }))
+        });
+        Some(match self.0 {
+            ErrorTerm::GaussMarkovBias => value.alias("wandering-bias"),
+            _ => value,
+        })
     }
 }
 

@@ -74,7 +74,7 @@ pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simul
 fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
     let on = (0..TERM_PARAMETERS).filter(|&k| simulated.run.instrument.term_sigma[k] > 0.0);
     let term = |k: usize| {
-        let (value, sigma) = (simulated.further[k], None);
+        let (value, sigma) = (simulated.terms[k], None);
         Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
     };
     on.filter_map(term).collect()

@@ -9,11 +9,12 @@ use super::clock::Clock;
 use super::error::FileError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
+use super::noise_keys::NoiseKeys;
 use super::quantity::{OUTPUTS, units};
 use crate::imu::{
-    BiasVariation, Instrument, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term, TermVector,
+    GaussMarkov, Instrument, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term, TermVector,
 };
-use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
+use crate::units::{ARCSEC, PPM};
 
 /// What `[imu]` and the tables below it say.
 pub(super) struct InstrumentFields<'a> {
@@ -131,7 +132,7 @@ impl<'a> InstrumentFields<'a> {
                     gyro: gyro.prior,
                     accel: accel.prior,
                 },
-                noise: noise(&fields)?,
+                noise: noise(&fields, notes)?,
                 term_sigma: term_sigma(&fields)?,
             },
         })
@@ -157,49 +158,46 @@ fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
     Ok(sigma)
 }
 
-fn noise(imu: &Fields) -> Result<PerSensor<Noise>, FileError> {
-    let fields = imu.need_table(
-        "noise",
-        &[
-            "angle_random_walk_deg_per_sqrt_h",
-            "velocity_random_walk_ug_per_sqrt_hz",
-            "gyro_instability_deg_per_h",
-            "gyro_correlation_time_s",
-            "accel_instability_ug",
-            "accel_correlation_time_s",
-        ],
-        "the noise of the instrument",
-    )?;
-    let triad = |walk: &str, walk_unit, wander: &str, wander_unit, time: &str| {
-        let bias_variation = match (fields.get(wander), fields.get(time)) {
+fn noise(imu: &Fields, notes: &mut Vec<String>) -> Result<PerSensor<Noise>, FileError> {
+    let keys = Sensor::ALL.map(NoiseKeys::of);
+    let known = keys.map(|keys| {
+        let (walk, sigma) = (keys.random_walk.0, keys.gauss_markov.0);
+        [walk, sigma, keys.correlation_time, keys.former]
+    });
+    let fields = imu.need_table("noise", known.as_flattened(), "the noise of the instrument")?;
+    let mut triad = |keys: NoiseKeys| {
+        let ((walk, walk_unit), (sigma, sigma_unit)) = (keys.random_walk, keys.gauss_markov);
+        let former = fields
+            .get(keys.former)
+            .filter(|_| fields.get(sigma).is_none());
+        if former.is_some() {
+            notes.push(format!(
+                "imu.noise.{} is read as the 1σ of a Gauss–Markov bias, not as the floor of the Allan \
+                 deviation that data sheets call instability; write {sigma}.",
+                keys.former
+            ));
+        }
+        let time = keys.correlation_time;
+        let gauss_markov = match (fields.get(sigma).or(former), fields.get(time)) {
             (None, None) => None,
-            (Some(sigma), Some(time)) => Some(BiasVariation {
-                sigma: sigma.positive()? * wander_unit,
+            (Some(sigma), Some(time)) => Some(GaussMarkov {
+                sigma: sigma.positive()? * sigma_unit,
                 correlation_time: time.positive()?,
             }),
             (Some(_), None) => return Err(fields.missing(time, "its correlation time")),
-            (None, Some(_)) => return Err(fields.missing(wander, "the 1σ of the wandering bias")),
+            (None, Some(_)) => {
+                return Err(fields.missing(sigma, "the 1σ of the Gauss–Markov bias"));
+            }
         };
         Ok(Noise {
             random_walk: fields.need(walk, "a random walk")?.not_negative()? * walk_unit,
-            bias_variation,
+            gauss_markov,
         })
     };
+    let [gyro, accel] = keys;
     Ok(PerSensor {
-        gyro: triad(
-            "angle_random_walk_deg_per_sqrt_h",
-            DEG_PER_SQRT_H,
-            "gyro_instability_deg_per_h",
-            DEG_PER_H,
-            "gyro_correlation_time_s",
-        )?,
-        accel: triad(
-            "velocity_random_walk_ug_per_sqrt_hz",
-            MICRO_G_PER_SQRT_HZ,
-            "accel_instability_ug",
-            MICRO_G,
-            "accel_correlation_time_s",
-        )?,
+        gyro: triad(gyro)?,
+        accel: triad(accel)?,
     })
 }
 

@@ -9,13 +9,14 @@ use flate2::{Compression, GzBuilder};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use super::error::{FileError, Place, list, suggestion};
+use super::noise_keys::NoiseKeys;
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use crate::calibration::Calibration;
 use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
-use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
+use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
 /// `segments.csv`, `truth.json`.
@@ -215,15 +216,15 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
             velocity_walk = short(noise.accel.random_walk / MICRO_G_PER_SQRT_HZ),
         ),
     ];
-    for (name, unit, unit_value, noise) in [
-        ("gyro", "deg_per_h", DEG_PER_H, &noise.gyro),
-        ("accel", "ug", MICRO_G, &noise.accel),
-    ] {
-        if let Some(bias_variation) = noise.bias_variation {
+    for sensor in Sensor::ALL {
+        let keys = NoiseKeys::of(sensor);
+        let (sigma, unit) = keys.gauss_markov;
+        if let Some(bias) = noise.get(sensor).gauss_markov {
             sections.push(format!(
-                "{name}_instability_{unit} = {:?}\n{name}_correlation_time_s = {:?}\n",
-                short(bias_variation.sigma / unit_value),
-                bias_variation.correlation_time
+                "{sigma} = {:?}\n{} = {:?}\n",
+                short(bias.sigma / unit),
+                keys.correlation_time,
+                bias.correlation_time
             ));
         }
     }
@@ -235,7 +236,7 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
     sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
     sections.extend(terms_text(run));
     sections.push(format!(
-        "# how still the IMU is while the table stands\n[standstill]\nposition_sigma_m = {:?}\n",
+        "# how still the IMU is while the table is at rest\n[standstill]\nposition_sigma_m = {:?}\n",
         run.standstill.position_sigma
     ));
     if let Some(sigma) = run.standstill.velocity_sigma {
@@ -320,8 +321,7 @@ fn terms_text(run: &Run) -> Option<String> {
         (sigma > 0.0).then(line)
     });
     let lines: String = on.collect();
-    (!lines.is_empty())
-        .then(|| format!("# further error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
+    (!lines.is_empty()).then(|| format!("# error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
 }
 
 fn meta_text(meta: &BTreeMap<String, String>) -> String {

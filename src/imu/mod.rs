@@ -18,7 +18,7 @@ mod triad;
 pub use body_frame::BodyFrame;
 pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;
-pub use signal::{BiasVariation, Noise, NoiseSource, Output, Pulses};
+pub use signal::{GaussMarkov, Noise, NoiseSource, Output, Pulses};
 pub use terms::{Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{
-    ANGLES, BiasVariation, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
+    ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -129,14 +129,14 @@ impl Instrument {
             noise: PerSensor {
                 gyro: Noise {
                     random_walk: gyro.angle_random_walk_deg_per_sqrt_h.0 * DEG_PER_SQRT_H,
-                    bias_variation: gyro.bias_variation.map(|i| BiasVariation {
+                    gauss_markov: gyro.gauss_markov.map(|i| GaussMarkov {
                         sigma: i.sigma_deg_per_h.0 * DEG_PER_H,
                         correlation_time: i.correlation_time_s.0,
                     }),
                 },
                 accel: Noise {
                     random_walk: accel.velocity_random_walk_ug_per_sqrt_hz.0 * MICRO_G_PER_SQRT_HZ,
-                    bias_variation: accel.bias_variation.map(|i| BiasVariation {
+                    gauss_markov: accel.gauss_markov.map(|i| GaussMarkov {
                         sigma: i.sigma_ug.0 * MICRO_G,
                         correlation_time: i.correlation_time_s.0,
                     }),
@@ -225,7 +225,8 @@ impl TermsFile {
 struct GyroFile {
     pulse_arcsec: Positive,
     angle_random_walk_deg_per_sqrt_h: NonNegative,
-    bias_variation: Option<GyroInstabilityFile>,
+    #[serde(alias = "instability")]
+    gauss_markov: Option<GyroGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_deg_per_h: SpreadFile,
 }
@@ -235,21 +236,22 @@ struct GyroFile {
 struct AccelFile {
     pulse_um_per_s: Positive,
     velocity_random_walk_ug_per_sqrt_hz: NonNegative,
-    bias_variation: Option<AccelInstabilityFile>,
+    #[serde(alias = "instability")]
+    gauss_markov: Option<AccelGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_ug: SpreadFile,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct GyroInstabilityFile {
+struct GyroGaussMarkovFile {
     sigma_deg_per_h: NonNegative,
     correlation_time_s: Positive,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct AccelInstabilityFile {
+struct AccelGaussMarkovFile {
     sigma_ug: NonNegative,
     correlation_time_s: Positive,
 }

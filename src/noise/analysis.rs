@@ -6,7 +6,7 @@ use super::allan::{Curve, cluster_sizes, overlapping};
 use super::identify::{Clusters, Found, Hidden, Identified, mean, of_kind};
 use super::process::Process;
 use super::standing::Stretch;
-use crate::imu::{BiasVariation, Noise, PerSensor, Sensor};
+use crate::imu::{GaussMarkov, Noise, PerSensor, Sensor};
 use crate::run::Run;
 use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
@@ -102,11 +102,11 @@ impl NoiseAnalysis {
             .map(|found| found.strength)
             .or(limit().map(|h| h.limit))?;
         let longest = mean.curve.tau.last().copied().unwrap_or_default();
-        let bias_variation = identified
+        let gauss_markov = identified
             .for_filter
             .iter()
             .find_map(|found| match found.process {
-                Process::GaussMarkov { correlation_time } => Some(BiasVariation {
+                Process::GaussMarkov { correlation_time } => Some(GaussMarkov {
                     sigma: found.strength,
                     correlation_time,
                 }),
@@ -115,12 +115,12 @@ impl NoiseAnalysis {
         Some(NoiseFigures {
             noise: Noise {
                 random_walk,
-                bias_variation,
+                gauss_markov,
             },
             random_walk_is_limit: white.is_none(),
             // The hump of its Allan deviation is at 1.89 correlation times.
-            correlation_is_open: bias_variation
-                .is_some_and(|bias_variation| 1.89 * bias_variation.correlation_time > longest),
+            correlation_is_open: gauss_markov
+                .is_some_and(|gauss_markov| 1.89 * gauss_markov.correlation_time > longest),
         })
     }
 }
@@ -173,7 +173,7 @@ impl AxisNoise {
     }
 
     /// Lowest Allan deviation with its cluster time, if it is not the last: what is read off a curve as
-    /// bias bias_variation.
+    /// bias gauss_markov.
     pub fn minimum(&self) -> Option<(f64, f64)> {
         let Curve { tau, variance } = &self.curve;
         let points = tau.iter().zip(variance);

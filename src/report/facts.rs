@@ -102,7 +102,7 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
         "random walk {} {walk_unit}",
         sigma(noise.random_walk / walk)
     );
-    if let Some(instability) = noise.bias_variation {
+    if let Some(instability) = noise.gauss_markov {
         text.push_str(&format!(
             ", instability {} {bias_unit} over {} s",
             sigma(instability.sigma / bias),

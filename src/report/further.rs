@@ -32,7 +32,7 @@ pub(super) struct Row {
 /// A block in words.
 pub(super) fn title(block: ErrorTerm) -> &'static str {
     match block {
-        ErrorTerm::BiasVariation => "wandering biases",
+        ErrorTerm::GaussMarkovBias => "wandering biases",
         ErrorTerm::TableBase => "table level and north",
         ErrorTerm::TableAxes => "table axes",
         ErrorTerm::Instrument(Term::AccelSecondOrder) => "accel second order",
@@ -47,7 +47,7 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
 pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
         ErrorTerm::Instrument(term) => term.unit(),
-        ErrorTerm::TableBase | ErrorTerm::TableAxes | ErrorTerm::BiasVariation => ("″", ARCSEC),
+        ErrorTerm::TableBase | ErrorTerm::TableAxes | ErrorTerm::GaussMarkovBias => ("″", ARCSEC),
     }
 }
 

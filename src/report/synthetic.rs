@@ -135,14 +135,14 @@ fn run(form_rng: &mut ChaCha8Rng) -> Run {
         noise: PerSensor {
             gyro: Noise {
                 random_walk: 0.001 * DEG_PER_SQRT_H,
-                bias_variation: Some(BiasVariation {
+                gauss_markov: Some(GaussMarkov {
                     sigma: 0.003 * DEG_PER_H,
                     correlation_time: 3600.0,
                 }),
             },
             accel: Noise {
                 random_walk: 5.0 * MICRO_G,
-                bias_variation: None,
+                gauss_markov: None,
             },
         },
         prior: prior(),

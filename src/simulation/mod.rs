@@ -30,8 +30,8 @@ pub struct Simulated {
     pub run: Run,
     /// The instrument's true parameters.
     pub truth: PerSensor<Triad>,
-    /// Those of its further terms.
-    pub further: TermVector,
+    /// Those of its error terms.
+    pub terms: TermVector,
     /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
     /// What a sample holds when the run is written to a file.
@@ -48,7 +48,7 @@ enum Draws {
     Imperfection,
     Positions,
     Readings,
-    Further,
+    Terms,
 }
 
 impl Draws {
@@ -76,8 +76,8 @@ impl Scenario {
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
         let motion = Motion::new(&self.table, &self.path, &imperfection)?;
         let read = Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))?;
-        let further = self.draw_further(&mut Draws::Further.generator(seed, stream));
-        let ideal = true_increments(&motion, &self.site, &self.integrator, &further);
+        let terms = self.draw_terms(&mut Draws::Terms.generator(seed, stream));
+        let ideal = true_increments(&motion, &self.site, &self.integrator, &terms);
 
         let truth = PerSensor::from_fn(|sensor| {
             let draws = match sensor {
@@ -162,7 +162,7 @@ impl Scenario {
         Ok(Simulated {
             run,
             truth,
-            further,
+            terms,
             geometry: self.geometry(&imperfection),
             output: self.output,
         })

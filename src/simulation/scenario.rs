@@ -122,13 +122,13 @@ impl Scenario {
         Ok(self)
     }
 
-    /// The same scenario with the errors of a block, of usual size unless its models state one.
+    /// The same scenario with an error term, of usual magnitude unless its models state one.
     pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
-            ErrorTerm::BiasVariation => {
+            ErrorTerm::GaussMarkovBias => {
                 let noise = &mut self.instrument.noise;
                 for noise in [&mut noise.gyro, &mut noise.accel] {
-                    noise.bias_variation.get_or_insert(usual_variation(noise));
+                    noise.gauss_markov.get_or_insert(usual_variation(noise));
                 }
             }
             ErrorTerm::TableBase | ErrorTerm::TableAxes => {
@@ -158,9 +158,9 @@ impl Scenario {
         let sees_table = self.body_frame == BodyFrame::Table;
         let errors = &self.table.errors;
         match block {
-            ErrorTerm::BiasVariation => {
-                let wanders = |sensor| self.instrument.noise.get(sensor).bias_variation.is_some();
-                Sensor::ALL.into_iter().any(wanders)
+            ErrorTerm::GaussMarkovBias => {
+                let varies = |sensor| self.instrument.noise.get(sensor).gauss_markov.is_some();
+                Sensor::ALL.into_iter().any(varies)
             }
             ErrorTerm::TableBase => sees_table && errors.level.max(errors.north) > 0.0,
             ErrorTerm::TableAxes => sees_table && errors.nonorthogonality > 0.0,
@@ -213,8 +213,8 @@ impl Scenario {
         Ok(())
     }
 
-    /// The true parameters of further terms.
-    pub(super) fn draw_further(&self, rng: &mut ChaCha8Rng) -> TermVector {
+    /// The true parameters of error terms.
+    pub(super) fn draw_terms(&self, rng: &mut ChaCha8Rng) -> TermVector {
         self.instrument.term_sigma.map(|sigma| {
             let unit: f64 = StandardNormal.sample(rng);
             sigma * unit

@@ -177,7 +177,7 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
     let run = &simulated.run;
     let mut record = truth_record(&simulated.truth, run);
     for parameter in terms.iter().flat_map(|term| term.parameters()) {
-        let value = simulated.further[parameter];
+        let value = simulated.terms[parameter];
         assert!(value != 0.0);
         let name = Term::parameter_name(parameter).unwrap();
         record.terms.insert(name, TermRecord { value, sigma: None });

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::measurement::Measurement;
 use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::{PerSensor, Sensor, TermVector};
@@ -21,19 +22,6 @@ pub(in crate::calibration) struct Filter {
     p: DMatrix<f64>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-}
-
-/// Uncertainty at the first sample of a stretch, 1σ, and the mean of its attitude error.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::calibration) struct Start {
-    /// Mean of φ₀, rad.
-    pub attitude: Vector3<f64>,
-    /// East, North and Up, rad.
-    pub attitude_sigma: Vector3<f64>,
-    /// m/s
-    pub velocity_sigma: f64,
-    /// m
-    pub position_sigma: f64,
 }
 
 impl Filter {
@@ -59,7 +47,7 @@ impl Filter {
             p[(state, state)] = model.geometry.axes[tilt].powi(2);
         }
         let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
-            let variation = model.noise.get(sensor).bias_variation?;
+            let variation = model.noise.get(sensor).gauss_markov?;
             Some((state, variation.sigma, variation.correlation_time))
         });
         let varying = varying.collect();
@@ -122,16 +110,18 @@ impl Filter {
         let phi = self.top_rows(block);
         let n = self.x.len();
         let mut x = [0.0; NAVIGATION];
-        for (column, value) in phi.iter().zip(self.x.iter()) {
-            add_scaled(&mut x, column, *value);
-        }
         let mut rows = vec![[0.0; NAVIGATION]; n];
-        for (row, p) in rows.iter_mut().zip(self.p.as_slice().chunks_exact(n)) {
-            for (column, value) in phi.iter().zip(p) {
-                add_scaled(row, column, *value);
+        let mut corner = [[0.0; NAVIGATION]; NAVIGATION];
+        let p = self.p.as_slice();
+        for (k, column) in phi.iter().enumerate() {
+            add_scaled(&mut x, column, self.x[k]);
+        }
+        for (j, row) in rows.iter_mut().enumerate() {
+            let p = &p[n * j..n * j + phi.len()];
+            for (column, p) in phi.iter().zip(p) {
+                add_scaled(row, column, *p);
             }
         }
-        let mut corner = [[0.0; NAVIGATION]; NAVIGATION];
         for (column, row) in phi.iter().zip(&rows) {
             for (k, sum) in corner.iter_mut().enumerate() {
                 add_scaled(sum, row, column[k]);
@@ -226,8 +216,9 @@ impl Filter {
             // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
             let columns = self.p.as_mut_slice().chunks_exact_mut(n);
             for (j, column) in columns.enumerate() {
-                for (p, gain) in column[..=j].iter_mut().zip(&gain) {
-                    *p -= gain * ph[j];
+                let (column, gain, factor) = (&mut column[..=j], &gain[..=j], ph[j]);
+                for k in 0..=j {
+                    column[k] -= gain[k] * factor;
                 }
             }
             self.times_upper(row, &mut rest);
@@ -236,11 +227,7 @@ impl Filter {
             }
             let columns = self.p.as_mut_slice().chunks_exact_mut(n);
             for (j, column) in columns.enumerate() {
-                let (gain_j, rest_j) = (gain[j], rest[j]);
-                let both = gain.iter().zip(&rest);
-                for (p, (gain, rest)) in column[..=j].iter_mut().zip(both) {
-                    *p += rest * gain_j + gain * rest_j;
-                }
+                add_both(&mut column[..=j], (gain[j], &rest), (rest[j], &gain));
             }
         }
         for column in 0..n {
@@ -409,8 +396,17 @@ pub(in crate::calibration) struct Feedback {
 
 #[inline]
 fn add_scaled(sum: &mut Column, column: &Column, factor: f64) {
-    for (sum, value) in sum.iter_mut().zip(column) {
-        *sum += value * factor;
+    for k in 0..NAVIGATION {
+        sum[k] += column[k] * factor;
+    }
+}
+
+/// `column += a x + b y`, each as long as the column at least.
+#[inline]
+fn add_both(column: &mut [f64], (a, x): (f64, &[f64]), (b, y): (f64, &[f64])) {
+    let (x, y) = (&x[..column.len()], &y[..column.len()]);
+    for k in 0..column.len() {
+        column[k] += a * x[k] + b * y[k];
     }
 }
 

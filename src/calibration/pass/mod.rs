@@ -19,7 +19,7 @@ use super::schedule::{AtRest, Step};
 use crate::attitude::{exp, from_tilt_and_heading};
 use crate::imu::{PerSensor, TermVector};
 use crate::navigation::{Navigator, State, TermValues};
-pub(super) use filter::{Filter, Start};
+pub(super) use filter::Filter;
 use measurement::Measurement;
 
 /// How a pass treats its estimates and its gate.

@@ -26,7 +26,7 @@ pub(super) fn write(source: &Source) -> Exported {
         accel: lower(triads.accel.sensitivity * imu_b.transpose()),
     };
     let q = Term::GSensitivity.parameters().start;
-    let q = Matrix3::from_fn(|i, j| source.correction.further[q + 3 * i + j]);
+    let q = Matrix3::from_fn(|i, j| source.correction.terms[q + 3 * i + j]);
     let of_force = triads.gyro.sensitivity * q * (gyro_imu * imu_b).transpose();
 
     let notes = [
@@ -115,7 +115,7 @@ fn noise(file: &mut Document, source: &Source) {
         let noise: Option<&Noise> = source.run.map(|run| run.instrument.noise.get(sensor));
         // Over times short against its correlation time a Gauss–Markov bias walks like this.
         let walk = noise
-            .and_then(|noise| noise.bias_variation)
+            .and_then(|noise| noise.gauss_markov)
             .map(|bias| bias.sigma * (2.0 / bias.correlation_time).sqrt());
         let density = noise.map(|noise| noise.random_walk);
         key(

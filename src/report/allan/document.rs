@@ -72,7 +72,7 @@ struct Coefficient {
 struct Lowest {
     tau_s: f64,
     deviation: f64,
-    /// Divided by 0.664: what is often read off as bias bias_variation, whether its slope is there or not.
+    /// Divided by 0.664: what is often read off as bias gauss_markov, whether its slope is there or not.
     over_0_664: f64,
 }
 
@@ -174,9 +174,9 @@ fn noise(analysis: &NoiseAnalysis) -> BTreeMap<&'static str, f64> {
         };
         let walk = quantity(Process::RandomWalk, sensor);
         fields.insert(walk.key, figures.noise.random_walk / walk.value);
-        if let Some(bias_variation) = figures.noise.bias_variation {
-            fields.insert(sigma, bias_variation.sigma / deviation_unit(sensor).1);
-            fields.insert(time, bias_variation.correlation_time);
+        if let Some(gauss_markov) = figures.noise.gauss_markov {
+            fields.insert(sigma, gauss_markov.sigma / deviation_unit(sensor).1);
+            fields.insert(time, gauss_markov.correlation_time);
         }
     }
     fields

@@ -49,14 +49,14 @@ pub(super) fn quantity(process: Process, sensor: Sensor) -> Quantity {
             "velocity_random_walk_ug_per_sqrt_hz",
         ),
         (Process::BiasInstability, Sensor::Gyro) => (
-            "bias bias_variation B",
+            "bias gauss_markov B",
             "B",
             "°/h",
             DEG_PER_H,
             "bias_instability_deg_per_h",
         ),
         (Process::BiasInstability, Sensor::Accel) => (
-            "bias bias_variation B",
+            "bias gauss_markov B",
             "B",
             "µg",
             MICRO_G,

@@ -39,7 +39,7 @@ fn triad(text: &mut String, analysis: &NoiseAnalysis, sensor: Sensor, figures: &
         walk.key,
         four_digits(noise.random_walk / walk.value)
     );
-    let Some(bias_variation) = noise.bias_variation else {
+    let Some(gauss_markov) = noise.gauss_markov else {
         return;
     };
     let (key, time_key) = match sensor {
@@ -48,20 +48,20 @@ fn triad(text: &mut String, analysis: &NoiseAnalysis, sensor: Sensor, figures: &
     };
     let sigma = quantity(
         Process::GaussMarkov {
-            correlation_time: bias_variation.correlation_time,
+            correlation_time: gauss_markov.correlation_time,
         },
         sensor,
     );
     let _ = writeln!(
         text,
         "{key} = {}  # 1σ of a Gauss–Markov process{}",
-        four_digits(bias_variation.sigma / sigma.value),
+        four_digits(gauss_markov.sigma / sigma.value),
         from(analysis, sensor)
     );
     let _ = writeln!(
         text,
         "{time_key} = {}{}",
-        four_digits(bias_variation.correlation_time),
+        four_digits(gauss_markov.correlation_time),
         if figures.correlation_is_open {
             "  # as long as the record can show; σ grows with its root"
         } else {

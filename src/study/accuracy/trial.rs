@@ -15,7 +15,7 @@ use crate::imu::BodyFrame;
 use crate::imu::{InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 
-/// One run. Errors are estimate less truth; everything is in the general form.
+/// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone)]
 pub struct Trial {
     /// Its number, the stream of its random numbers.
@@ -32,7 +32,7 @@ pub struct Trial {
     pub(super) bound_track: Vec<ParameterVector>,
     /// σ of the bound of constants beside the parameters, zero where they are none.
     pub further_bound: AuxiliaryVector,
-    /// What the blocks of states did to the filter; of the first run only.
+    /// What the error terms did to the filter; of the first run only.
     pub effects: Vec<ErrorTermTest>,
     /// Error of the closed form for each part of its dwells; none where it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,
@@ -88,7 +88,7 @@ impl AccuracyStudy {
         let duration = record.recording.imu.duration();
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
-        let bound = bound(&problem, &attainable, &simulated.further)
+        let bound = bound(&problem, &attainable, &simulated.terms)
             .map_err(|source| StudyError::Bound { run, source })?;
         for &term in &self.unmodelled {
             problem.model.switch_off(term);
@@ -98,7 +98,7 @@ impl AccuracyStudy {
             Ok(outcome) if run == 0 => test_error_terms(&problem, outcome).unwrap_or_default(),
             _ => Vec::new(),
         };
-        let further = auxiliary_vector(&simulated.geometry, &simulated.further);
+        let further = auxiliary_vector(&simulated.geometry, &simulated.terms);
         let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,

@@ -5,7 +5,7 @@ use super::budget::Budget;
 use super::*;
 use crate::calibration::ParameterMatrix;
 use crate::calibration::{Group, Options, Problem, in_general_form, six_position};
-use crate::imu::{BiasVariation, Noise};
+use crate::imu::{GaussMarkov, Noise};
 use crate::models::{Place, trajectory};
 use crate::study::navigation::Pair;
 use crate::units::{DEG_PER_H, MICRO_G, MICRO_G_PER_SQRT_HZ};
@@ -135,7 +135,7 @@ fn velocity_random_walk_and_a_constant_bias_grow_as_they_do_without_schuler() {
         gyro: Noise::default(),
         accel: Noise {
             random_walk: walk,
-            bias_variation: None,
+            gauss_markov: None,
         },
     };
     let variance = noise::position(&mission, None, &noise).unwrap();
@@ -148,7 +148,7 @@ fn velocity_random_walk_and_a_constant_bias_grow_as_they_do_without_schuler() {
         gyro: Noise::default(),
         accel: Noise {
             random_walk: 0.0,
-            bias_variation: Some(BiasVariation {
+            gauss_markov: Some(GaussMarkov {
                 sigma: bias,
                 correlation_time: 1e9,
             }),

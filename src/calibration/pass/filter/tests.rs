@@ -119,7 +119,7 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
     let mut model = Model::new(&run, &Options::default());
     model.prior_sigma.fill(1e-4);
     for noise in [&mut model.noise.gyro, &mut model.noise.accel] {
-        noise.bias_variation = Some(crate::imu::BiasVariation {
+        noise.gauss_markov = Some(crate::imu::GaussMarkov {
             sigma,
             correlation_time: CORRELATION_TIME,
         });
