@@ -40,7 +40,7 @@ fn most_significant_is(all: Vec<Option<ErrorTerm>>) {
         // The usual wandering is not told from white noise within ten minutes; five times as much is.
         let noise = &mut scenario.instrument.noise;
         for noise in [&mut noise.gyro, &mut noise.accel] {
-            if let Some(instability) = &mut noise.bias_variation {
+            if let Some(instability) = &mut noise.gauss_markov {
                 instability.sigma *= 5.0;
             }
         }

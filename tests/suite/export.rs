@@ -9,7 +9,7 @@ use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
 use turncal::formats::export::{Exported, Format, write};
-use turncal::imu::{BiasVariation, BodyFrame, Noise, Nominal, PerSensor};
+use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
 
@@ -401,7 +401,7 @@ fn run() -> Run {
     };
     run.instrument.noise.gyro = Noise {
         random_walk: 2e-5,
-        bias_variation: Some(BiasVariation {
+        gauss_markov: Some(GaussMarkov {
             sigma: 4e-7,
             correlation_time: 200.0,
         }),

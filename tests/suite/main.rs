@@ -26,6 +26,7 @@ mod outliers;
 mod recorded;
 mod shared;
 mod simulated;
+mod stretches;
 mod study;
 mod table1;
 mod terms;

@@ -110,7 +110,7 @@ fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
 /// A tactical instrument, whose biases wander by more than the filter's σ without states for them.
 fn with_wandering_biases(runs: u64) {
     let scenario = Scenario::load("two-axis").unwrap();
-    assert!(scenario.instrument.noise.accel.bias_variation.is_some());
+    assert!(scenario.instrument.noise.accel.gauss_markov.is_some());
     accurate_as_claimed(runs, |stream| trial(&scenario, stream));
 }
 

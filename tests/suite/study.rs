@@ -47,7 +47,7 @@ fn by_hand() -> [Vec<ParameterVector>; 4] {
         let problem = Problem::new(&made.run, &Options::default());
         let filtered = estimate(&problem, &|_| {}).unwrap().estimate;
         let truth = to_vector(&made.truth);
-        let bound = bound(&problem, &made.truth, &made.further).unwrap();
+        let bound = bound(&problem, &made.truth, &made.terms).unwrap();
         let at_rest = positions.simulate(SEED, stream).unwrap();
         let closed = six_position(&Problem::new(&at_rest.run, &Options::default()))
             .unwrap()

@@ -37,11 +37,11 @@ fn sigma(outcome: &Outcome) -> TermVector {
 
 /// NEES of a term's parameters in one run, and how many they are.
 fn nees(term: Term, stream: u64) -> (f64, usize) {
-    let Simulated { run, further, .. } = scenario(term).simulate(SEED, stream).unwrap();
+    let Simulated { run, terms, .. } = scenario(term).simulate(SEED, stream).unwrap();
     let outcome = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
     assert!(outcome.converged, "{}: {stream}", term.name());
     assert!(outcome.auxiliary.unobserved().next().is_none());
-    let error = outcome.auxiliary.terms() - further;
+    let error = outcome.auxiliary.terms() - terms;
     let sigma = sigma(&outcome);
     let of_term: Vec<usize> = term.parameters().collect();
     // In units of σ the covariance is a correlation matrix, which inverts without loss.
@@ -106,7 +106,7 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
     let read = turncal::run::Run::read(&run.join("run.toml")).unwrap();
     assert_eq!(read.instrument.term_sigma, made.run.instrument.term_sigma);
     let truth = Calibration::read(&run.join("truth.json")).unwrap();
-    let offset = made.further[Term::TimeOffset.parameters().start];
+    let offset = made.terms[Term::TimeOffset.parameters().start];
     assert_eq!(truth.terms["accel.time_offset"].value, offset);
     assert_eq!(truth.terms.len(), 1);
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
-use turncal::imu::{BiasVariation, Instrument, Noise, PerSensor, Prior, Sensor};
+use turncal::imu::{GaussMarkov, Instrument, Noise, PerSensor, Prior, Sensor};
 use turncal::recording::{LabelledMotion, Recording, Segment, TableLog};
 use turncal::run::{Run, Standstill};
 use turncal::turntable::TableAccuracy;
@@ -48,14 +48,14 @@ pub fn made_run(name: &str) -> Run {
     let noise = PerSensor {
         gyro: Noise {
             random_walk: 3e-7,
-            bias_variation: Some(BiasVariation {
+            gauss_markov: Some(GaussMarkov {
                 sigma: 5e-8,
                 correlation_time: 300.0,
             }),
         },
         accel: Noise {
             random_walk: 5e-5,
-            bias_variation: None,
+            gauss_markov: None,
         },
     };
     let instrument = Instrument {
@@ -141,10 +141,10 @@ pub fn assert_same(a: &Run, b: &Run) {
         );
         near(noise_a.random_walk, noise_b.random_walk);
         assert_eq!(
-            noise_a.bias_variation.is_some(),
-            noise_b.bias_variation.is_some()
+            noise_a.gauss_markov.is_some(),
+            noise_b.gauss_markov.is_some()
         );
-        if let (Some(a), Some(b)) = (noise_a.bias_variation, noise_b.bias_variation) {
+        if let (Some(a), Some(b)) = (noise_a.gauss_markov, noise_b.gauss_markov) {
             near(a.sigma, b.sigma);
             near(a.correlation_time, b.correlation_time);
         }
