@@ -61,6 +61,9 @@ pub struct Calibration {
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
+    /// Gravity at the site.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<GravityRecord>,
     /// Number of passes over the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
@@ -110,6 +113,15 @@ pub struct TermRecord {
     /// 1σ; none for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
+}
+
+/// Gravity at the site of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GravityRecord {
+    /// Its magnitude.
+    pub m_s2: f64,
+    /// 1σ, which the scale factors of all three accelerometers share.
+    pub sigma_m_s2: f64,
 }
 
 /// How a calibration was found.
@@ -303,6 +315,7 @@ impl Calibration {
             parameters: Vec::new(),
             covariance: Vec::new(),
             terms: BTreeMap::new(),
+            gravity: None,
             passes: None,
             converged: None,
             consistency: None,

@@ -16,7 +16,7 @@ use crate::calibration::Calibration;
 use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
-use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
+use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, MILLIGAL, PPM};
 
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
 /// `segments.csv`, `truth.json`.
@@ -184,11 +184,13 @@ latitude_deg = {latitude:?}
 longitude_deg = {longitude:?}
 height_m = {height:?}
 gravity_m_s2 = {gravity:?}
+gravity_sigma_mgal = {gravity_sigma:?}
 "#,
             latitude = short(site.latitude / DEGREE),
             longitude = short(site.longitude / DEGREE),
             height = site.height,
             gravity = site.gravity,
+            gravity_sigma = short(site.gravity_sigma / MILLIGAL),
         ),
         meta_text(&run.recording.meta),
         format!(

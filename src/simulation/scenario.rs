@@ -289,10 +289,8 @@ impl SiteFile {
             self.longitude_deg.0 * DEGREE,
             self.height_m.0,
         );
-        Site {
-            gravity: self.gravity_m_s2.map_or(site.gravity, |g| g.0),
-            ..site
-        }
+        // What is simulated is known.
+        site.with_gravity(self.gravity_m_s2.map_or(site.gravity, |g| g.0), 0.0)
     }
 }
 
