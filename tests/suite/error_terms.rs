@@ -80,7 +80,7 @@ fn a_calibration_warns_of_the_error_term_that_is_not_estimated() {
     let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
     let assessment = solution.assess(&problem).unwrap();
     let record = solution.calibration(&problem, &assessment);
-    let words = "Calibrate again with --with accel-second-order";
+    let words = "accel-second-order";
     assert!(
         record
             .warnings
