@@ -27,7 +27,7 @@ use super::parameters::{
 };
 use super::problem::{Problem, Stretch};
 use super::schedule::AtRest;
-use crate::attitude::{log, skew, to_tilt_and_heading};
+use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
 use crate::imu::Triad;
 use crate::navigation::{Block, BlockMatrix, Navigator, State};
 
@@ -299,13 +299,15 @@ impl Information {
         }
     }
 
-    /// Refers the navigation errors to another computed state of the same moment, to first order about
-    /// it.
+    /// Refers the navigation errors to another computed state of the same moment. Attitudes add up
+    /// to more than the sum of their rotation vectors, so the sum is taken at the estimate so far.
     fn refer(&mut self, from: &State, to: &State) {
-        let turned = from.attitude * to.attitude.transpose();
+        let estimate = self.solution();
+        let error = Vector3::from_fn(|axis, _| estimate[(self.table + ATTITUDE + axis, 0)]);
+        let turned = from_tilt_and_heading(&error) * from.attitude * to.attitude.transpose();
         let mut shift = Mat::zeros(NAVIGATION, 1);
         for (first, by) in [
-            (ATTITUDE, to_tilt_and_heading(&turned)),
+            (ATTITUDE, to_tilt_and_heading(&turned) - error),
             (VELOCITY, to.velocity - from.velocity),
             (POSITION, to.position - from.position),
         ] {

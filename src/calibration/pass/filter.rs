@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::measurement::Measurement;
-use crate::attitude::{skew, to_tilt_and_heading};
+use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
@@ -289,12 +289,14 @@ impl Filter {
         }
     }
 
-    /// Refers the navigation errors to another computed state of the same moment: to first order about
-    /// it, whatever the mean has come to so far, so that a pass is one linear problem and the order of
-    /// its stretches does not matter. The covariance stays as it is.
+    /// Refers the navigation errors to another computed state of the same moment. What is estimated
+    /// of the truth stays as it is, and so does the covariance.
     pub fn refer(&mut self, from: &State, to: &State) {
-        let mut attitude = self.x.fixed_rows_mut::<3>(ATTITUDE);
-        attitude += to_tilt_and_heading(&(from.attitude * to.attitude.transpose()));
+        let error = self.at(ATTITUDE);
+        let estimated = from_tilt_and_heading(&error) * from.attitude;
+        self.x
+            .fixed_rows_mut::<3>(ATTITUDE)
+            .copy_from(&to_tilt_and_heading(&(estimated * to.attitude.transpose())));
         let mut velocity = self.x.fixed_rows_mut::<3>(VELOCITY);
         velocity += to.velocity - from.velocity;
         let mut position = self.x.fixed_rows_mut::<3>(POSITION);
