@@ -1,30 +1,72 @@
-//! Calibration of an inertial measurement unit on a turntable.
+//! Calibration of an inertial measurement unit on a turntable: scale factors K, installation matrix E and
+//! biases D of gyros and accelerometers, with a σ of each.
+//!
+//! An error-state extended Kalman filter runs a strapdown navigation solution through a recording and
+//! attributes its errors at rest (velocity, attitude of the table) to the parameters; passes over the
+//! whole recording, each linearised at the estimate of the one before, are the iterations of a
+//! Gauss–Newton method. The closed form from static positions (Zhao, Jiang, Li 2016) is the baseline.
+//!
+//! # Calibrate
+//! ```
+//! use turncal::calibration::{Method, Options, Problem};
+//! use turncal::simulation::Scenario;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A simulated run; `Run::read("run.toml".as_ref())` reads a recorded one.
+//! let run = Scenario::load("single-axis")?.simulate(1, 0)?.run;
+//! let problem = Problem::new(&run, &Options::default());
+//! let solution = problem.solve(Method::Ekf, &|_| {})?;
+//! let assessment = solution.assess(&problem)?;
+//! let calibration = solution.calibration(&problem, &assessment);
+//! assert!(solution.converged());
+//! println!("{} ± {:?}", calibration["gyro.bias.x"], calibration.sigma_of("gyro.bias.x"));
+//! for finding in solution.findings(&assessment) {
+//!     println!("{finding}");
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//! `examples/` has three programs more: samples from arrays, both methods against a truth, a study of a
+//! path.
 //!
 //! # Frames, signs, units
-//! * Navigation frame `n`: East-North-Up. Body frame `b`: right-front-up. `C_b_n` takes body to
-//!   navigation; heading is clockwise from North.
-//! * Instrument: `N = K C u + D`, with `u` the angular rate in rad/s or the specific force in m/s².
-//! * Navigation errors are computed − true, parameter errors true − estimated.
-//! * SI and radians everywhere; [`units`] at the edges.
+//! | what | convention |
+//! |---|---|
+//! | navigation frame n | East-North-Up at the site |
+//! | body frame b | right-front-up: the table's mounting face, or fixed by the accelerometers without a table ([`imu::BodyFrame`]) |
+//! | attitude | `C_b_n` takes body to navigation; heading is clockwise from North |
+//! | instrument | `N = K C u + D`, u the angular rate in rad/s or the specific force in m/s² ([`imu`]) |
+//! | navigation errors | computed − true, `C_computed = (I − [φ×]) C_true` |
+//! | parameter errors | true − estimated |
+//! | units | SI and radians everywhere; [`units`] and [`formats`] convert at the edges |
 //!
 //! # Rooms
-//! Data flow one way: [`run`] → [`navigation`], [`calibration`] and [`noise`] → [`study`] → [`report`]. [`earth`],
-//! [`attitude`], [`imu`] and [`turntable`] know nobody; [`simulation`] makes runs from [`models`], [`export`]
-//! writes what other programs read. [`draft`] looks at a log of which nothing is known, [`survey`] at a run
-//! before it is calibrated.
+//! A [`recording::Recording`] is data. A [`run::Run`] adds what is known beforehand: instrument, site,
+//! table. [`calibration::Options`] say what is to be estimated; a [`calibration::Problem`] looks at
+//! all of it once. Data flow one way: [`formats`] read runs, [`calibration`] solves, [`study`] judges by
+//! navigation and Monte Carlo, `report` shows. [`earth`], [`attitude`], [`imu`], [`turntable`] and
+//! [`navigation`] know none of these; [`simulation`] makes runs from [`models`]; [`survey`] looks at a
+//! run before it is calibrated, [`noise`] at its noise.
+//!
+//! # Features
+//! `report` (pages, figures, tables) and `cli` (the command `turncal`, with `report`) are on by
+//! default. Without them no crate of a user interface is compiled:
+//! `turncal = { version = "…", default-features = false }`.
 
 pub mod attitude;
 pub mod calibration;
-pub mod draft;
 pub mod earth;
-pub mod export;
+pub mod formats;
 pub mod imu;
 pub mod models;
 pub mod navigation;
 pub mod noise;
+pub mod recording;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod run;
 pub mod simulation;
+pub(crate) mod statistics;
 pub mod study;
 pub mod survey;
 pub mod turntable;

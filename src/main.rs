@@ -7,7 +7,10 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    match cli::Cli::parse().run() {
+    let cli = cli::Cli::parse();
+    cli::leave_nothing_behind();
+    let done = cli::with_threads(|| cli.run()).unwrap_or_else(|error| Err(error.into()));
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("turncal: {error:#}");

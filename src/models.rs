@@ -4,6 +4,7 @@
 //! The files of the `models/` folder are embedded. A path to an existing file wins over an embedded
 //! name, on the command line and in a user's scenario; an embedded scenario names embedded models.
 
+mod catalogue;
 mod instrument;
 mod machine;
 mod trajectory;
@@ -13,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
 pub use trajectory::trajectory;
@@ -36,6 +38,16 @@ pub enum Room {
 }
 
 impl Room {
+    /// All folders, those first that commands name most.
+    pub const ALL: [Self; 6] = [
+        Self::Scenario,
+        Self::Path,
+        Self::Turntable,
+        Self::Imu,
+        Self::Installation,
+        Self::Trajectory,
+    ];
+
     /// The folder's name.
     pub fn name(self) -> &'static str {
         match self {

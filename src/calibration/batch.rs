@@ -16,18 +16,20 @@ use nalgebra::Vector3;
 
 use super::curvature::curvature;
 use super::error::CalibrationError;
-use super::linearisation::singular;
-use super::outcome::{Estimate, Outcome, from_vector, to_vector};
-use super::problem::Problem;
-use super::schedule::{Schedule, Standing};
-use super::states::{
-    ATTITUDE, NAVIGATION, POSITION, ParameterMatrix, ParameterVector, VELOCITY,
-    sensor_and_parameter,
+use super::error_term::ErrorTerm;
+use super::estimate::Estimate;
+use super::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
+use super::linearisation::{Start, singular};
+use super::model::Model;
+use super::outcome::Outcome;
+use super::parameters::{
+    ParameterMatrix, ParameterVector, from_vector, sensor_and_parameter, to_vector,
 };
+use super::problem::{Problem, Stretch};
+use super::schedule::AtRest;
 use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
 use crate::imu::Triad;
 use crate::navigation::{Block, BlockMatrix, Navigator, State};
-use crate::run::{Run, StateBlock};
 
 /// The attitude error at the first sample is the initial one to within this, rad: a number so small
 /// that it is none, where a row needs a σ.
@@ -39,32 +41,28 @@ const NO_SOURCE: f64 = 1e-14;
 /// observations that it let in, by batch least squares.
 ///
 /// # Errors
-/// [`CalibrationError`] where the run is not the one of the outcome, or has a block of states on that
-/// the batch does not know.
-pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
-    let on = StateBlock::ALL.into_iter().find(|&block| run.has(block));
-    if let Some(block) = on {
-        return Err(CalibrationError::NotInBatch { block });
+/// [`CalibrationError`] where the problem is not the one of the outcome, has several stretches, or has an
+/// error term on that the batch does not know.
+pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
+    let model = &problem.model;
+    let on = ErrorTerm::ALL.into_iter().find(|&term| model.has(term));
+    if let Some(term) = on {
+        return Err(CalibrationError::NotInBatch { term: term.name() });
     }
-    let form = outcome.estimate.form();
-    let schedule = Schedule::new(run, &run.dwells())?;
-    let problem = Problem::new(
-        run,
-        schedule,
-        form,
-        outcome.prior_attitude,
-        outcome.velocity_sigma,
-    );
+    let [stretch] = problem.stretches() else {
+        let term = "a second stretch";
+        return Err(CalibrationError::NotInBatch { term });
+    };
     let mut accepted = outcome.innovations.iter().map(|i| i.accepted);
-    let mut batch = Batch::new(&problem, outcome)?;
-    let mut stood = false;
-    for step in &problem.schedule.steps {
-        match &step.standing {
-            Some(standing) => {
-                let new_position = standing.first && stood;
+    let mut batch = Batch::new(problem, stretch, outcome)?;
+    let mut rested = false;
+    for step in &stretch.steps {
+        match &step.at_rest {
+            Some(at_rest) => {
+                let new_position = at_rest.first && rested;
                 let accepted = || accepted.next().unwrap_or(true);
-                batch.stand(step.samples.clone(), standing, new_position, accepted)?;
-                stood = true;
+                batch.rest(step.samples.clone(), at_rest, new_position, accepted)?;
+                rested = true;
             }
             None => {
                 let block = batch.navigator.advance(step.samples.clone());
@@ -74,7 +72,7 @@ pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, Calibrat
     }
     let at = to_vector(&outcome.linearised_at.triads);
     let (step, covariance) = batch.information.parameters();
-    let triads = from_vector(form, &(at + step));
+    let triads = from_vector(model.form, &(at + step));
     Ok(Estimate {
         covariance: covariance + curvature(&triads, &covariance),
         triads,
@@ -82,7 +80,8 @@ pub fn batch_estimate(run: &Run, outcome: &Outcome) -> Result<Estimate, Calibrat
 }
 
 struct Batch<'a> {
-    problem: &'a Problem<'a>,
+    model: &'a Model,
+    stretch: &'a Stretch<'a>,
     /// The accelerometers where the outcome's last pass linearised.
     accel: Triad,
     navigator: Navigator<'a>,
@@ -90,41 +89,53 @@ struct Batch<'a> {
 }
 
 impl<'a> Batch<'a> {
-    fn new(problem: &'a Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
-        let (run, at) = (problem.run, &outcome.linearised_at);
-        let walk = crate::imu::PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
-        let start = State::at_rest(at.initial_attitude);
-        let navigator = Navigator::new(&run.imu, &run.site, walk, &at.triads, start)
+    fn new(
+        problem: &'a Problem,
+        stretch: &'a Stretch,
+        outcome: &Outcome,
+    ) -> Result<Self, CalibrationError> {
+        let (run, model, at) = (stretch.run, &problem.model, &outcome.linearised_at);
+        let walk = crate::imu::PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
+        let diverged = CalibrationError::Diverged { time: 0.0 };
+        let attitudes = at
+            .initial_attitudes
+            .first()
+            .zip(outcome.prior_attitudes.first());
+        let (attitude, prior) = attitudes.ok_or(diverged)?;
+        let start = State::at_rest(*attitude);
+        let imu = &run.recording.imu;
+        let navigator = Navigator::new(imu, &run.site, walk, &at.triads, start)
             .ok_or_else(|| singular(&at.triads))?;
         Ok(Self {
-            problem,
+            model,
+            stretch,
             accel: at.triads.accel,
             navigator,
             information: Information::new(
-                problem,
-                &(problem.prior_mean - to_vector(&at.triads)),
-                &to_tilt_and_heading(&(problem.attitude.mean * at.initial_attitude.transpose())),
+                model,
+                &stretch.start(prior, attitude),
+                &(model.prior_mean - to_vector(&at.triads)),
             ),
         })
     }
 
     fn advance(&mut self, block: &Block, end: usize) -> Result<(), CalibrationError> {
-        let time = self.problem.run.imu.time(end);
+        let time = self.stretch.run.recording.imu.time(end);
         let done = self.information.advance(block);
         done.ok_or(CalibrationError::Diverged { time })
     }
 
-    /// A stretch of a dwell; `accepted` tells of one observation after the other.
-    fn stand(
+    /// A step of a dwell; `accepted` tells of one observation after the other.
+    fn rest(
         &mut self,
         samples: Range<usize>,
-        standing: &Standing,
+        at_rest: &AtRest,
         new_position: bool,
         mut accepted: impl FnMut() -> bool,
     ) -> Result<(), CalibrationError> {
-        let variance = self.problem.variance;
-        let tied = standing.tied(&self.navigator.state, &self.accel);
-        if standing.first {
+        let (model, variance) = (self.model, self.stretch.variance);
+        let tied = at_rest.tied(&self.navigator.state, &self.accel);
+        if at_rest.first {
             self.information.come_to_rest(&self.navigator.state);
         }
         self.information.refer(&self.navigator.state, &tied);
@@ -135,7 +146,7 @@ impl<'a> Batch<'a> {
         self.advance(&block, end)?;
         let state = &block.state;
         if new_position {
-            self.information.new_table_position(variance.table.sqrt());
+            self.information.new_table_position(model.position_sigma);
         }
         let mut rows = Vec::new();
         if new_position {
@@ -144,11 +155,11 @@ impl<'a> Batch<'a> {
         if accepted() {
             rows.push((VELOCITY, state.velocity, variance.velocity));
         }
-        if let Some((reading, count)) = &standing.reading
+        if let Some((reading, count)) = &at_rest.reading
             && accepted()
         {
             let difference = -log(&(state.attitude * reading.transpose()));
-            let variance = variance.reading / *count as f64 + variance.attitude;
+            let variance = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
             rows.push((ATTITUDE, difference, variance));
         }
         self.information.observe(&rows);
@@ -167,25 +178,24 @@ struct Information {
 }
 
 impl Information {
-    fn new(problem: &Problem, mean: &ParameterVector, attitude: &Vector3<f64>) -> Self {
-        let start = &problem.start;
-        let sigma = problem.prior_sigma.iter().copied().enumerate();
+    fn new(model: &Model, start: &Start, mean: &ParameterVector) -> Self {
+        let sigma = model.prior_sigma.iter().copied().enumerate();
         let parameters: Vec<_> = sigma.filter(|&(_, sigma)| sigma > 0.0).collect();
-        let table = if start.table > 0.0 { 3 } else { 0 };
+        let table = if model.position_sigma > 0.0 { 3 } else { 0 };
         let initial = table + NAVIGATION + parameters.len();
         let z = initial + 3;
         let mut rows = Mat::zeros(z, z + 1);
         for axis in 0..table {
-            rows[(axis, axis)] = 1.0 / start.table;
+            rows[(axis, axis)] = 1.0 / model.position_sigma;
         }
         for axis in 0..3 {
             let mut know = |index: usize, sigma: f64| rows[(index, index)] = 1.0 / sigma;
             know(table + ATTITUDE + axis, SAME);
-            know(table + VELOCITY + axis, start.velocity);
-            know(table + POSITION + axis, start.position);
-            know(initial + axis, start.attitude[axis]);
+            know(table + VELOCITY + axis, start.velocity_sigma);
+            know(table + POSITION + axis, start.position_sigma);
+            know(initial + axis, start.attitude_sigma[axis]);
             rows[(table + ATTITUDE + axis, initial + axis)] = -1.0 / SAME;
-            rows[(initial + axis, z)] = attitude[axis] / start.attitude[axis];
+            rows[(initial + axis, z)] = start.attitude[axis] / start.attitude_sigma[axis];
         }
         for (n, &(index, sigma)) in parameters.iter().enumerate() {
             let unknown = table + NAVIGATION + n;
@@ -277,7 +287,7 @@ impl Information {
         self.rows = stack.qr().thin_R().get(..n, ..).to_owned();
     }
 
-    /// The body has come to rest, see [`super::filter::Filter::come_to_rest`].
+    /// The body has come to rest, see [`super::pass::Filter::come_to_rest`].
     fn come_to_rest(&mut self, computed: &State) {
         for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
             let turn = skew(computed);

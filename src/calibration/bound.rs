@@ -1,29 +1,27 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
-use super::coarse::{AttitudePrior, coarse_start};
+use super::auxiliary::Auxiliary;
+use super::coarse::initial_attitudes;
 use super::error::CalibrationError;
-use super::further::Further;
+use super::estimate::Estimate;
 use super::linearisation::Linearisation;
-use super::outcome::{Estimate, Moment};
-use super::pass::{Gate, Mode, pass};
+use super::pass::{Epoch, Gate, Mode, pass};
 use super::problem::Problem;
-use super::schedule::{Schedule, first_reading};
-use super::standstill::velocity_sigma;
-use crate::imu::{FurtherVector, PerSensor, Triad};
-use crate::run::Run;
+use crate::imu::{PerSensor, TermVector, Triad};
 
 /// What no estimator of a run can beat.
 #[derive(Debug, Clone)]
 pub struct Bound {
     /// The truth, with the covariance that is the bound.
     pub estimate: Estimate,
-    /// Covariance of the constants beside the parameters.
-    pub further: Further,
+    /// Covariance of the parameters of error terms and table.
+    pub auxiliary: Auxiliary,
     /// σ against time.
-    pub history: Vec<Moment>,
+    pub history: Vec<Epoch>,
 }
 
-/// The covariance of a held pass linearised at the truth, `terms` those of the instrument, in the truth's own installation form:
+/// The covariance of a pass linearised at the truth, `terms` those of the instrument, in the truth's own
+/// installation form, whatever that of the problem:
 /// the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
 /// Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the first
 /// reading or the coarse start: arc seconds of tilt and arc minutes of heading are nothing to the
@@ -32,31 +30,25 @@ pub struct Bound {
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
 pub fn bound(
-    run: &Run,
+    problem: &Problem,
     truth: &PerSensor<Triad>,
-    terms: &FurtherVector,
+    terms: &TermVector,
 ) -> Result<Bound, CalibrationError> {
-    let dwells = run.dwells();
-    let schedule = Schedule::new(run, &dwells)?;
-    let form = truth.gyro.form;
-    let attitude = match (&run.table, first_reading(run, &dwells)) {
-        (Some(table), Some(reading)) => AttitudePrior::of_reading(table, reading),
-        _ => coarse_start(run, &dwells, form)?.attitude,
-    };
+    let model = problem.model.in_form(problem.run(), truth.gyro.form);
+    let problem = problem.with_model(model);
+    let attitudes = initial_attitudes(&problem)?;
     let at = Linearisation {
         triads: *truth,
-        further: *terms,
-        initial_attitude: attitude.mean,
+        terms: *terms,
+        initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
     };
-    let sigma = velocity_sigma(run, &dwells);
-    let problem = Problem::new(run, schedule, form, attitude, sigma);
-    let result = pass(&problem, &at, Mode::Held(Gate::Open))?;
+    let result = pass(&problem, &attitudes, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {
             triads: *truth,
             covariance: result.covariance,
         },
-        further: result.further,
+        auxiliary: result.auxiliary,
         history: result.history,
     })
 }

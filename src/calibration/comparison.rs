@@ -4,11 +4,11 @@
 use super::error::ComparisonError;
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
+use super::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use super::scatter::{Scatter, scatter};
-use super::states::{ParameterMatrix, ParameterVector, sensor_and_parameter};
+use crate::calibration::result::Calibration;
+use crate::imu::BodyFrame;
 use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, Triad};
-use crate::run::CalibrationRecord;
-use crate::run::record::BodyFrame;
 
 /// A record with the name that tables and messages give it.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct Named<'a> {
     /// Its name.
     pub name: &'a str,
     /// The calibration, or the truth.
-    pub record: &'a CalibrationRecord,
+    pub record: &'a Calibration,
 }
 
 /// Calibrations in the general form and a common body frame, held against a reference.
@@ -47,12 +47,12 @@ impl Comparison {
     }
 }
 
-/// A calibration less the reference.
+/// A calibration minus the reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
     /// The calibration.
     pub calibration: Canonical,
-    /// Calibration less reference, normalised: scale factors relative, angles pure numbers, biases in
+    /// Calibration minus reference, normalised: scale factors relative, angles pure numbers, biases in
     /// rad/s or m/s².
     pub difference: ParameterVector,
     /// 1σ of the difference, as if both came of different data; none where a side claims no σ.
@@ -164,7 +164,7 @@ mod tests {
     use crate::calibration::frame::tests::{record, with_covariance};
     use crate::imu::InstallationForm;
 
-    fn named<'a>(name: &'a str, record: &'a CalibrationRecord) -> Named<'a> {
+    fn named<'a>(name: &'a str, record: &'a Calibration) -> Named<'a> {
         Named { name, record }
     }
 
@@ -189,7 +189,7 @@ mod tests {
     fn nees_of_the_truth_is_zero_and_of_one_sigma_along_one_axis_one_in_n() {
         let truth = record();
         let mut estimate = with_covariance(record(), InstallationForm::General);
-        let nees = |estimate: &CalibrationRecord| {
+        let nees = |estimate: &Calibration| {
             let comparison = compare(&[named("a", estimate)], Some(named("t", &truth))).unwrap();
             comparison.sides[0].nees.unwrap()
         };

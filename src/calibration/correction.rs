@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 use super::frame::triad_record;
-use crate::imu::{AXES, FURTHER, FurtherVector, PerSensor, Sensed, Sensor, Term};
-use crate::run::{CalibrationRecord, Run};
+use crate::calibration::result::Calibration;
+use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
+use crate::run::Run;
 
 /// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,8 +18,8 @@ pub struct Correction {
     pub matrix: PerSensor<Matrix3<f64>>,
     /// `D`, the file's quantity per second.
     pub bias: PerSensor<Vector3<f64>>,
-    /// Parameters `q` of further terms, in SI; zero where the record has none.
-    pub further: FurtherVector,
+    /// Parameters `q` of error terms, in SI; zero where the record has none.
+    pub terms: TermVector,
 }
 
 /// One sample, calibrated, along right, front and up of the calibration's body frame.
@@ -94,7 +95,7 @@ pub enum CorrectionError {
 
 impl Correction {
     /// What a record says. Constants of the table (`table.…`) are no part of it.
-    pub fn of_record(record: &CalibrationRecord) -> Result<Self, CorrectionError> {
+    pub fn of_record(record: &Calibration) -> Result<Self, CorrectionError> {
         let sensitivity = PerSensor::from_fn(|sensor| {
             let triad = triad_record(record, sensor);
             Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j])
@@ -108,14 +109,15 @@ impl Correction {
                 .filter(|_| volume.abs() > SMALLEST_VOLUME);
             inverse.ok_or(CorrectionError::Singular(sensor))
         };
-        let mut further = FurtherVector::zeros();
+        let mut terms = TermVector::zeros();
         for (name, term) in &record.terms {
             if name.starts_with("table.") {
                 continue;
             }
-            let known = (0..FURTHER).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
+            let known =
+                (0..TERM_PARAMETERS).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
             let known = known.ok_or_else(|| CorrectionError::UnknownTerm(name.clone()))?;
-            further[known] = term.value;
+            terms[known] = term.value;
         }
         Ok(Self {
             matrix: PerSensor {
@@ -124,15 +126,15 @@ impl Correction {
             },
             bias: PerSensor::from_fn(|sensor| Vector3::from(triad_record(record, sensor).bias)),
             sensitivity,
-            further,
+            terms,
         })
     }
 
     /// The same, and the record must be one of the run's instrument: units and nominal scales agree.
-    pub fn for_run(record: &CalibrationRecord, run: &Run) -> Result<Self, CorrectionError> {
+    pub fn for_run(record: &Calibration, run: &Run) -> Result<Self, CorrectionError> {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
-            let expected = run.unit.get(sensor);
+            let expected = run.instrument.unit.get(sensor);
             if let Some(unit) = &record.unit
                 && unit.get(sensor) != expected
             {
@@ -143,8 +145,10 @@ impl Correction {
                 });
             }
             let scales = correction.sensitivity.get(sensor).diagonal();
-            for (axis, (&calibration, &run)) in
-                scales.iter().zip(&run.nominal.get(sensor).0).enumerate()
+            for (axis, (&calibration, &run)) in scales
+                .iter()
+                .zip(&run.instrument.nominal.get(sensor).0)
+                .enumerate()
             {
                 if !(1.0 / SCALE_FACTOR..=SCALE_FACTOR).contains(&(calibration / run)) {
                     return Err(CorrectionError::Scale {
@@ -159,9 +163,9 @@ impl Correction {
         Ok(correction)
     }
 
-    /// Parameters of further terms that are not zero.
+    /// Parameters of error terms that are not zero.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..FURTHER).filter(|&k| self.further[k] != 0.0)
+        (0..TERM_PARAMETERS).filter(|&k| self.terms[k] != 0.0)
     }
 
     /// Whether it has a parameter of a term.
@@ -171,13 +175,13 @@ impl Correction {
 
     /// The samples of a run, one after the other.
     ///
-    /// Further terms respond to the calibrated sample itself. The angular acceleration that the size
+    /// Error terms respond to the calibrated sample itself. The angular acceleration that the size
     /// effect asks for is the difference of the rates before and after; where the record is not
     /// continuous it is taken for zero. The time offset asks for the rate over the Earth and gets the
     /// inertial one: 10 ms times Earth rate is 0.7 µg.
     pub fn samples<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = Calibrated> + 'a {
         let plain = self.terms().next().is_none();
-        (0..run.imu.len()).map(move |k| {
+        (0..run.recording.imu.len()).map(move |k| {
             let of_triads = PerSensor::from_fn(|sensor| self.of_triad(sensor, run, k));
             let u = if plain {
                 of_triads
@@ -185,8 +189,8 @@ impl Correction {
                 self.without_terms(&of_triads, self.angular_acceleration(run, k))
             };
             Calibrated {
-                start: run.imu.time(k),
-                end: run.imu.time(k + 1),
+                start: run.recording.imu.time(k),
+                end: run.recording.imu.time(k + 1),
                 rate: u.gyro,
                 force: u.accel,
             }
@@ -196,21 +200,22 @@ impl Correction {
     /// `(K C)⁻¹ (N − D)` of sample `k`.
     fn of_triad(&self, sensor: Sensor, run: &Run, k: usize) -> Vector3<f64> {
         let increment = match sensor {
-            Sensor::Gyro => run.imu.gyro[k],
-            Sensor::Accel => run.imu.accel[k],
+            Sensor::Gyro => run.recording.imu.gyro[k],
+            Sensor::Accel => run.recording.imu.accel[k],
         };
-        let output = increment.component_mul(&run.nominal.get(sensor).0) / run.imu.period;
+        let output = increment.component_mul(&run.instrument.nominal.get(sensor).0)
+            / run.recording.imu.period;
         self.matrix.get(sensor) * (output - self.bias.get(sensor))
     }
 
     fn angular_acceleration(&self, run: &Run, k: usize) -> Vector3<f64> {
         let first = k.saturating_sub(1);
-        let last = (k + 1).min(run.imu.len() - 1);
-        if !run.imu.continuous || first == last {
+        let last = (k + 1).min(run.recording.imu.len() - 1);
+        if !run.recording.imu.continuous || first == last {
             return Vector3::zeros();
         }
         let rate = |k| self.of_triad(Sensor::Gyro, run, k);
-        (rate(last) - rate(first)) / ((last - first) as f64 * run.imu.period)
+        (rate(last) - rate(first)) / ((last - first) as f64 * run.recording.imu.period)
     }
 
     fn without_terms(
@@ -227,7 +232,7 @@ impl Correction {
                 force: u.accel,
             };
             u = PerSensor::from_fn(|sensor| {
-                of_triads.get(sensor) - sensed.added(sensor, &self.further)
+                of_triads.get(sensor) - sensed.added(sensor, &self.terms)
             });
         }
         u

@@ -3,7 +3,6 @@
 use thiserror::Error;
 
 use crate::imu::Sensor;
-use crate::run::{ImuRecord, StateBlock};
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
 /// and what to do.
@@ -26,22 +25,6 @@ pub enum CalibrationError {
         found: usize,
         /// Dwells needed.
         needed: usize,
-    },
-    /// Sections laid end to end.
-    #[error(
-        "the record is not continuous (continuous = false), but turns are navigated from dwell to dwell; \
-         use --method six-position with labelled sections, or give one unbroken record"
-    )]
-    NotContinuous,
-    /// A gap in the record, or an axis lost for a while, beyond interpolation.
-    #[error(
-        "{lost}: what the instrument did there is not known well enough to go on navigating; cut the \
-         record so that this part is left out, or use --method six-position with a table's log or labelled \
-         sections"
-    )]
-    Unbridged {
-        /// What is missing, where.
-        lost: String,
     },
     /// A prior of σ zero or an estimate that went astray.
     #[error(
@@ -76,14 +59,14 @@ pub enum CalibrationError {
         /// Labels of the sections.
         labels: Vec<String>,
     },
-    /// A block of states that batch least squares does not have.
+    /// Something that batch least squares does not have.
     #[error(
-        "the run switches {} on, which batch least squares does not know; switch it off in run and \
-         outcome", .block.name()
+        "the problem has {term}, which batch least squares does not know; leave it out of problem and \
+         outcome"
     )]
     NotInBatch {
-        /// The block.
-        block: StateBlock,
+        /// What it is.
+        term: &'static str,
     },
     /// Samples that no error within the prior explains, or absurd noise figures.
     #[error(
@@ -94,14 +77,6 @@ pub enum CalibrationError {
         /// Time in the record, s.
         time: f64,
     },
-}
-
-impl CalibrationError {
-    /// Why a record that is not continuous is not.
-    pub(crate) fn not_continuous(imu: &ImuRecord) -> Self {
-        imu.unbridged()
-            .map_or(Self::NotContinuous, |lost| Self::Unbridged { lost })
-    }
 }
 
 fn quoted(labels: &[String]) -> String {

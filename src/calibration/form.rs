@@ -3,8 +3,8 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
-use super::frame::in_general_form;
-use super::linearisation::Linearisation;
+use super::linearisation::{AttitudePrior, Linearisation};
+use super::parameters::in_general_form;
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::problem::Problem;
 use crate::imu::InstallationForm;
@@ -12,7 +12,7 @@ use crate::imu::InstallationForm;
 /// The likelihood ratio of a restricted installation form against the general one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FormTest {
-    /// By how much the merit, −2 ln of likelihood and prior, falls if the general form is allowed.
+    /// By how much the cost, −2 ln of likelihood and prior, falls if the general form is allowed.
     pub gain: f64,
     /// Angles that the general form has more.
     pub angles: usize,
@@ -35,28 +35,24 @@ impl FormTest {
 /// angles as the general one, which no data can reject.
 pub(super) fn form_test(
     restricted: &Problem,
+    priors: &[AttitudePrior],
     held: &PassResult,
 ) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();
-    let more = angles(general) - angles(restricted.form);
+    let more = angles(general) - angles(restricted.model.form);
     let Ok(chi2) = ChiSquared::new(more as f64) else {
         return Ok(None);
     };
-    let problem = Problem::new(
-        restricted.run,
-        restricted.schedule.clone(),
-        general,
-        restricted.attitude,
-        restricted.velocity_sigma,
-    );
+    let model = restricted.model.in_form(restricted.run(), general);
     let at = Linearisation {
         triads: in_general_form(&held.estimate.triads),
-        ..held.estimate
+        ..held.estimate.clone()
     };
-    let free = pass(&problem, &at, Mode::Held(Gate::As(&held.innovations)))?;
+    let gate = Gate::As(&held.innovations);
+    let free = pass(&restricted.with_model(model), priors, &at, Mode::Held(gate))?;
     Ok(Some(FormTest {
-        gain: held.merit - free.merit,
+        gain: held.cost - free.cost,
         angles: more,
         limit: chi2.inverse_cdf(1.0 - FALSE_REJECTION),
     }))

@@ -12,13 +12,17 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::ComparisonError;
-use super::outcome::{Estimate, parameter_name, to_vector};
-use super::record::triads_of;
-use super::states::{PARAMETERS, ParameterMatrix, ParameterVector, sensor_and_parameter};
+use super::estimate::Estimate;
+use super::parameters::{
+    PARAMETERS, ParameterMatrix, ParameterVector, in_general_form, parameter, parameter_name,
+    sensor_and_parameter, to_vector,
+};
+use super::result::triads_of;
+use super::result::{Calibration, TermRecord, TriadRecord};
 use crate::attitude::skew;
-use crate::imu::{AXES, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector};
-use crate::run::CalibrationRecord;
-use crate::run::record::{BodyFrame, TermRecord, TriadRecord};
+use crate::imu::{
+    AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector,
+};
 
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +49,7 @@ impl Canonical {
     /// a record in the accelerometer frame: there the table was not seen.
     pub(super) fn new(
         name: &str,
-        record: &CalibrationRecord,
+        record: &Calibration,
         nominal: &PerSensor<Nominal>,
         body_frame: BodyFrame,
     ) -> Result<Self, ComparisonError> {
@@ -130,11 +134,6 @@ impl Estimate {
     }
 }
 
-/// The same triads in the general form.
-pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
-    PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
-}
-
 /// The same triads, given on any body axes, on those of a body frame; as they are on the table's,
 /// which they do not tell.
 pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
@@ -155,7 +154,7 @@ pub(super) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
     let mut free: Vec<usize> = (0..PARAMETERS).collect();
     if body_frame == BodyFrame::Accelerometer {
         let fixed: Vec<usize> = Triad::above_the_diagonal(InstallationForm::General)
-            .map(|angle| super::states::parameter(Sensor::Accel, angle))
+            .map(|angle| parameter(Sensor::Accel, angle))
             .collect();
         free.retain(|index| !fixed.contains(index));
     }
@@ -164,7 +163,7 @@ pub(super) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
 
 /// The nominal scales by which a record's own scale factors in the general form are one: the norms
 /// of the rows of `K C`, with the sign of the scale factor.
-pub(super) fn own_nominal(record: &CalibrationRecord) -> PerSensor<Nominal> {
+pub(super) fn own_nominal(record: &Calibration) -> PerSensor<Nominal> {
     PerSensor::from_fn(|sensor| {
         let triad = triad_record(record, sensor);
         Nominal(Vector3::from_fn(|i, _| {
@@ -173,7 +172,7 @@ pub(super) fn own_nominal(record: &CalibrationRecord) -> PerSensor<Nominal> {
     })
 }
 
-pub(super) fn triad_record(record: &CalibrationRecord, sensor: Sensor) -> &TriadRecord {
+pub(super) fn triad_record(record: &Calibration, sensor: Sensor) -> &TriadRecord {
     match sensor {
         Sensor::Gyro => &record.gyro,
         Sensor::Accel => &record.accel,
@@ -204,7 +203,7 @@ fn clear_fixed(a: &mut Matrix3<f64>, sensor: Sensor, body_frame: BodyFrame) {
 /// Covariance of the record's own parameters, normalised; none if it claims no σ.
 fn own_covariance(
     name: &str,
-    record: &CalibrationRecord,
+    record: &Calibration,
     nominal: &PerSensor<Nominal>,
 ) -> Result<Option<ParameterMatrix>, ComparisonError> {
     let form = record.installation_form.unwrap_or_default();
@@ -228,7 +227,7 @@ fn own_covariance(
                 *slot = angle;
             }
             for (of_triad, sigma) in vector.to_vector().iter().enumerate() {
-                let index = super::states::parameter(sensor, of_triad);
+                let index = parameter(sensor, of_triad);
                 covariance[(index, index)] = (sigma / factor(index)).powi(2);
             }
         }
@@ -288,7 +287,7 @@ fn jacobian(
             general_tangent(triad, &da, bias)
         });
         for of in Sensor::ALL {
-            let rows = super::states::parameter(of, 0);
+            let rows = parameter(of, 0);
             jacobian
                 .fixed_view_mut::<{ crate::imu::PARAMETERS }, 1>(rows, index)
                 .copy_from(column.get(of));

@@ -1,55 +1,81 @@
-//! Calibration: closed form, coarse start, filter and passes.
+//! Calibration: closed form, coarse start, filter and Gauss–Newton iterations, and what can be said of a
+//! result.
 //!
-//! Each takes a [`crate::run::Run`] and gives an [`Estimate`]; none prints, reads files or draws.
+//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] says what
+//! could be had. Nothing here prints, reads files or draws.
 
+mod auxiliary;
 mod batch;
-mod block_effect;
 mod bound;
 mod closed_form;
 mod coarse;
 mod comparison;
-mod consistency;
 mod correction;
 mod curvature;
 mod error;
-mod estimator;
-mod filter;
+mod error_term;
+mod error_term_test;
+mod estimate;
+mod finding;
 mod form;
 pub(crate) mod frame;
-pub mod further;
+mod gauss_newton;
 mod group;
+mod innovation;
+mod layout;
 mod linearisation;
+pub(crate) mod model;
 mod nees;
 mod observability;
-pub mod outcome;
+mod options;
+mod outcome;
+mod parameters;
 mod pass;
 mod problem;
 mod quality;
 mod record;
+pub mod result;
 mod scatter;
 mod schedule;
+mod solution;
 mod standstill;
-pub mod states;
 
+pub use auxiliary::{
+    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryMatrix, AuxiliaryVector, auxiliary_name,
+    auxiliary_vector,
+};
 pub use batch::batch_estimate;
-pub use block_effect::{BlockEffect, block_effects};
 pub use bound::{Bound, bound};
 pub use closed_form::{
     ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
 };
-pub use coarse::{AttitudePrior, CoarseStart, coarse_start};
+pub use coarse::{CoarseStart, coarse_start};
 pub use comparison::{Comparison, Named, Side, compare};
-pub use consistency::mean_square_interval;
 pub use correction::{Calibrated, Correction, CorrectionError};
 pub use error::{CalibrationError, ComparisonError};
-pub use estimator::{Progress, estimate};
+pub use error_term::ErrorTerm;
+pub use error_term_test::{ErrorTermTest, test_error_terms};
+pub use estimate::Estimate;
+pub use finding::Finding;
 pub use form::FormTest;
-pub use frame::{Canonical, in_body_frame, in_general_form};
+pub use frame::{Canonical, in_body_frame};
+pub use gauss_newton::{Progress, estimate};
 pub use group::Group;
-pub use linearisation::Linearisation;
+pub use innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
+pub use linearisation::{AttitudePrior, Linearisation};
+pub use model::Model;
 pub use nees::{Nees, nees};
 pub use observability::{AttitudePart, Direction, Observability, Part};
-pub use outcome::{Estimate, Outcome};
+pub use options::Options;
+pub use outcome::{Outcome, Pass};
+pub use parameters::{
+    OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
+    parameter, parameter_name, sensor_and_parameter, to_vector,
+};
+pub use pass::Epoch;
+pub use problem::Problem;
 pub use quality::{Measures, Quality, Spread};
-pub use record::{triads_of, truth_record};
+pub use record::truth_record;
+pub use result::{Calibration, Method, triads_of};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};
+pub use solution::{Assessment, Solution};

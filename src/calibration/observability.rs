@@ -8,8 +8,8 @@
 use faer::{Mat, Side};
 use nalgebra::SMatrix;
 
-use super::outcome::{Estimate, OBSERVED_BELOW, parameter_name};
-use super::states::{PARAMETERS, ParameterVector};
+use super::estimate::Estimate;
+use super::parameters::{OBSERVED_BELOW, PARAMETERS, ParameterVector, parameter_name};
 use crate::imu::InstallationForm;
 
 /// Directions left with the same part of their σ, to this part of it, are one space, in which the
@@ -116,28 +116,12 @@ impl Observability {
             .take_while(|direction| direction.remaining > OBSERVED_BELOW)
     }
 
-    /// What was not observed, in words: parameters, and combinations of parameters each of which
-    /// was.
-    pub(super) fn warnings(&self, form: InstallationForm, hidden: &[usize]) -> Vec<String> {
-        let mut warnings = Vec::new();
-        if !hidden.is_empty() {
-            warnings.push(format!(
-                "Not observed by this path, σ not even halved: {}.",
-                listed(form, hidden)
-            ));
-        }
-        let combinations: Vec<String> = self
-            .unobserved()
+    /// Combinations of parameters that were not observed though each parameter was, in words.
+    pub(super) fn combinations(&self, form: InstallationForm, hidden: &[usize]) -> Vec<String> {
+        self.unobserved()
             .filter(|d| d.parts.iter().all(|part| !hidden.contains(&part.parameter)))
             .map(|direction| direction.words(form))
-            .collect();
-        if !combinations.is_empty() {
-            warnings.push(format!(
-                "Not observed by this path though each parameter alone was: {}.",
-                combinations.join("; ")
-            ));
-        }
-        warnings
+            .collect()
     }
 }
 
@@ -239,27 +223,6 @@ fn direction(
         parts,
         attitude,
     }
-}
-
-/// Parameters by sensor and kind, such as `gyro scale x, y; accel bias z`.
-fn listed(form: InstallationForm, parameters: &[usize]) -> String {
-    let mut text = String::new();
-    let mut last = String::new();
-    for name in parameters.iter().filter_map(|&i| parameter_name(form, i)) {
-        let (group, axis) = name.rsplit_once('.').unwrap_or((&name, ""));
-        if group == last {
-            text.push_str(", ");
-        } else {
-            if !last.is_empty() {
-                text.push_str("; ");
-            }
-            text.push_str(&group.replace('.', " "));
-            text.push(' ');
-            last = group.to_owned();
-        }
-        text.push_str(axis);
-    }
-    text
 }
 
 #[cfg(test)]

@@ -1,38 +1,51 @@
-//! What all passes over a run share.
+//! A calibration problem: runs of one instrument, looked at once, and what is to be estimated of them.
 
+use std::sync::Arc;
+
+use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::coarse::AttitudePrior;
-use super::filter::Start;
-use super::outcome::to_vector;
-use super::schedule::Schedule;
-use super::states::{ParameterVector, parameter};
-use crate::imu::{FurtherVector, InstallationForm, PARAMETERS as PER_TRIAD, Sensor};
-use crate::run::{Run, TableGeometry};
+use super::finding::Finding;
+use super::linearisation::{AttitudePrior, Start};
+use super::model::Model;
+use super::options::Options;
+use super::schedule::{Step, first_reading, steps};
+use super::standstill::velocity_sigma;
+use crate::attitude::to_tilt_and_heading;
+use crate::imu::PerSensor;
+use crate::recording::TableLog;
+use crate::run::{Dwell, Run};
 
-/// 1σ of the initial velocity: a table at rest, m/s.
+/// 1σ of the initial velocity: a body at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
-/// Chance that the gate rejects a sound observation.
-const FALSE_REJECTION: f64 = 1e-6;
 
-/// What all passes over a run share.
+/// Runs of one instrument with what is to be estimated of them.
+///
+/// Dwells, moves and what is observed when are found once; estimate, tests, bound and quality share
+/// them. It is cheap to copy with another [`Model`].
 #[derive(Debug, Clone)]
-pub(super) struct Problem<'a> {
+pub struct Problem<'a> {
+    /// What is estimated, and what is known of it beforehand.
+    pub model: Model,
+    pub(super) options: Options,
+    run: &'a Run,
+    others: Vec<&'a Run>,
+    stretches: Arc<[Stretch<'a>]>,
+}
+
+/// Part of a recording without a break, from its first dwell to its last.
+#[derive(Debug, Clone)]
+pub(super) struct Stretch<'a> {
     pub run: &'a Run,
-    pub schedule: Schedule,
-    pub form: InstallationForm,
-    /// What is known of the initial attitude before the run.
-    pub attitude: AttitudePrior,
-    pub prior_mean: ParameterVector,
-    pub prior_sigma: ParameterVector,
-    /// 1σ of each further parameter before the run, whose mean is zero; zero where its term is off.
-    pub further_sigma: FurtherVector,
-    pub table_geometry: TableGeometry,
-    pub start: Start,
+    /// The table's readings, where they are observed.
+    pub table: Option<&'a TableLog>,
+    /// Which of the problem's runs it is of.
+    pub recording: usize,
+    pub dwells: Vec<Dwell>,
+    pub steps: Vec<Step>,
     pub variance: Variance,
     /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
     pub velocity_sigma: f64,
-    pub gate: f64,
 }
 
 /// Variance of each observation per axis.
@@ -40,67 +53,155 @@ pub(super) struct Problem<'a> {
 pub(super) struct Variance {
     pub velocity: f64,
     pub position: f64,
-    /// Of one reading of the table.
-    pub reading: f64,
     /// Of the computed attitude: a pulse's worth.
     pub attitude: f64,
-    /// Of the table's position, drawn anew at each.
-    pub table: f64,
 }
 
 impl<'a> Problem<'a> {
-    /// The problem of a run that stands this still.
-    pub fn new(
-        run: &'a Run,
-        schedule: Schedule,
-        form: InstallationForm,
-        attitude: AttitudePrior,
-        velocity_sigma: f64,
-    ) -> Self {
-        let table_geometry = run.table.as_ref().map(|t| t.geometry).unwrap_or_default();
-        let (position_sigma, reading_sigma) = run.table.as_ref().map_or((0.0, 0.0), |table| {
-            (table.position_sigma, table.reading_sigma)
-        });
-        let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
-        let sigma_of_triads = run.prior_sigma(form);
-        let mut prior_sigma = ParameterVector::zeros();
-        for sensor in Sensor::ALL {
-            prior_sigma
-                .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
-                .copy_from(sigma_of_triads.get(sensor));
-        }
+    /// The problem of a run.
+    pub fn new(run: &'a Run, options: &Options) -> Self {
+        let model = Model::new(run, options);
         Self {
             run,
-            schedule,
-            form,
-            attitude,
-            prior_mean: to_vector(&run.prior_mean(form)),
-            prior_sigma,
-            further_sigma: run.further_sigma,
-            table_geometry,
-            start: Start {
-                attitude: attitude.sigma,
-                velocity: INITIAL_VELOCITY,
-                position: run.standstill.position_sigma,
-                table: position_sigma,
-            },
+            others: Vec::new(),
+            stretches: stretches(run, 0, &model).into(),
+            model,
+            options: options.clone(),
+        }
+    }
+
+    /// The same with another run of the instrument. What is known of the instrument and of a table
+    /// beforehand stays that of the first; each site has its own gravity.
+    pub fn and(&self, run: &'a Run) -> Self {
+        let mut all = self.stretches.to_vec();
+        let mut others = self.others.clone();
+        others.push(run);
+        let mut model = self.model.clone();
+        model.gravity_sigma = model.gravity_sigma.max(run.site.gravity_sigma);
+        all.extend(stretches(run, others.len(), &self.model));
+        Self {
+            others,
+            model,
+            stretches: all.into(),
+            ..self.clone()
+        }
+    }
+
+    /// The same with another model.
+    pub fn with_model(&self, model: Model) -> Self {
+        Self {
+            model,
+            ..self.clone()
+        }
+    }
+
+    /// The same observed in some of its dwells only, told by number.
+    pub(super) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
+        let mut number = 0;
+        let stretches = self.stretches.iter().map(|stretch| {
+            let dwells = stretch.dwells.iter().filter(|_| {
+                number += 1;
+                used(number - 1)
+            });
+            let dwells: Vec<Dwell> = dwells.cloned().collect();
+            let Stretch {
+                run,
+                table,
+                recording,
+                velocity_sigma,
+                ..
+            } = *stretch;
+            Stretch::new(run, table, recording, dwells, velocity_sigma)
+        });
+        Self {
+            stretches: stretches.collect(),
+            ..self.clone()
+        }
+    }
+
+    pub(super) fn stretches(&self) -> &[Stretch<'a>] {
+        &self.stretches
+    }
+
+    /// The run, of several the first.
+    pub fn run(&self) -> &'a Run {
+        self.run
+    }
+
+    /// What the readers of the runs' files found.
+    pub(super) fn notes(&self) -> impl Iterator<Item = Finding> + '_ {
+        let runs = std::iter::once(&self.run).chain(&self.others);
+        let notes = runs.flat_map(|run| &run.recording.notes);
+        notes.map(|note| Finding::Recording { note: note.clone() })
+    }
+
+    /// The dwells of all runs.
+    pub fn dwells(&self) -> impl Iterator<Item = &Dwell> {
+        self.stretches.iter().flat_map(|stretch| &stretch.dwells)
+    }
+
+    /// Squared whitened innovation of three components beyond which an observation is an outlier.
+    pub(super) fn gate(&self) -> f64 {
+        // Three degrees of freedom are always valid.
+        ChiSquared::new(3.0).map_or(f64::INFINITY, |chi2| {
+            chi2.inverse_cdf(1.0 - self.options.false_rejection)
+        })
+    }
+}
+
+impl<'a> Stretch<'a> {
+    fn new(
+        run: &'a Run,
+        table: Option<&'a TableLog>,
+        recording: usize,
+        dwells: Vec<Dwell>,
+        velocity_sigma: f64,
+    ) -> Self {
+        let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
+        let PerSensor { gyro, accel } = run.recording.imu.pulse;
+        Self {
+            steps: steps(run, table, &dwells),
             variance: Variance {
-                velocity: velocity_sigma.powi(2) + quantisation(run.imu.pulse.accel),
+                velocity: velocity_sigma.powi(2) + quantisation(accel),
                 position: run.standstill.position_sigma.powi(2),
-                reading: reading_sigma.powi(2),
-                attitude: quantisation(run.imu.pulse.gyro),
-                table: position_sigma.powi(2),
+                attitude: quantisation(gyro),
             },
+            run,
+            table,
+            recording,
+            dwells,
             velocity_sigma,
-            gate: gate(),
+        }
+    }
+
+    /// What the table says of the attitude at its first sample, where it says anything.
+    pub fn attitude_of_table(&self) -> Option<AttitudePrior> {
+        let reading = first_reading(self.table, &self.dwells)?;
+        Some(AttitudePrior::of_reading(&self.run.table, reading))
+    }
+
+    /// Uncertainty at its first sample of errors referred to a point where the attitude is `at`.
+    pub fn start(&self, prior: &AttitudePrior, at: &Matrix3<f64>) -> Start {
+        Start {
+            attitude: to_tilt_and_heading(&(prior.mean * at.transpose())),
+            attitude_sigma: prior.sigma,
+            velocity_sigma: INITIAL_VELOCITY,
+            position_sigma: self.run.standstill.position_sigma,
         }
     }
 }
 
-/// Squared whitened innovation of three components beyond which an observation is an outlier.
-fn gate() -> f64 {
-    // Three degrees of freedom are always valid.
-    ChiSquared::new(3.0).map_or(f64::INFINITY, |chi2| {
-        chi2.inverse_cdf(1.0 - FALSE_REJECTION)
-    })
+/// The stretches of a run: a break between two dwells parts them.
+fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'a>> {
+    let table = run.observed_table(model.aiding);
+    let dwells = run.dwells(model.aiding);
+    let velocity_sigma = velocity_sigma(run, &dwells);
+    let imu = &run.recording.imu;
+    let unbroken = |before: &Dwell, after: &Dwell| {
+        imu.unbroken(&(before.samples.end - 1..after.samples.start + 1))
+    };
+    let parts = dwells.chunk_by(unbroken);
+    parts
+        .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), velocity_sigma))
+        .collect()
 }

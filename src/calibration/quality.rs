@@ -1,5 +1,7 @@
 //! How well a calibration explains what is known without a truth: gravity, and turns.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::closed_form::{ClosedForm, Reference, six_position_by};
@@ -7,12 +9,12 @@ use super::error::CalibrationError;
 use super::linearisation::{Linearisation, singular};
 use super::outcome::Outcome;
 use super::pass::{Gate, Mode, pass};
-use super::problem::Problem;
-use super::schedule::Schedule;
+use super::problem::{Problem, Stretch};
 use crate::attitude::{exp, level, log, tilt};
-use crate::imu::{FurtherVector, PerSensor, Sensed, Sensor, Triad};
-use crate::navigation::{FurtherTerms, Navigator, State};
-use crate::run::{Dwell, LabelledMotion, Run};
+use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
+use crate::navigation::{Navigator, State, TermValues};
+use crate::recording::LabelledMotion;
+use crate::run::{Dwell, Run};
 
 /// What a calibration leaves of gravity and of turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +29,7 @@ pub struct Quality {
 /// Departures from what is known of a body that stands and turns.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Measures {
-    /// Size of the mean specific force in each dwell less gravity, m/s².
+    /// Magnitude of the mean specific force in each dwell minus gravity, m/s².
     pub gravity: Spread,
     /// Angle in each dwell between gravity as the accelerometers see it and as the gyros carry it there
     /// from the dwell before, rad.
@@ -65,64 +67,58 @@ impl FromIterator<f64> for Spread {
 }
 
 impl Outcome {
-    /// The quality of this calibration of a run.
+    /// The quality of this calibration of a problem.
     ///
     /// What is held out is judged by one pass more, without the observations of every other dwell. It
     /// linearises where the last pass did; nothing else of that pass is in it.
     ///
     /// # Errors
-    /// [`CalibrationError`] where the run is not the one of the outcome.
-    pub fn quality(&self, run: &Run) -> Result<Quality, CalibrationError> {
-        let dwells = run.dwells();
+    /// [`CalibrationError`] where the problem is not the one of the outcome.
+    pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let estimate = Linearisation {
             triads: self.estimate.triads,
-            further: self.further.terms(),
-            initial_attitude: self.linearised_at.initial_attitude,
+            terms: self.auxiliary.terms(),
+            initial_attitudes: self.linearised_at.initial_attitudes.clone(),
         };
-        let held_out = match every_other(&dwells) {
-            None => None,
-            Some(used) => {
-                let schedule = Schedule::new(run, &used)?;
-                let form = self.estimate.form();
-                let velocity = self.velocity_sigma;
-                let problem = Problem::new(run, schedule, form, self.prior_attitude, velocity);
-                let mode = Mode::Held(Gate::Innovations);
-                match pass(&problem, &self.linearised_at, mode) {
-                    Ok(half) => Some(measures(run, &dwells, &half.estimate, |k| k % 2 == 1)?),
-                    // Half the dwells may be too few.
-                    Err(_) => None,
-                }
-            }
-        };
+        let half = every_other(problem).and_then(|half| {
+            let mode = Mode::Held(Gate::Innovations);
+            // Half the dwells may be too few.
+            pass(&half, &self.prior_attitudes, &self.linearised_at, mode).ok()
+        });
+        let held_out = half.map(|half| measures(problem, &half.estimate, |k| k % 2 == 1));
         Ok(Quality {
-            all: measures(run, &dwells, &estimate, |_| true)?,
-            held_out,
+            all: measures(problem, &estimate, |_| true)?,
+            held_out: held_out.transpose()?,
         })
     }
 }
 
 impl ClosedForm {
-    /// The quality of this calibration of a run.
+    /// The quality of this calibration of a problem.
     ///
     /// From labels, what is held out are dwells without a label; else every other dwell, as in
     /// [`Outcome::quality`].
     ///
     /// # Errors
-    /// [`CalibrationError`] where the run is not the one of the closed form.
-    pub fn quality(&self, run: &Run) -> Result<Quality, CalibrationError> {
-        let dwells = run.rests();
+    /// [`CalibrationError`] where the problem is not the one of the closed form.
+    pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
+        let run = problem.run();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
+            let first = problem.stretches().iter();
             let at = Linearisation {
                 triads: *triads,
-                further: FurtherVector::zeros(),
-                initial_attitude: first_attitude(run, &dwells, triads)?,
+                terms: TermVector::zeros(),
+                initial_attitudes: first
+                    .map(|s| first_attitude(s, triads))
+                    .collect::<Result<_, _>>()?,
             };
-            measures(run, &dwells, &at, judged)
+            measures(problem, &at, judged)
         };
         let all = of(&self.estimate.triads, &|_| true)?;
         let held_out = match self.reference {
-            Reference::Labels if run.imu.continuous => {
-                let unlabelled = |k: usize| !labelled(run, &dwells[k]);
+            Reference::Labels if run.recording.imu.continuous => {
+                let dwells: Vec<&Dwell> = problem.dwells().collect();
+                let unlabelled = |k: usize| !labelled(run, dwells[k]);
                 let measures = of(&self.estimate.triads, &unlabelled)?;
                 // Every labelled turn was used.
                 let turns = Spread::default();
@@ -130,14 +126,11 @@ impl ClosedForm {
             }
             Reference::Labels => None,
             reference => {
-                let form = self.estimate.form();
-                let half = every_other(&dwells);
-                let half = half.map(|used| six_position_by(reference, run, &used, form));
-                match half {
-                    Some(Ok(half)) => Some(of(&half.estimate.triads, &|k| k % 2 == 1)?),
-                    // Half the positions may be too few.
-                    Some(Err(_)) | None => None,
-                }
+                // Half the positions may be too few.
+                let half = every_other(problem).map(|half| six_position_by(reference, &half));
+                let half = half.and_then(Result::ok);
+                let half = half.map(|half| of(&half.estimate.triads, &|k| k % 2 == 1));
+                half.transpose()?
             }
         };
         Ok(Quality {
@@ -147,86 +140,82 @@ impl ClosedForm {
     }
 }
 
-/// The dwells from the first on, leaving out every other; none if that leaves less than two.
-fn every_other(dwells: &[Dwell]) -> Option<Vec<Dwell>> {
-    let used: Vec<Dwell> = dwells.iter().step_by(2).cloned().collect();
-    (used.len() >= 2).then_some(used)
+/// The problem with its dwells from the first on, leaving out every other; none if that leaves less than
+/// two, or a stretch with none.
+fn every_other<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
+    let half = problem.observed_in(|k| k % 2 == 0);
+    let left = half
+        .stretches()
+        .iter()
+        .all(|stretch| !stretch.dwells.is_empty());
+    (left && half.dwells().count() >= 2).then_some(half)
 }
 
 fn labelled(run: &Run, dwell: &Dwell) -> bool {
     let Dwell { samples, .. } = dwell;
-    run.segments.iter().any(|segment| {
+    run.recording.segments.iter().any(|segment| {
         segment.motion.is_some()
             && segment.samples.start < samples.end
             && samples.start < segment.samples.end
     })
 }
 
-/// The table's attitude in the first dwell, or one of those in which it is level.
+/// The table's attitude in the first dwell of a stretch, or one of those in which it is level.
 fn first_attitude(
-    run: &Run,
-    dwells: &[Dwell],
+    stretch: &Stretch,
     triads: &PerSensor<Triad>,
 ) -> Result<Matrix3<f64>, CalibrationError> {
-    let Some(first) = dwells.first() else {
+    let Some(first) = stretch.dwells.first() else {
         return Ok(Matrix3::identity());
     };
     if let Some(position) = &first.position {
         return Ok(position.attitude);
     }
     let correction = triads.accel.correction().ok_or_else(|| singular(triads))?;
-    let output = first.mean(Sensor::Accel, run).output;
+    let output = first.mean(Sensor::Accel, stretch.run).output;
     let up = correction * (output - triads.accel.bias);
     Ok(level(&up.normalize()))
 }
 
 /// What a calibration leaves in the judged dwells and in the turns that end in them.
 fn measures(
-    run: &Run,
-    dwells: &[Dwell],
+    problem: &Problem,
     at: &Linearisation,
     judged: impl Fn(usize) -> bool,
 ) -> Result<Measures, CalibrationError> {
-    let navigate = |attitude: Matrix3<f64>, samples| {
-        let state = State::at_rest(attitude);
-        let navigator =
-            Navigator::new(&run.imu, &run.site, PerSensor::default(), &at.triads, state);
-        let further = FurtherTerms {
-            on: (0..at.further.len())
-                .filter(|&k| at.further[k] != 0.0)
-                .collect(),
-            values: at.further,
-        };
-        let navigator = navigator.ok_or_else(|| singular(&at.triads))?;
-        let block = navigator.with_further(further).advance(samples);
-        Ok::<_, CalibrationError>(block.state.attitude)
-    };
     let (mut gravity, mut direction, mut turns) = (Vec::new(), Vec::new(), Vec::new());
-    let mut carried = at.initial_attitude;
-    let mut before: Option<&Dwell> = None;
-    for (k, dwell) in dwells.iter().enumerate() {
-        let position = dwell.position.as_ref();
-        if let Some(before) = before.filter(|_| run.imu.continuous) {
-            let turn = before.samples.end..dwell.samples.start;
-            let start = before.position.as_ref().map_or(carried, |p| p.attitude);
-            carried = navigate(start, turn)?;
-            if let Some(position) = position.filter(|_| judged(k)) {
-                turns.push(log(&(carried * position.attitude.transpose())).norm());
+    let mut number = 0;
+    for (stretch, initial) in problem.stretches().iter().zip(&at.initial_attitudes) {
+        let run = stretch.run;
+        let mut carried = *initial;
+        let mut before: Option<&Dwell> = None;
+        for dwell in &stretch.dwells {
+            let judged = judged(number);
+            number += 1;
+            let position = dwell.position.as_ref();
+            if let Some(before) = before {
+                let turn = before.samples.end..dwell.samples.start;
+                let start = before.position.as_ref().map_or(carried, |p| p.attitude);
+                carried = navigate(run, at, start, turn)?;
+                if let Some(position) = position.filter(|_| judged) {
+                    turns.push(log(&(carried * position.attitude.transpose())).norm());
+                }
             }
-        }
-        let force = force_at_rest(run, dwell, at, &carried)?;
-        let off = tilt(&(carried * force));
-        if judged(k) {
-            gravity.push(force.norm() - run.site.gravity);
-            if before.is_some() && run.imu.continuous {
-                direction.push(off.norm());
+            let force = force_at_rest(run, dwell, at, &carried)?;
+            let off = tilt(&(carried * force));
+            if judged {
+                gravity.push(force.norm() - run.site.gravity);
+                if before.is_some() {
+                    direction.push(off.norm());
+                }
             }
+            carried = exp(off) * carried;
+            before = Some(dwell);
         }
-        carried = exp(off) * carried;
-        before = Some(dwell);
     }
-    for segment in &run.segments {
-        let ends = |dwell: &Dwell| {
+    let (run, dwells) = (problem.run(), problem.dwells().collect::<Vec<_>>());
+    for segment in &run.recording.segments {
+        let ends = |dwell: &&Dwell| {
             dwell
                 .samples
                 .contains(&segment.samples.end.saturating_sub(1))
@@ -234,12 +223,12 @@ fn measures(
         let of_judged = dwells.iter().position(ends).is_none_or(&judged);
         if let Some(LabelledMotion::Turns { axis, angle }) = segment.motion
             && of_judged
-            && !run.imu.is_lost(&segment.samples)
+            && !run.recording.imu.is_lost(&segment.samples)
         {
             let triad = &at.triads.gyro;
             let correction = triad.correction().ok_or_else(|| singular(&at.triads))?;
-            let sum: Vector3<f64> = run.imu.gyro[segment.samples.clone()].iter().sum();
-            let duration = segment.samples.len() as f64 * run.imu.period;
+            let sum: Vector3<f64> = run.recording.imu.gyro[segment.samples.clone()].iter().sum();
+            let duration = segment.samples.len() as f64 * run.recording.imu.period;
             turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
         }
     }
@@ -248,6 +237,25 @@ fn measures(
         direction: direction.into_iter().collect(),
         turns: turns.into_iter().collect(),
     })
+}
+
+/// Attitude after these samples, navigated from this one before.
+fn navigate(
+    run: &Run,
+    at: &Linearisation,
+    from: Matrix3<f64>,
+    samples: Range<usize>,
+) -> Result<Matrix3<f64>, CalibrationError> {
+    let (imu, state) = (&run.recording.imu, State::at_rest(from));
+    let navigator = Navigator::new(imu, &run.site, PerSensor::default(), &at.triads, state);
+    let on = (0..at.terms.len()).filter(|&k| at.terms[k] != 0.0);
+    let terms = TermValues {
+        on: on.collect(),
+        values: at.terms,
+    };
+    let navigator = navigator.ok_or_else(|| singular(&at.triads))?;
+    let block = navigator.with_terms(terms).advance(samples);
+    Ok(block.state.attitude)
 }
 
 /// A term changes the force that it responds to by a hundredth at most, so three rounds leave a millionth
@@ -271,7 +279,7 @@ fn force_at_rest(
         force: of_triad,
     };
     for _ in 0..ROUNDS {
-        sensed.force = of_triad - sensed.added(Sensor::Accel, &at.further);
+        sensed.force = of_triad - sensed.added(Sensor::Accel, &at.terms);
     }
     Ok(sensed.force)
 }

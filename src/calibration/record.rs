@@ -4,20 +4,26 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::block_effect::BlockEffect;
+use super::auxiliary::{Auxiliary, auxiliary_name};
 use super::closed_form::ClosedForm;
-use super::further::{Further, constant_name};
+use super::error_term_test::ErrorTermTest;
+use super::estimate::Estimate;
+use super::finding::Finding;
+use super::innovation::{Consistency, Nis};
 use super::observability::Direction;
-use super::outcome::{Consistency, Estimate, Nis, Outcome, parameter_name};
+use super::outcome::Outcome;
+use super::parameters::{PARAMETERS, parameter, parameter_name, sensor_and_parameter};
+use super::problem::Problem;
 use super::quality::{Measures, Quality, Spread};
-use super::states::{PARAMETERS, sensor_and_parameter};
-use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
-use crate::run::Run;
-use crate::run::record::{
-    Aiding, BlockRecord, BodyFrame, CalibrationRecord, ConsistencyRecord, DirectionRecord,
-    EQUATION, EQUATION_WITH_TERMS, MeasuresRecord, Method, NisRecord, QualityRecord, SpreadRecord,
+use super::result::{
+    BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
+    FindingRecord, GravityRecord, MeasuresRecord, Method, NisRecord, QualityRecord, SpreadRecord,
     TermRecord, TestVector, TriadRecord,
 };
+use crate::imu::{
+    BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
+};
+use crate::run::Run;
 
 /// Inputs of the test vectors: rad/s, then m/s².
 const TEST_INPUTS: [[f64; 6]; 3] = [
@@ -27,52 +33,64 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// The record of this calibration of a run, with what blocks of states did to it and what it leaves
-    /// of gravity and turns.
+    /// This calibration of a problem, with what error terms did to it and what it leaves of gravity and
+    /// turns.
     pub fn record(
         &self,
-        run: &Run,
-        effects: &[BlockEffect],
+        problem: &Problem,
+        tests: &[ErrorTermTest],
         quality: &Quality,
-    ) -> CalibrationRecord {
-        CalibrationRecord {
+    ) -> Calibration {
+        let mut findings = self.findings.clone();
+        findings.extend(ErrorTermTest::most_significant(tests));
+        Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::Ekf),
-            blocks: effects.iter().map(BlockRecord::from).collect(),
-            aiding: Some(match run.body_frame() {
-                BodyFrame::Table => Aiding::Table,
-                BodyFrame::Accelerometer => Aiding::Velocity,
-            }),
-            terms: self.further.records(),
-            equation: Some(match self.further.has_terms() {
+            blocks: tests.iter().map(BlockRecord::from).collect(),
+            aiding: Some(problem.model.aiding),
+            terms: self.auxiliary.records(),
+            equation: Some(match self.auxiliary.has_terms() {
                 true => EQUATION_WITH_TERMS.to_owned(),
                 false => EQUATION.to_owned(),
+            }),
+            gravity: Some(GravityRecord {
+                m_s2: self.gravity.0,
+                sigma_m_s2: self.gravity.1,
             }),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
             observability: direction_records(self),
-            warnings: self.warnings.clone(),
-            ..self.estimate.record(run)
+            warnings: texts(&findings),
+            findings: findings.iter().map(FindingRecord::from).collect(),
+            ..self
+                .estimate
+                .record(problem.run(), problem.model.aiding.body_frame())
         }
     }
 }
 
 impl ClosedForm {
-    /// The record of this calibration of a run, with what it leaves of gravity and turns.
-    pub fn record(&self, run: &Run, quality: &Quality) -> CalibrationRecord {
-        CalibrationRecord {
+    /// This calibration of a problem, with what it leaves of gravity and turns.
+    pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
+        Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::SixPosition),
-            body_frame: self.reference.body_frame(),
-            warnings: self.warnings.clone(),
-            ..self.estimate.record(run)
+            gravity: Some(GravityRecord {
+                m_s2: problem.run().site.gravity,
+                sigma_m_s2: problem.run().site.gravity_sigma,
+            }),
+            warnings: texts(&self.findings),
+            findings: self.findings.iter().map(FindingRecord::from).collect(),
+            ..self
+                .estimate
+                .record(problem.run(), self.reference.body_frame())
         }
     }
 }
 
-impl Further {
-    /// Its estimated constants by name.
+impl Auxiliary {
+    /// Its estimated parameters by name.
     pub fn records(&self) -> BTreeMap<String, TermRecord> {
         let sigma = self.sigma();
         let record = |k: usize| {
@@ -80,7 +98,7 @@ impl Further {
                 value: self.values[k],
                 sigma: Some(sigma[k]),
             };
-            Some((constant_name(k)?, record))
+            Some((auxiliary_name(k)?, record))
         };
         self.estimated().filter_map(record).collect()
     }
@@ -88,7 +106,7 @@ impl Further {
 
 impl Estimate {
     /// The record of this estimate, with a model card: equation, correction, test vectors.
-    pub fn record(&self, run: &Run) -> CalibrationRecord {
+    pub fn record(&self, run: &Run, body_frame: BodyFrame) -> Calibration {
         let form = self.form();
         let sigma = self.sigma();
         let estimated: Vec<usize> = self.estimated().collect();
@@ -100,20 +118,28 @@ impl Estimate {
         };
         let factor = |index: usize| {
             let (sensor, of_triad) = sensor_and_parameter(index);
-            run.nominal.get(sensor).factor(of_triad)
+            run.instrument.nominal.get(sensor).factor(of_triad)
         };
-        let of = |sensor| triad_record(self.triads.get(sensor), run.nominal.get(sensor));
+        let of = |sensor| triad_record(self.triads.get(sensor), run.instrument.nominal.get(sensor));
         let correction = |sensor| {
-            let sensitivity = run.nominal.get(sensor).sensitivity(self.triads.get(sensor));
+            let sensitivity = run
+                .instrument
+                .nominal
+                .get(sensor)
+                .sensitivity(self.triads.get(sensor));
             Some(rows(&sensitivity.try_inverse()?))
         };
-        CalibrationRecord {
+        Calibration {
             installation_form: Some(form),
-            body_frame: run.body_frame(),
-            unit: Some(run.unit.clone()),
+            body_frame,
+            unit: Some(run.instrument.unit.clone()),
             sigma: Some(PerSensor::from_fn(|sensor| {
-                let sigma = sigma.fixed_rows::<PER_TRIAD>(super::states::parameter(sensor, 0));
-                sigma_record(form, &sigma.into_owned(), run.nominal.get(sensor))
+                let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
+                sigma_record(
+                    form,
+                    &sigma.into_owned(),
+                    run.instrument.nominal.get(sensor),
+                )
             })),
             parameters: names(true),
             covariance: estimated
@@ -134,8 +160,8 @@ impl Estimate {
                 .iter()
                 .map(|input| self.test_vector(run, input))
                 .collect(),
-            meta: run.meta.clone(),
-            ..CalibrationRecord::new(of(Sensor::Gyro), of(Sensor::Accel))
+            meta: run.recording.meta.clone(),
+            ..Calibration::new(of(Sensor::Gyro), of(Sensor::Accel))
         }
     }
 
@@ -144,7 +170,7 @@ impl Estimate {
         for (sensor, first) in [(Sensor::Gyro, 0), (Sensor::Accel, 3)] {
             let u = Vector3::from_column_slice(&input[first..first + 3]);
             let output = self.triads.get(sensor).output(&u);
-            let output = output.component_mul(&run.nominal.get(sensor).0);
+            let output = output.component_mul(&run.instrument.nominal.get(sensor).0);
             raw[first..first + 3].copy_from_slice(output.as_slice());
         }
         TestVector {
@@ -155,32 +181,13 @@ impl Estimate {
 }
 
 /// The record of a known truth.
-pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> CalibrationRecord {
-    let of = |sensor| triad_record(truth.get(sensor), run.nominal.get(sensor));
-    CalibrationRecord {
+pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
+    let of = |sensor| triad_record(truth.get(sensor), run.instrument.nominal.get(sensor));
+    Calibration {
         installation_form: Some(truth.gyro.form),
-        unit: Some(run.unit.clone()),
-        ..CalibrationRecord::new(of(Sensor::Gyro), of(Sensor::Accel))
+        unit: Some(run.instrument.unit.clone()),
+        ..Calibration::new(of(Sensor::Gyro), of(Sensor::Accel))
     }
-}
-
-/// Both triads of a record, normalised by these nominal scales and split in a form. A record may
-/// hold any installation matrix, so the split goes through `K C`, which all forms share.
-pub fn triads_of(
-    record: &CalibrationRecord,
-    nominal: &PerSensor<Nominal>,
-    form: InstallationForm,
-) -> PerSensor<Triad> {
-    PerSensor::from_fn(|sensor| {
-        let triad = match sensor {
-            Sensor::Gyro => &record.gyro,
-            Sensor::Accel => &record.accel,
-        };
-        let nominal = nominal.get(sensor).0;
-        let a = Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j] / nominal[i]);
-        let bias = Vector3::from(triad.bias).component_div(&nominal);
-        Triad::from_sensitivity(form, &a, bias)
-    })
 }
 
 fn triad_record(triad: &Triad, nominal: &Nominal) -> TriadRecord {
@@ -234,17 +241,17 @@ fn direction_records(outcome: &Outcome) -> Vec<DirectionRecord> {
         .collect()
 }
 
-impl From<&BlockEffect> for BlockRecord {
-    fn from(effect: &BlockEffect) -> Self {
+impl From<&ErrorTermTest> for BlockRecord {
+    fn from(test: &ErrorTermTest) -> Self {
         Self {
-            block: effect.block.name().to_owned(),
-            on: effect.on,
-            sigma_factors: effect.cost,
-            merit_gain: effect.gain,
-            merit_gain_limit: effect.limit,
-            asked_for: effect.asked_for(),
-            nis_without: effect.without,
-            nis_with: effect.with,
+            block: test.term.name().to_owned(),
+            on: test.on,
+            sigma_factors: test.sigma_factors,
+            merit_gain: test.gain,
+            merit_gain_limit: test.limit,
+            asked_for: test.significant(),
+            nis_without: test.without,
+            nis_with: test.with,
         }
     }
 }
@@ -281,5 +288,21 @@ fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
         all: of(all),
         velocity: some(velocity),
         table: some(table),
+    }
+}
+
+fn texts(findings: &[Finding]) -> Vec<String> {
+    findings.iter().map(Finding::to_string).collect()
+}
+
+impl From<&Finding> for FindingRecord {
+    fn from(finding: &Finding) -> Self {
+        // A finding is a kind and figures, which JSON always holds.
+        let value = serde_json::to_value(finding).unwrap_or_default();
+        Self {
+            kind: value["kind"].as_str().unwrap_or_default().to_owned(),
+            text: finding.to_string(),
+            figures: value["figures"].clone(),
+        }
     }
 }

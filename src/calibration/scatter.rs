@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::frame::Canonical;
 use super::nees::Directions;
-use super::states::ParameterVector;
+use super::parameters::ParameterVector;
 
 /// Mean and scatter of three calibrations or more, taken as of one instrument that has not changed
 /// and of different data.
@@ -26,7 +26,7 @@ pub struct ParameterScatter {
     pub index: usize,
     /// Number of calibrations that entered.
     pub count: usize,
-    /// Mean less the reference's value, weighted by 1/σ²; not weighted without σ.
+    /// Mean minus the reference's value, weighted by 1/σ²; not weighted without σ.
     pub mean: f64,
     /// 1σ of the weighted mean by the claimed σ.
     pub mean_sigma: Option<f64>,
@@ -147,12 +147,12 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::calibration::PARAMETERS;
     use crate::calibration::frame::own_nominal;
     use crate::calibration::frame::tests::{record, with_covariance};
-    use crate::calibration::outcome::from_vector;
-    use crate::calibration::states::PARAMETERS;
+    use crate::calibration::from_vector;
+    use crate::imu::BodyFrame;
     use crate::imu::InstallationForm::General;
-    use crate::run::record::BodyFrame;
 
     /// Calibrations that scatter by `factor` times the σ that they claim.
     fn drawn(count: usize, factor: f64) -> (Vec<Canonical>, ParameterVector) {

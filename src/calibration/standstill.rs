@@ -1,6 +1,6 @@
 //! How still the IMU is while the table stands.
 
-use super::schedule::stretch;
+use super::schedule::step_length;
 use crate::run::{Dwell, Run};
 
 /// Below this the velocity at standstill is never trusted, m/s. Small beside what random walk makes of
@@ -17,10 +17,10 @@ pub(super) fn velocity_sigma(run: &Run, dwells: &[Dwell]) -> f64 {
     if let Some(given) = run.standstill.velocity_sigma {
         return given.max(FLOOR);
     }
-    let stretch = stretch(run.imu.period);
+    let stretch = step_length(run.recording.imu.period);
     let (mut covariance, mut variance, mut pairs) = (0.0, 0.0, 0usize);
     for dwell in dwells {
-        let sums: Vec<_> = run.imu.accel[dwell.samples.clone()]
+        let sums: Vec<_> = run.recording.imu.accel[dwell.samples.clone()]
             .chunks_exact(stretch)
             .map(|chunk| chunk.iter().sum::<nalgebra::Vector3<f64>>())
             .collect();
@@ -38,7 +38,7 @@ pub(super) fn velocity_sigma(run: &Run, dwells: &[Dwell]) -> f64 {
         return FLOOR;
     }
     let (covariance, variance) = (covariance / pairs as f64, variance / pairs as f64);
-    let excess = -covariance - run.imu.pulse.accel.powi(2) / 12.0;
+    let excess = -covariance - run.recording.imu.pulse.accel.powi(2) / 12.0;
     if excess > SIGNIFICANT * variance / (pairs as f64).sqrt() {
         excess.sqrt().max(FLOOR)
     } else {
@@ -59,7 +59,7 @@ mod tests {
         for output in [Output::Pulse, Output::Increment] {
             scenario.output = output;
             let run = scenario.simulate(1, 0).unwrap().run;
-            assert_eq!(velocity_sigma(&run, &run.dwells()), FLOOR);
+            assert_eq!(velocity_sigma(&run, &run.dwells(run.aiding())), FLOOR);
         }
     }
 
@@ -78,10 +78,10 @@ mod tests {
                 -sigma
             })
         };
-        for k in 0..run.imu.accel.len() {
-            run.imu.accel[k] += velocity(k + 1) - velocity(k);
+        for k in 0..run.recording.imu.accel.len() {
+            run.recording.imu.accel[k] += velocity(k + 1) - velocity(k);
         }
-        let found = velocity_sigma(&run, &run.dwells());
+        let found = velocity_sigma(&run, &run.dwells(run.aiding()));
         assert!((found / sigma - 1.0).abs() < 0.1, "{found}");
     }
 }

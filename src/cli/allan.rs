@@ -7,15 +7,16 @@ use turncal::noise::{NoiseAnalysis, Stretch};
 use turncal::report::allan;
 use turncal::run::Run;
 
+use super::input::run_file;
 use super::output::Delivery;
 use super::progress::Activity;
 
-/// Allan deviation of a standing record, and the noise figures that it shows
+/// Allan deviation of a stationary record, and the noise figures that it shows
 ///
 /// Overlapping Allan deviation of every axis with its confidence; random walk, bias instability, rate random
-/// walk, quantisation and ramps as far as their slopes are there, with their σ, and what the others are
-/// below; a table [imu.noise] for run.toml. Takes the whole record if it stands, else its longest
-/// standstill.
+/// walk, quantisation and ramps as far as they are detected, with their σ, and upper limits of the others; a
+/// table [imu.noise] for run.toml. Takes the whole record if it is stationary, else its longest static
+/// interval.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a page and figures")))]
 #[command(after_help = "Examples:
@@ -23,8 +24,8 @@ use super::progress::Activity;
   turncal allan run.toml --segment z_up -o noise
   turncal allan run.toml --json")]
 pub struct Allan {
-    /// The run; its [imu.noise] need only be near
-    #[arg(value_name = "RUN.toml")]
+    /// The run's run.toml; its [imu.noise] may be rough
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
     /// Take the segment of this label; the longest, if there are several
     #[arg(long, value_name = "LABEL")]
@@ -44,6 +45,6 @@ impl Allan {
         let activity = Activity::new("identifying noise");
         let analysis = NoiseAnalysis::new(&run, stretch);
         drop(activity);
-        begun.deliver(&allan::document(&run.name, &analysis))
+        begun.deliver(&allan::document(&run.recording.name, &analysis))
     }
 }

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::error::ErrorKind;
 use turncal::calibration::Correction;
-use turncal::export::{sample_rows, write_samples};
+use turncal::calibration::result::Calibration;
+use turncal::formats::export::{sample_rows, write_samples};
 use turncal::imu::{Sensor, Term};
-use turncal::run::{CalibrationRecord, Run};
+use turncal::run::Run;
 use turncal::units::PPM;
 
+use super::input::run_file;
 use super::output::{keep, stream};
 use super::progress::Activity;
 
@@ -19,19 +21,19 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Turns a run's raw samples into angular rate and specific force
 ///
 /// Writes a row a sample: its begin and end in s, angular rate in rad/s and specific force in m/s², both
-/// mean over the sample, along right, front and up of the calibration's body frame. Further terms of
-/// the calibration are taken out, too; its time offset takes the inertial rate for that over the
-/// Earth. The file is itself a record for a run.toml: output = "rate", time_stamp = "end".
+/// mean over the sample, along right, front and up of the calibration's body frame. Error terms of
+/// the calibration are corrected, too; the correction of its time offset neglects Earth rate. The file is
+/// itself a record for a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal apply result/calibration.json my-run/run.toml -o calibrated.csv.gz
-  turncal apply result/calibration.json my-run/run.toml | head")]
+  turncal apply result/calibration.json run.toml -o calibrated.csv.gz
+  turncal apply result/calibration.json run.toml | head")]
 pub struct Apply {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
     /// The run's run.toml
-    #[arg(value_name = "RUN.toml")]
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
@@ -53,7 +55,7 @@ impl Apply {
                 clap::Error::raw(ErrorKind::ValueValidation, message).exit();
             }
         }
-        let record = CalibrationRecord::read(&self.calibration)?;
+        let record = Calibration::read(&self.calibration)?;
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let run = Run::read(&self.run)?;
         let correction = Correction::for_run(&record, &run)
@@ -61,7 +63,10 @@ impl Apply {
         activity.next("writing");
         match &self.output {
             Some(output) => {
-                keep(output, run.files.iter().chain([&self.calibration]))?;
+                keep(
+                    output,
+                    run.recording.files.iter().chain([&self.calibration]),
+                )?;
                 write_samples(output, &correction, &run, self.force)?;
             }
             None => stream(|rows| sample_rows(rows, &correction, &run))?,
@@ -69,8 +74,8 @@ impl Apply {
         drop(activity);
         eprintln!(
             "{} samples of {} s; x right, y front, z up, along: {}",
-            run.imu.len(),
-            run.imu.period,
+            run.recording.imu.len(),
+            run.recording.imu.period,
             record.body_frame.words()
         );
         for note in notes(&record, &correction, &run) {
@@ -80,7 +85,7 @@ impl Apply {
     }
 }
 
-fn notes(record: &CalibrationRecord, correction: &Correction, run: &Run) -> Vec<String> {
+fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String> {
     let mut notes = Vec::new();
     if record.converged == Some(false) {
         notes.push("the calibration did not converge".to_owned());
@@ -92,9 +97,11 @@ fn notes(record: &CalibrationRecord, correction: &Correction, run: &Run) -> Vec<
     for sensor in Sensor::ALL {
         let scale = correction.sensitivity.get(sensor).diagonal();
         let off = scale
-            .component_div(&run.nominal.get(sensor).0)
+            .component_div(&run.instrument.nominal.get(sensor).0)
             .add_scalar(-1.0);
-        let sigmas = off.abs().component_div(&run.prior.get(sensor).scale_sigma);
+        let sigmas = off
+            .abs()
+            .component_div(&run.instrument.prior.get(sensor).scale_sigma);
         if sigmas.max() > SUSPECT_SIGMAS {
             notes.push(format!(
                 "{} scale factors are up to {:.0} ppm off the run's nominal ones, {:.0} times the 1σ in \
@@ -108,9 +115,9 @@ fn notes(record: &CalibrationRecord, correction: &Correction, run: &Run) -> Vec<
     if correction.has(Term::TimeOffset) {
         notes.push("the time offset of the accelerometers neglects Earth rate".to_owned());
     }
-    if correction.has(Term::SizeEffect) && !run.imu.continuous {
+    if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
         notes.push(
-            "the record is not continuous, so the size effect is taken out without its part by \
+            "the record is not continuous, so the size effect is corrected without its part by \
              angular acceleration"
                 .to_owned(),
         );

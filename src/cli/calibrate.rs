@@ -6,36 +6,41 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use clap::error::ErrorKind;
 use rayon::prelude::*;
-use turncal::calibration::outcome::Estimate;
+use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    self, BlockEffect, CalibrationError, ClosedForm, Outcome, Quality, Reference, block_effects,
-    in_body_frame, triads_of,
+    self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
+    Solution, in_body_frame, triads_of,
 };
-use turncal::imu::{InstallationForm, PerSensor, Triad};
+use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
 use turncal::report::calibration::{self as of_calibration, Navigated, Report};
-use turncal::run::record::TermRecord;
-use turncal::run::{CalibrationRecord, Run};
+use turncal::run::Run;
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
-use super::block::Block;
+use super::error_term::TermArgument;
+use super::input::run_file;
 use super::output::{Overwrite, print, show};
 use super::progress::Activity;
 
 /// Estimates scale factors, installation and biases of a run
 ///
-/// Writes DIR/calibration.json and DIR/report/ and prints a summary.
+/// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
+/// failure.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate my-run/run.toml
-  turncal calibrate my-run/run.toml -o result --truth my-run/truth.json
+  turncal calibrate my-run/run.toml -o mine --truth my-run/truth.json
+  turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale")]
 pub struct Calibrate {
     /// The run's run.toml
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
-    /// Directory to write [default: NAME-calibration, or nothing with --json]
+    /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method;
+    /// nothing with --json]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// How to estimate
@@ -47,10 +52,10 @@ pub struct Calibrate {
     /// What is observed [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Blocks of states to estimate, beside those that the run switches on
-    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
-    with: Vec<Block>,
-    /// True calibration; the estimator never sees it, summary and report show errors against it
+    /// Error terms to estimate, beside those that the run switches on
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    with: Vec<TermArgument>,
+    /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Print the calibration as one JSON document and nothing else
@@ -82,9 +87,9 @@ pub enum Installation {
 /// What the filter observes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Aiding {
-    /// Standstill, and the attitude of the table
+    /// Zero velocity in every dwell, and the attitude of the table
     Table,
-    /// Standstill alone; the accelerometers fix the body axes
+    /// Zero velocity alone; the accelerometers define the body axes
     Velocity,
 }
 
@@ -98,79 +103,54 @@ impl From<Installation> for InstallationForm {
     }
 }
 
-/// What a method gave.
-enum Result {
-    Filter(Box<Outcome>),
-    ClosedForm(Box<ClosedForm>),
+impl From<Aiding> for turncal::run::Aiding {
+    fn from(aiding: Aiding) -> Self {
+        match aiding {
+            Aiding::Table => Self::Table,
+            Aiding::Velocity => Self::Velocity,
+        }
+    }
 }
 
-impl Result {
-    fn outcome(&self) -> Option<&Outcome> {
-        match self {
-            Self::Filter(outcome) => Some(outcome),
-            Self::ClosedForm(_) => None,
-        }
-    }
-
-    fn closed_form(&self) -> Option<&ClosedForm> {
-        match self {
-            Self::Filter(_) => None,
-            Self::ClosedForm(closed_form) => Some(closed_form),
-        }
-    }
-
-    fn method(&self) -> (&'static str, &Estimate) {
-        match self {
-            Self::Filter(outcome) => ("EKF", &outcome.estimate),
-            Self::ClosedForm(closed_form) => ("closed form", &closed_form.estimate),
-        }
-    }
-
-    fn note(&self) -> String {
-        self.closed_form().map(note).unwrap_or_default()
-    }
-
-    fn effects(&self, run: &Run) -> std::result::Result<Vec<BlockEffect>, CalibrationError> {
-        let effects = self.outcome().map(|outcome| block_effects(run, outcome));
-        effects.unwrap_or(Ok(Vec::new()))
-    }
-
-    fn quality(&self, run: &Run) -> std::result::Result<Quality, CalibrationError> {
-        match self {
-            Self::Filter(outcome) => outcome.quality(run),
-            Self::ClosedForm(closed_form) => closed_form.quality(run),
-        }
-    }
-
-    fn record(&self, run: &Run, effects: &[BlockEffect], quality: &Quality) -> CalibrationRecord {
-        match self {
-            Self::Filter(outcome) => outcome.record(run, effects, quality),
-            Self::ClosedForm(closed_form) => closed_form.record(run, quality),
+impl From<Method> for calibration::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Ekf => Self::Ekf,
+            Method::SixPosition => Self::SixPosition,
         }
     }
 }
 
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
-        let activity = Activity::new(format!("reading {}", self.run.display()));
-        let mut run = Run::read(&self.run)?;
-        match self.aiding {
-            Some(Aiding::Table) if run.table.is_none() => {
-                return Err(CalibrationError::NoTable)
-                    .with_context(|| self.run.display().to_string());
-            }
-            // What the filter is not to observe is not there.
-            Some(Aiding::Velocity) => run.table = None,
-            Some(Aiding::Table) | None => {}
+        if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
+            let message = format!(
+                "--with {}: --method six-position estimates scale factors, installation and biases only; \
+                 leave --with out, or estimate it by --method ekf\n",
+                term.0.name()
+            );
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         }
-        for block in &self.with {
-            block.switch_on(&mut run)?;
+        for term in &self.with {
+            term.needs_table(self.aiding);
+        }
+        let activity = Activity::new(format!("reading {}", self.run.display()));
+        let run = Run::read(&self.run)?;
+        if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
+            return Err(CalibrationError::NoTable).with_context(|| self.run.display().to_string());
         }
         let form = self.installation.into();
+        let mut options = Options::default().installation(form);
+        options.aiding = self.aiding.map(turncal::run::Aiding::from);
+        let mut problem = Problem::new(&run, &options);
+        for term in &self.with {
+            term.switch_on(&mut problem)?;
+        }
+        let body_frame = problem.model.aiding.body_frame();
         let truth = self
             .truth
             .as_deref()
-            .map(|path| read_truth(path, &run))
+            .map(|path| read_truth(path, &run, body_frame))
             .transpose()?;
         let (truth, true_terms) = truth.unzip();
         let true_terms = true_terms.unwrap_or_default();
@@ -180,7 +160,10 @@ impl Calibrate {
         let target = match (&self.output, self.json) {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
-            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.name))),
+            (None, false) => Some(PathBuf::from(match self.method {
+                Method::Ekf => format!("{}-calibration", run.recording.name),
+                Method::SixPosition => format!("{}-calibration-six-position", run.recording.name),
+            })),
         };
         let directory = target
             .as_deref()
@@ -194,39 +177,35 @@ impl Calibrate {
             })
             .transpose()?;
 
-        let result = match self.method {
-            Method::Ekf => Result::Filter(Box::new(filter(&run, form, &activity)?)),
-            Method::SixPosition => {
-                let closed_form = calibration::six_position(&run, form)
-                    .with_context(|| self.run.display().to_string())?;
-                Result::ClosedForm(Box::new(closed_form))
-            }
+        let solution = solve(&problem, self.method.into(), &activity)?;
+        let method = match self.method {
+            Method::Ekf => "EKF",
+            Method::SixPosition => "closed form",
         };
-        let (effects, (quality, navigation)) = rayon::join(
-            || result.effects(&run),
-            || {
-                let quality = result.quality(&run);
-                (quality, navigate(&run, &[result.method()], truth.as_ref()))
-            },
+        let (assessment, navigation) = rayon::join(
+            || solution.assess(&problem),
+            || navigate(&run, &[(method, solution.estimate())], truth.as_ref()),
         );
-        let (effects, quality) = (effects?, quality?);
-        let record = result.record(&run, &effects, &quality);
-        let note = result.note();
-        let dwells = dwell_times(&run);
+        let assessment = assessment?;
+        let calibration = solution.calibration(&problem, &assessment);
+        let findings = solution.findings(&assessment);
+        let note = solution.closed_form().map(note).unwrap_or_default();
+        let dwells = dwell_times(&problem);
         let report = Report {
-            title: &run.name,
+            title: &run.recording.name,
             run: &run,
-            body_frame: record.body_frame,
-            outcome: result.outcome(),
-            effects: &effects,
-            quality: Some(&quality),
+            aiding: problem.model.aiding,
+            body_frame: calibration.body_frame,
+            outcome: solution.outcome(),
+            findings: &findings,
+            effects: &assessment.error_terms,
+            quality: Some(&assessment.quality),
             true_terms: &true_terms,
-            closed_form: result
+            closed_form: solution
                 .closed_form()
                 .map(|closed_form| of_calibration::ClosedForm {
                     estimate: &closed_form.estimate,
                     note: &note,
-                    warnings: &closed_form.warnings,
                 }),
             truth: truth_in_form.as_ref(),
             dwells: &dwells,
@@ -235,32 +214,40 @@ impl Calibrate {
         let document = report.document();
         activity.next("writing");
         if let Some(directory) = directory {
-            record.write(&directory.path().join("calibration.json"), false)?;
+            calibration.write(&directory.path().join("calibration.json"), false)?;
             write_report(&document, &directory.path().join("report"))?;
             directory.commit()?;
         }
         drop(activity);
         if self.json {
-            return print(&record.to_json(Path::new("standard output"))?);
+            print(&calibration.to_json(Path::new("standard output"))?)?;
+        } else {
+            show(&document, false)?;
         }
-        show(&document, false)?;
-        if let Some(target) = target {
+        if let Some(target) = target.filter(|_| !self.json) {
             let page = target.join("report").join("index.html");
             eprintln!("\nreport: {}", page.display());
+        }
+        if !solution.converged() {
+            bail!(
+                "{}: not converged; values and σ may not be used, see the findings",
+                run.recording.name
+            );
         }
         Ok(())
     }
 }
 
-/// Runs the filter; a run that does not converge is a failure.
-pub fn filter(run: &Run, form: InstallationForm, activity: &Activity) -> anyhow::Result<Outcome> {
-    activity.next(format!("calibrating {}", run.name));
-    let outcome = calibration::estimate(run, form, &|pass| activity.pass(pass))
-        .with_context(|| run.name.clone())?;
-    if !outcome.converged {
-        bail!("{}: {}", run.name, outcome.warnings.join(" "));
-    }
-    Ok(outcome)
+/// Solves a problem, the passes being shown.
+pub fn solve(
+    problem: &Problem,
+    method: calibration::Method,
+    activity: &Activity,
+) -> anyhow::Result<Solution> {
+    let name = &problem.run().recording.name;
+    activity.next(format!("calibrating {name}"));
+    let solution = problem.solve(method, &|pass| activity.pass(pass));
+    solution.with_context(|| name.clone())
 }
 
 /// What a closed form was made of, in a few words.
@@ -278,7 +265,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
     };
     let minutes = closed_form.standing_time / 60.0;
     let digits = usize::from(minutes < 10.0);
-    format!("{from}, {minutes:.digits$} min of standing")
+    format!("{from}, {minutes:.digits$} min at rest")
 }
 
 /// Navigates 40 h standing level at the run's site by the calibration of each method.
@@ -296,10 +283,11 @@ pub fn navigate(
 }
 
 /// Begin and end of each dwell, s.
-pub fn dwell_times(run: &Run) -> Vec<Range<f64>> {
-    run.dwells()
-        .into_iter()
-        .map(|dwell| run.imu.time(dwell.samples.start)..run.imu.time(dwell.samples.end))
+pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
+    let imu = &problem.run().recording.imu;
+    let dwells = problem.dwells();
+    dwells
+        .map(|dwell| imu.time(dwell.samples.start)..imu.time(dwell.samples.end))
         .collect()
 }
 
@@ -314,20 +302,21 @@ pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()>
 fn read_truth(
     path: &Path,
     run: &Run,
+    body_frame: BodyFrame,
 ) -> anyhow::Result<(PerSensor<Triad>, BTreeMap<String, TermRecord>)> {
-    let record = CalibrationRecord::read(path)?;
+    let record = Calibration::read(path)?;
     if let Some(unit) = &record.unit
-        && *unit != run.unit
+        && *unit != run.instrument.unit
     {
         bail!(
             "{}: units are {} and {}, those of the run {} and {}; give the truth of this run",
             path.display(),
             unit.gyro,
             unit.accel,
-            run.unit.gyro,
-            run.unit.accel
+            run.instrument.unit.gyro,
+            run.instrument.unit.accel
         );
     }
-    let triads = triads_of(&record, &run.nominal, InstallationForm::General);
-    Ok((in_body_frame(&triads, run.body_frame()), record.terms))
+    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
+    Ok((in_body_frame(&triads, body_frame), record.terms))
 }

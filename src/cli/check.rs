@@ -6,14 +6,15 @@ use turncal::report::check;
 use turncal::run::Run;
 use turncal::survey::Survey;
 
+use super::input::run_file;
 use super::output::Delivery;
 use super::progress::Activity;
 
-/// Says what a run holds, and what each method could see of the instrument in it
+/// Says what a run holds, and what each method could observe of the instrument
 ///
 /// Reads everything and calibrates nothing: rate, jitter, faults and steps of the log; dwells with the axis
 /// that is up; turns with axis and angle; labelled sections against both; the σ to be expected of each method
-/// and what it would not see; what to change. What it finds wrong is no failure.
+/// and what it would not observe; what to change. What it finds wrong is no failure.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a page and a figure of the record")))]
 #[command(after_help = "Examples:
@@ -21,8 +22,8 @@ use super::progress::Activity;
   turncal check run.toml -o check
   turncal check run.toml --json")]
 pub struct Check {
-    /// The run
-    #[arg(value_name = "RUN.toml")]
+    /// The run's run.toml
+    #[arg(value_name = "RUN.toml", value_parser = run_file)]
     run: PathBuf,
     #[command(flatten)]
     delivery: Delivery,

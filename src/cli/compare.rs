@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
+use turncal::calibration::result::Calibration;
 use turncal::calibration::{Named, compare};
 use turncal::report::comparison;
-use turncal::run::CalibrationRecord;
 
 use super::names::short_names;
 use super::output::Delivery;
 
-/// Calibrations side by side, parameter by parameter, with their σ.
+/// Calibrations side by side, parameter by parameter, with their σ
 ///
 /// All are brought to the general installation form and to one body frame first. Without a truth the
 /// first is the reference. From three on, mean, scatter and χ² of the scatter against the claimed σ
@@ -43,7 +43,7 @@ impl Compare {
             .collect();
         let records = paths
             .iter()
-            .map(|path| CalibrationRecord::read(path))
+            .map(|path| Calibration::read(path))
             .collect::<Result<Vec<_>, _>>()?;
         let names = short_names(&paths);
         let named: Vec<Named> = names

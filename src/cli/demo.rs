@@ -3,13 +3,19 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use anyhow::Context;
-use turncal::calibration::{self, ClosedForm};
-use turncal::imu::InstallationForm;
+use anyhow::{Context, bail};
+use rayon::prelude::*;
+use turncal::calibration::{self, ClosedForm, Estimate, Options, Problem};
+use turncal::imu::{PerSensor, Triad};
+use turncal::models::{self, Place};
 use turncal::report::calibration::{self as of_calibration, Report};
+use turncal::report::demo::{self, Flown};
+use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
+use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 
-use super::calibrate::{dwell_times, filter, navigate, note, write_report};
+use super::calibrate::{dwell_times, navigate, note, solve, write_report};
+use super::input::seed;
 use super::output::{Overwrite, show};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
@@ -28,14 +34,11 @@ pub struct Demo {
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
     output: PathBuf,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     overwrite: Overwrite,
 }
-
-/// Both installation forms of the demo are the general one.
-const FORM: InstallationForm = InstallationForm::General;
 
 impl Demo {
     pub fn run(&self) -> anyhow::Result<()> {
@@ -46,43 +49,64 @@ impl Demo {
             || simulated(&Scenario::load("demo")?, self.seed),
             || static_positions(self.seed),
         );
-        let (turning, (standing, closed_form)) = (turning?, standing?);
+        let (turning, standing) = (turning?, standing?);
+        let still = Problem::new(&standing.run, &Options::default());
+        let whole = calibration::six_position(&still)?;
         let run = &turning.run;
-        let outcome = filter(run, FORM, &activity)?;
+        let problem = Problem::new(run, &Options::default());
+        let solution = solve(&problem, calibration::Method::Ekf, &activity)?;
+        if !solution.converged() {
+            bail!("the demonstration did not converge; take another --seed");
+        }
 
-        let note = note(&closed_form);
-        let dwells = dwell_times(run);
+        let minutes = |run: &Run| run.recording.imu.duration() / 60.0;
+        let (table_time, whole_time) = (minutes(run), minutes(&standing.run));
+        let closed_form = cut(&still, table_time / whole_time)?;
+        let note = format!(
+            "{}; the first part of each dwell, as if the table had been driven for the {table_time:.0} min of \
+             the filter's run",
+            note(&closed_form)
+        );
+        let dwells = dwell_times(&problem);
         activity.next("navigating");
         let methods = [
             ("closed form", &closed_form.estimate),
-            ("EKF", &outcome.estimate),
+            ("EKF", solution.estimate()),
         ];
-        let (effects, (quality, navigation)) = rayon::join(
-            || calibration::block_effects(run, &outcome),
-            || {
-                let quality = outcome.quality(run);
-                (quality, navigate(run, &methods, Some(&turning.truth)))
-            },
+        let (assessment, navigation) = rayon::join(
+            || solution.assess(&problem),
+            || navigate(run, &methods, Some(&turning.truth)),
         );
-        let (effects, quality) = (effects?, quality?);
+        let assessment = assessment?;
+        let estimates = [&closed_form.estimate, solution.estimate(), &whole.estimate];
+        let missions = fly(run, &estimates, &turning.truth)?;
+        let names = [
+            format!("closed form, {table_time:.0} min"),
+            format!("EKF, {table_time:.0} min"),
+            format!("closed form, {whole_time:.0} min"),
+        ];
+        let mut findings = closed_form.findings.clone();
+        findings.extend(solution.findings(&assessment));
         let report = Report {
             title: "turncal demo",
             run,
-            body_frame: run.body_frame(),
-            outcome: Some(&outcome),
-            effects: &effects,
-            quality: Some(&quality),
+            aiding: problem.model.aiding,
+            body_frame: problem.model.aiding.body_frame(),
+            outcome: solution.outcome(),
+            findings: &findings,
+            effects: &assessment.error_terms,
+            quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
             closed_form: Some(of_calibration::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
-                warnings: &closed_form.warnings,
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
-        let document = report.document();
+        let mut document = report.document();
+        demo::add(&mut document, &names, &missions);
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;
@@ -94,9 +118,9 @@ impl Demo {
         };
         let (filtered, closed) = (method("ekf")?, method("six-position")?);
         write(&standing, &closed)?;
-        let record = outcome.record(run, &effects, &quality);
+        let record = solution.calibration(&problem, &assessment);
         record.write(&filtered.join("calibration.json"), false)?;
-        let record = closed_form.record(&standing.run, &closed_form.quality(&standing.run)?);
+        let record = whole.record(&still, &whole.quality(&still)?);
         record.write(&closed.join("calibration.json"), false)?;
         write_report(&document, &root.join("report"))?;
         directory.commit()?;
@@ -109,9 +133,56 @@ impl Demo {
     }
 }
 
-/// The static positions and what the closed form makes of them.
-fn static_positions(seed: Option<u64>) -> anyhow::Result<(Simulated, ClosedForm)> {
-    let standing = simulated(&Scenario::load("demo-six-position")?, seed)?;
-    let closed_form = calibration::six_position(&standing.run, FORM)?;
-    Ok((standing, closed_form))
+/// The static positions that the paper's closed form takes.
+fn static_positions(seed: Option<u64>) -> anyhow::Result<Simulated> {
+    simulated(&Scenario::load("demo-six-position")?, seed)
+}
+
+/// The closed form from the first part of each dwell that makes this part of the run's time.
+fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
+    let imu = &problem.run().recording.imu;
+    let seconds = |dwell: &Dwell| dwell.samples.len() as f64 * imu.period;
+    let at_rest: f64 = problem.dwells().map(seconds).sum();
+    let moves = imu.duration() - at_rest;
+    let part = (part * imu.duration() - moves) / at_rest;
+    let dwells = problem.dwells();
+    let dwells: Vec<Dwell> = dwells
+        .map(|dwell| dwell.first_seconds(part * seconds(dwell), imu))
+        .collect();
+    Ok(calibration::six_position_of(problem, &dwells)?)
+}
+
+/// Navigates 40 h by each estimate, stationary and in flight.
+fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::Result<Vec<Flown>> {
+    let (flight, _) = models::trajectory("flight", &Place::Embedded)?;
+    let still = Mission::standing_level(&run.site, FORTY_HOURS);
+    let flying = Mission {
+        motion: Motion::Moving(flight.at_latitude(run.site.latitude)),
+        ..still.clone()
+    };
+    let missions = [
+        (
+            "stationary and level",
+            "Stationary, gyro bias makes nearly all of the error, and only time at rest lowers its σ.",
+            still,
+        ),
+        (
+            "in flight",
+            "In flight turns and accelerations expose scale factors and installation, which the filter \
+             observes in minutes.",
+            flying,
+        ),
+    ];
+    let missions = missions.into_iter().map(|(how, shows, mission)| {
+        let ends = estimates.par_iter().map(|estimate| {
+            let outlook = mission.outlook(estimate, Some(truth))?;
+            outlook.into_iter().last().context("no navigation")
+        });
+        Ok(Flown {
+            how,
+            shows,
+            ends: ends.collect::<anyhow::Result<_>>()?,
+        })
+    });
+    missions.collect()
 }

@@ -4,9 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use turncal::export;
-use turncal::run::{CalibrationRecord, Run, write_whole};
+use turncal::calibration::result::Calibration;
+use turncal::formats::export;
+use turncal::formats::write_whole;
+use turncal::run::Run;
 
+use super::input::run_file;
 use super::output::{keep, print};
 
 /// Writes a calibration as what other programs read
@@ -16,8 +19,9 @@ use super::output::{keep, print};
 /// a format cannot hold is said in the file and on standard error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal export result/calibration.json --format c -o turncal_calibration.h
-  turncal export result/calibration.json --format kalibr --run my-run/run.toml -o imu.yaml
+  turncal export result/calibration.json --format c -o imu.h
+  turncal export result/calibration.json --format kalibr \\
+      --run my-run/run.toml -o imu.yaml
   turncal export result/calibration.json --format text")]
 pub struct Export {
     /// The calibration
@@ -27,7 +31,7 @@ pub struct Export {
     #[arg(long, value_enum)]
     format: Format,
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
-    #[arg(long, value_name = "RUN.toml")]
+    #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
@@ -65,14 +69,14 @@ impl From<Format> for export::Format {
 
 impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
-        let record = CalibrationRecord::read(&self.calibration)?;
+        let record = Calibration::read(&self.calibration)?;
         let run = self.run.as_deref().map(Run::read).transpose()?;
         let exported = export::write(&record, self.format.into(), run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;
         let text = exported.text.as_bytes();
         match &self.output {
             Some(output) => {
-                let files = run.iter().flat_map(|run| &run.files);
+                let files = run.iter().flat_map(|run| &run.recording.files);
                 keep(output, files.chain([&self.calibration]))?;
                 write_whole(output, text, self.force)?;
             }

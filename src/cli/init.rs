@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::draft::Draft;
-use turncal::run::write_whole;
+use turncal::formats::draft::Draft;
+use turncal::formats::write_whole;
 
 use super::output::{keep, print};
 use super::progress::Activity;

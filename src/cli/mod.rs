@@ -2,20 +2,31 @@
 
 mod allan;
 mod apply;
-mod block;
 mod calibrate;
 mod check;
 mod compare;
+mod completions;
 mod demo;
+mod error_term;
 mod export;
 mod init;
+mod input;
+mod list;
+mod man;
 mod names;
 mod navigate;
 mod noise;
 mod output;
 mod progress;
+mod signals;
 mod simulate;
 mod study;
+#[cfg(test)]
+mod tests;
+mod threads;
+
+pub use signals::leave_nothing_behind;
+pub use threads::with_threads;
 
 use clap::{Parser, Subcommand};
 
@@ -25,8 +36,13 @@ use clap::{Parser, Subcommand};
     version,
     arg_required_else_help = true,
     after_help = "\
-Begin with:  turncal demo
-Then:        turncal calibrate my-run/run.toml -o my-calibration"
+Begin with:
+  turncal demo
+
+With a log of your own:
+  turncal init imu.csv -o run.toml
+  turncal check run.toml
+  turncal calibrate run.toml"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -47,6 +63,9 @@ enum Command {
     Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
+    List(list::List),
+    Completions(completions::Completions),
+    Man(man::Manual),
 }
 
 impl Cli {
@@ -65,6 +84,9 @@ impl Cli {
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
+            Command::List(list) => list.run(),
+            Command::Completions(completions) => completions.run(),
+            Command::Man(manual) => manual.run(),
         }
     }
 }

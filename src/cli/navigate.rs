@@ -7,14 +7,15 @@ use clap::ValueEnum;
 use nalgebra::Vector3;
 use turncal::attitude::from_pitch_roll_heading;
 use turncal::calibration::Named;
+use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
 use turncal::report::navigation::Navigation;
-use turncal::run::CalibrationRecord;
 use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
 use turncal::units::DEGREE;
 
+use super::input::{hours, latitude, number};
 use super::names::short_names;
 use super::output::Delivery;
 use super::progress::Activity;
@@ -26,14 +27,17 @@ const LARGEST_PITCH: f64 = 89.0;
 /// The navigation error that a calibration's errors cause
 ///
 /// Navigates with the instrument of --truth, taken for that of the calibration, from perfect alignment,
-/// its height held to the true one: standing at a place, or along a trajectory. Shows errors of
+/// its height held to the true one: at rest, or along a trajectory. Shows errors of
 /// attitude, velocity and position, and the σ of them that the calibration's covariance predicts.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
-  turncal navigate calibration.json --truth truth.json --latitude-deg 45
-  turncal navigate calibration.json --truth truth.json --trajectory flight --hours 3 -o flight
-  turncal navigate monday.json --truth friday.json --latitude-deg -33.9 --errors gyro --json")]
+  turncal navigate calibration.json --truth truth.json \\
+      --latitude-deg 45
+  turncal navigate calibration.json --truth truth.json \\
+      --trajectory flight --hours 3 -o flight
+  turncal navigate monday.json --truth friday.json \\
+      --latitude-deg -33.9 --errors gyro --json")]
 pub struct Navigate {
     /// The calibration that navigation uses
     #[arg(value_name = "CALIBRATION.json")]
@@ -41,7 +45,7 @@ pub struct Navigate {
     /// What the instrument truly is: a truth.json or another calibration
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Latitude, north positive [default: the trajectory's]
+    /// Latitude in degrees, north positive [default: the trajectory's]
     #[arg(
         long,
         value_name = "L",
@@ -50,10 +54,10 @@ pub struct Navigate {
         value_parser = latitude
     )]
     latitude_deg: Option<f64>,
-    /// Height above the ellipsoid [default: 0, or the trajectory's, which moves with it]
+    /// Height above the ellipsoid in metres [default: 0, or the trajectory's, which moves with it]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
     height_m: Option<f64>,
-    /// Attitude while standing
+    /// Attitude at rest, in degrees
     #[arg(
         long,
         value_name = "PITCH,ROLL,HEADING",
@@ -63,13 +67,13 @@ pub struct Navigate {
         value_parser = attitude
     )]
     attitude_deg: Attitude,
-    /// Whose errors
+    /// Which triad's errors
     #[arg(long, value_enum, default_value_t = Errors::Both)]
     errors: Errors,
-    /// How long, to the minute, up to 1000
-    #[arg(long, default_value_t = 40.0, value_parser = hours)]
+    /// How many hours, to the minute, up to 1000
+    #[arg(long, default_value_t = 40.0, allow_negative_numbers = true, value_parser = hours)]
     hours: f64,
-    /// Move instead of standing: a TOML file or an embedded name (flight, vehicle)
+    /// Move instead of resting: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
     #[command(flatten)]
@@ -105,8 +109,8 @@ impl Navigate {
         let paths = [self.calibration.as_path(), self.truth.as_path()];
         let names = short_names(&paths);
         let [calibration, truth] = [
-            CalibrationRecord::read(&self.calibration)?,
-            CalibrationRecord::read(&self.truth)?,
+            Calibration::read(&self.calibration)?,
+            Calibration::read(&self.truth)?,
         ];
         let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
             .map(|(name, record)| Named { name, record });
@@ -173,28 +177,8 @@ impl Navigate {
     }
 }
 
-/// A number between two others.
-fn number(text: &str, low: f64, high: f64) -> Result<f64, String> {
-    let expected = || format!("expected a number from {low} to {high}");
-    let value: f64 = text.trim().parse().map_err(|_| expected())?;
-    if (low..=high).contains(&value) {
-        Ok(value)
-    } else {
-        Err(expected())
-    }
-}
-
-fn latitude(text: &str) -> Result<f64, String> {
-    number(text, -90.0, 90.0)
-}
-
 fn height(text: &str) -> Result<f64, String> {
     number(text, -12e3, 1e5)
-}
-
-/// Hours of a navigation.
-pub(super) fn hours(text: &str) -> Result<f64, String> {
-    number(text, INTERVAL / HOUR, 1000.0)
 }
 
 fn attitude(text: &str) -> Result<Attitude, String> {

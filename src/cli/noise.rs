@@ -3,6 +3,7 @@
 use turncal::noise::conventions::{convert, known};
 use turncal::report::conversion;
 
+use super::input::positive;
 use super::output::show;
 
 /// A noise figure in every convention: data sheets, Kalibr, PSINS, KF-GINS
@@ -19,13 +20,13 @@ use super::output::show;
 Units, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 and the like:\n{}", known()))]
 pub struct Noise {
     /// The figure
-    #[arg(value_name = "VALUE", value_parser = positive)]
+    #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]
     value: f64,
     /// Its unit, or the name that a program has for it
     #[arg(value_name = "UNIT")]
     unit: String,
     /// Sample rate in Hz, for the noise of each sample
-    #[arg(long, value_name = "HZ", value_parser = positive)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     rate: Option<f64>,
     /// Print the figures as one JSON document and nothing else
     #[arg(long)]
@@ -36,12 +37,5 @@ impl Noise {
     pub fn run(&self) -> anyhow::Result<()> {
         let conversion = convert(self.value, &self.unit, self.rate)?;
         show(&conversion::document(&conversion), self.json)
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("expected a number above zero".to_owned()),
     }
 }

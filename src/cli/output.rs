@@ -4,21 +4,21 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use terminal_size::{Width, terminal_size_of};
+use turncal::formats::FileError;
+use turncal::formats::WholeDirectory;
 use turncal::report::{self, Document, terminal};
-use turncal::run::{RunError, WholeDirectory};
 
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Overwrite {
-    /// Replace the output directory if it exists
+    /// Replace the output directory if it exists and holds only what turncal wrote
     #[arg(long)]
     force: bool,
 }
 
 impl Overwrite {
     /// Begins an output directory; none of `inputs` may lie in it.
-    pub fn directory(self, target: &Path, inputs: &[&Path]) -> Result<WholeDirectory, RunError> {
+    pub fn directory(self, target: &Path, inputs: &[&Path]) -> Result<WholeDirectory, FileError> {
         WholeDirectory::create(target, self.force, inputs)
     }
 }
@@ -40,11 +40,11 @@ pub struct Delivery {
 impl Delivery {
     /// Begins the directory, if one is asked for, so that long work is not done in vain; none of
     /// `inputs` may lie in it.
-    pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, RunError> {
+    pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, FileError> {
         let target = self.output.as_deref();
         let begun = target.map(|target| {
             let whole = self.overwrite.directory(target, inputs)?;
-            Ok::<_, RunError>((target, whole))
+            Ok::<_, FileError>((target, whole))
         });
         Ok(Begun {
             directory: begun.transpose()?,
@@ -80,14 +80,9 @@ impl Begun<'_> {
 pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
     let text = match json {
         true => report::json(document),
-        false => terminal::text(document, width()),
+        false => terminal::text(document, columns().map(usize::from)),
     };
     print(text.as_bytes())
-}
-
-/// Letters in a line of the terminal; none where output goes to a file or a pipe.
-fn width() -> Option<usize> {
-    terminal_size_of(io::stdout()).map(|(Width(width), _)| usize::from(width))
 }
 
 /// Refuses an output file that is one of the inputs: not even force replaces those.
@@ -107,6 +102,12 @@ pub fn keep<'a>(
         );
     }
     Ok(())
+}
+
+/// How wide standard output is: that of its terminal, else what COLUMNS says, else without limit.
+pub fn columns() -> Option<u16> {
+    let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
+    terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
 }
 
 /// Writes to standard output. A reader that has seen enough, such as `head`, is no failure.

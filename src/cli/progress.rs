@@ -1,12 +1,18 @@
 //! Progress on a terminal; nothing where standard error is a file or a pipe.
 
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use turncal::calibration::outcome::Pass;
+use turncal::calibration::Pass;
 
 /// What is being done, with the time it has taken.
-pub struct Activity(ProgressBar);
+pub struct Activity {
+    bar: ProgressBar,
+    /// Goes to end the thread that moves the time on.
+    ticking: Option<Sender<()>>,
+}
 
 impl Activity {
     /// Begins to show an activity.
@@ -15,20 +21,24 @@ impl Activity {
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed:>4}") {
             bar.set_style(style);
         }
-        bar.enable_steady_tick(Duration::from_millis(100));
-        Self(bar)
+        let ticking = if bar.is_hidden() { None } else { tick(&bar) };
+        Self { bar, ticking }
     }
 
     /// Says what comes next.
     pub fn next(&self, message: impl Into<String>) {
-        self.0.set_message(message.into());
+        self.bar.set_message(message.into());
     }
 
     /// Tells of a pass of the filter.
     pub fn pass(&self, pass: &Pass) {
-        let kind = if pass.live { "live" } else { "held" };
+        let kind = if pass.feedback {
+            "first pass"
+        } else {
+            "Gauss–Newton iteration"
+        };
         self.next(format!(
-            "{kind} pass done, largest step {:.2} σ",
+            "{kind} done, largest step {:.2} σ",
             pass.largest_step
         ));
     }
@@ -36,8 +46,22 @@ impl Activity {
 
 impl Drop for Activity {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.ticking = None;
+        self.bar.finish_and_clear();
     }
+}
+
+/// Moves the time on until the sender goes. Indicatif's own ticker panics where no thread can be started;
+/// here the time stands still until the next message.
+fn tick(bar: &ProgressBar) -> Option<Sender<()>> {
+    let (ticking, end) = mpsc::channel();
+    let bar = bar.clone();
+    let ticker = move || {
+        while end.recv_timeout(Duration::from_millis(100)) == Err(RecvTimeoutError::Timeout) {
+            bar.tick();
+        }
+    };
+    thread::Builder::new().spawn(ticker).ok().map(|_| ticking)
 }
 
 /// How many of a known number of runs are done.

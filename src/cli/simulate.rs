@@ -4,19 +4,21 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::TermRecord;
 use turncal::calibration::truth_record;
-use turncal::imu::{FURTHER, Term};
-use turncal::run::record::TermRecord;
-use turncal::run::{CalibrationRecord, write_run};
+use turncal::formats::write_run;
+use turncal::imu::{TERM_PARAMETERS, Term};
 use turncal::simulation::{Scenario, Simulated};
 
+use super::input::seed;
 use super::output::Overwrite;
 use super::progress::Activity;
 
 /// Makes a run directory with known truth from a scenario
 ///
-/// The scenario is a TOML file or the name of an embedded one: demo, demo-six-position,
-/// nineteen-position, two-axis, mems.
+/// Writes run.toml, the logs that it names and truth.json. The scenario is a TOML file or the name of an
+/// embedded one; turncal list shows them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7")]
 pub struct Simulate {
@@ -26,7 +28,7 @@ pub struct Simulate {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     overwrite: Overwrite,
@@ -46,7 +48,7 @@ impl Simulate {
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             eprintln!(
-                "note: the axes of the simulated table are not square, which the quaternions of its log \
+                "note: the axes of the simulated table are not orthogonal, which the quaternions of its log \
                  cannot tell: a calibration from these files will claim too small σ of installation. \
                  turncal study accuracy estimates their tilts."
             );
@@ -54,7 +56,7 @@ impl Simulate {
         eprintln!(
             "{}: {:.0} s written to {}",
             scenario.name,
-            simulated.run.imu.duration(),
+            simulated.run.recording.imu.duration(),
             self.output.display()
         );
         Ok(())
@@ -70,9 +72,9 @@ pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simul
 
 /// The true parameters of the terms that are on.
 fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
-    let on = (0..FURTHER).filter(|&k| simulated.run.further_sigma[k] > 0.0);
+    let on = (0..TERM_PARAMETERS).filter(|&k| simulated.run.instrument.term_sigma[k] > 0.0);
     let term = |k: usize| {
-        let (value, sigma) = (simulated.further[k], None);
+        let (value, sigma) = (simulated.terms[k], None);
         Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
     };
     on.filter_map(term).collect()
@@ -80,7 +82,7 @@ fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
 
 /// Writes a simulated run with its truth into a directory that is there.
 pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
-    let truth = CalibrationRecord {
+    let truth = Calibration {
         terms: true_terms(simulated),
         ..truth_record(&simulated.truth, &simulated.run)
     };

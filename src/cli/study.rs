@@ -9,6 +9,7 @@ use clap::Subcommand;
 /// Answers a question with many simulated runs
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
+#[command(after_help = "Example:  turncal study accuracy --runs 500 -o accuracy")]
 pub struct Study {
     #[command(subcommand)]
     question: Question,

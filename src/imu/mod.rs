@@ -8,14 +8,18 @@
 
 use serde::{Deserialize, Serialize};
 
+mod body_frame;
 mod installation;
+mod instrument;
 mod signal;
 mod terms;
 mod triad;
 
+pub use body_frame::BodyFrame;
 pub use installation::{ANGLES, InstallationForm};
-pub use signal::{Instability, Noise, NoiseSource, Output, Pulses};
-pub use terms::{FURTHER, FurtherResponse, FurtherVector, Sensed, Term};
+pub use instrument::Instrument;
+pub use signal::{GaussMarkov, Noise, NoiseSource, Output, Pulses};
+pub use terms::{Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 
 /// Names of the body axes, in order.

@@ -1,4 +1,4 @@
-//! From an ideal output to what a sample of the instrument holds: noise, instability, pulses.
+//! From an ideal output to what a sample of the instrument holds: noise, Gauss–Markov bias, pulses.
 
 use nalgebra::Vector3;
 use rand::Rng;
@@ -20,13 +20,13 @@ pub enum Output {
 pub struct Noise {
     /// Angle random walk in rad/√s, or velocity random walk in (m/s)/√s.
     pub random_walk: f64,
-    /// Slow wandering of the bias.
-    pub instability: Option<Instability>,
+    /// Gauss–Markov bias.
+    pub gauss_markov: Option<GaussMarkov>,
 }
 
-/// A bias that wanders as a stationary first-order Gauss–Markov process.
+/// A bias that varies as a stationary first-order Gauss–Markov process.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instability {
+pub struct GaussMarkov {
     /// Stationary 1σ in rad/s or m/s².
     pub sigma: f64,
     /// Correlation time in s.
@@ -38,7 +38,7 @@ pub struct Instability {
 pub struct NoiseSource {
     noise: Noise,
     period: f64,
-    wander: Vector3<f64>,
+    bias: Vector3<f64>,
 }
 
 fn normal(rng: &mut impl Rng) -> Vector3<f64> {
@@ -46,30 +46,30 @@ fn normal(rng: &mut impl Rng) -> Vector3<f64> {
 }
 
 impl NoiseSource {
-    /// A source for samples of this period in s; the wandering bias starts from its stationary
+    /// A source for samples of this period in s; the Gauss–Markov bias starts from its stationary
     /// distribution.
     pub fn new(noise: Noise, period: f64, rng: &mut impl Rng) -> Self {
-        let wander = noise
-            .instability
-            .map_or_else(Vector3::zeros, |instability| {
-                normal(rng) * instability.sigma
+        let bias = noise
+            .gauss_markov
+            .map_or_else(Vector3::zeros, |gauss_markov| {
+                normal(rng) * gauss_markov.sigma
             });
         Self {
             noise,
             period,
-            wander,
+            bias,
         }
     }
 
     /// The noise in the integral of the next sample's output, rad or m/s.
     pub fn draw(&mut self, rng: &mut impl Rng) -> Vector3<f64> {
         let white = normal(rng) * (self.noise.random_walk * self.period.sqrt());
-        if let Some(instability) = self.noise.instability {
-            let keep = (-self.period / instability.correlation_time).exp();
-            self.wander =
-                self.wander * keep + normal(rng) * (instability.sigma * (1.0 - keep * keep).sqrt());
+        if let Some(gauss_markov) = self.noise.gauss_markov {
+            let keep = (-self.period / gauss_markov.correlation_time).exp();
+            self.bias =
+                self.bias * keep + normal(rng) * (gauss_markov.sigma * (1.0 - keep * keep).sqrt());
         }
-        white + self.wander * self.period
+        white + self.bias * self.period
     }
 }
 
@@ -113,7 +113,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let noise = Noise {
             random_walk: 2.0,
-            instability: None,
+            gauss_markov: None,
         };
         let runs = 2000;
         let mut sum_of_squares = 0.0;
@@ -128,22 +128,31 @@ mod tests {
     }
 
     #[test]
-    fn instability_keeps_its_stationary_sigma() {
+    fn instability_keeps_its_stationary_sigma_and_forgets_with_its_correlation_time() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let instability = Instability {
+        let gauss_markov = GaussMarkov {
             sigma: 3.0,
             correlation_time: 1.0,
         };
         let noise = Noise {
             random_walk: 0.0,
-            instability: Some(instability),
+            gauss_markov: Some(gauss_markov),
         };
         let mut source = NoiseSource::new(noise, 0.5, &mut rng);
         let draws = 40_000;
-        let mean_square = (0..draws)
-            .map(|_| (source.draw(&mut rng) / 0.5).norm_squared() / 3.0)
-            .sum::<f64>()
-            / f64::from(draws);
-        assert!((mean_square / 9.0 - 1.0).abs() < 0.05);
+        let drift: Vec<Vector3<f64>> = (0..draws).map(|_| source.draw(&mut rng) / 0.5).collect();
+        let mean_product = |lag: usize| {
+            let pairs = drift.iter().zip(&drift[lag..]);
+            pairs.map(|(a, b)| a.dot(b)).sum::<f64>() / (3 * (drift.len() - lag)) as f64
+        };
+        assert!((mean_product(0) / 9.0 - 1.0).abs() < 0.05);
+        for lag in [1, 2, 4] {
+            let correlation = mean_product(lag) / mean_product(0);
+            let expected = (-0.5 * lag as f64).exp();
+            assert!(
+                (correlation - expected).abs() < 0.03,
+                "{lag}: {correlation}"
+            );
+        }
     }
 }

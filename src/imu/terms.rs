@@ -1,4 +1,4 @@
-//! Further error terms of an instrument, beside `K`, `E` and `D`: each changes what a triad takes for
+//! Error terms of an instrument, beside `K`, `E` and `D`: each changes what a triad takes for
 //! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -8,13 +8,13 @@ use crate::attitude::exp;
 use crate::units::{DEG_PER_H, MICRO_G, PPM, STANDARD_GRAVITY};
 
 /// Number of parameters of all terms.
-pub const FURTHER: usize = 22;
+pub const TERM_PARAMETERS: usize = 22;
 /// The parameters of all terms, in the order of [`Term::ALL`]; zero where a term is off.
-pub type FurtherVector = SVector<f64, FURTHER>;
+pub type TermVector = SVector<f64, TERM_PARAMETERS>;
 /// What each parameter adds to the input of a triad.
-pub type FurtherResponse = SMatrix<f64, 3, FURTHER>;
+pub type TermResponse = SMatrix<f64, 3, TERM_PARAMETERS>;
 
-/// A further error term.
+/// An error term.
 ///
 /// Source: IEEE Std 1293-2018, §5.3 (accelerometers: second order, asymmetry); IEEE Std 952-2020, §5
 /// (gyros: acceleration sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect,
@@ -138,7 +138,7 @@ impl Term {
 
 impl Sensed {
     /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².
-    pub fn added(&self, sensor: Sensor, q: &FurtherVector) -> Vector3<f64> {
+    pub fn added(&self, sensor: Sensor, q: &TermVector) -> Vector3<f64> {
         let of = |term: Term| q.rows_range(term.parameters());
         let f = &self.force;
         match sensor {
@@ -167,8 +167,8 @@ impl Sensed {
 
     /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter, where the parameters are
     /// these. Only that of the time offset depends on them.
-    pub fn response(&self, sensor: Sensor, q: &FurtherVector) -> FurtherResponse {
-        let mut response = FurtherResponse::zeros();
+    pub fn response(&self, sensor: Sensor, q: &TermVector) -> TermResponse {
+        let mut response = TermResponse::zeros();
         let f = &self.force;
         match sensor {
             Sensor::Gyro => {
@@ -229,13 +229,15 @@ mod tests {
     #[test]
     fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
         let sensed = any();
-        let mut names: Vec<String> = (0..FURTHER).map_while(Term::parameter_name).collect();
+        let mut names: Vec<String> = (0..TERM_PARAMETERS)
+            .map_while(Term::parameter_name)
+            .collect();
         names.sort();
         names.dedup();
-        assert_eq!(names.len(), FURTHER);
-        assert_eq!(Term::parameter_name(FURTHER), None);
-        let q = FurtherVector::zeros();
-        for parameter in 0..FURTHER {
+        assert_eq!(names.len(), TERM_PARAMETERS);
+        assert_eq!(Term::parameter_name(TERM_PARAMETERS), None);
+        let q = TermVector::zeros();
+        for parameter in 0..TERM_PARAMETERS {
             let sensor = Term::of(parameter).unwrap().sensor();
             for of in Sensor::ALL {
                 let responds = sensed.response(of, &q).column(parameter).norm() > 0.0;
@@ -253,7 +255,7 @@ mod tests {
             angular_acceleration: Vector3::new(0.0, 0.0, 3.0),
             force: Vector3::new(1.0, 0.0, 0.0),
         };
-        let mut q = FurtherVector::zeros();
+        let mut q = TermVector::zeros();
         q[Term::SizeEffect.parameters().start] = 0.1;
         q[Term::SizeEffect.parameters().start + 1] = 0.2;
         let added = sensed.added(Sensor::Accel, &q);
@@ -262,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_of_a_later_time_see_gravity_turned_further() {
+    fn samples_of_a_later_time_sense_gravity_turned_more() {
         let rate = Vector3::new(0.0, 0.4, 0.0);
         let up = |t: f64| crate::attitude::exp(-rate * t) * Vector3::new(0.0, 0.0, 9.8);
         let sensed = Sensed {
@@ -272,7 +274,7 @@ mod tests {
             force: up(1.0),
         };
         let offset = 0.02;
-        let mut q = FurtherVector::zeros();
+        let mut q = TermVector::zeros();
         q[Term::TimeOffset.parameters().start] = offset;
         let added = sensed.added(Sensor::Accel, &q);
         assert!((up(1.0 + offset) - up(1.0) - added).norm() < 1e-13);
@@ -281,11 +283,11 @@ mod tests {
     #[test]
     fn the_response_is_the_derivative_of_what_is_added() {
         let sensed = any();
-        let q = FurtherVector::from_fn(|k, _| 1e-3 * (k as f64 - 7.0));
+        let q = TermVector::from_fn(|k, _| 1e-3 * (k as f64 - 7.0));
         for sensor in Sensor::ALL {
             let response = sensed.response(sensor, &q);
-            for k in 0..FURTHER {
-                let mut step = FurtherVector::zeros();
+            for k in 0..TERM_PARAMETERS {
+                let mut step = TermVector::zeros();
                 step[k] = 1e-5;
                 let difference =
                     sensed.added(sensor, &(q + step)) - sensed.added(sensor, &(q - step));

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{
-    ANGLES, FurtherVector, Instability, InstallationForm, Noise, PerSensor, Prior, Sensor, Term,
+    ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -22,8 +22,8 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// How one instrument of the grade differs from the next before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of the parameters of its further terms, around zero; zero where it has none.
-    pub further_sigma: FurtherVector,
+    /// 1σ of the parameters of its error terms, around zero; zero where it has none.
+    pub term_sigma: TermVector,
 }
 
 /// How a triad's scale factors and biases differ between instruments of a grade.
@@ -129,14 +129,14 @@ impl Instrument {
             noise: PerSensor {
                 gyro: Noise {
                     random_walk: gyro.angle_random_walk_deg_per_sqrt_h.0 * DEG_PER_SQRT_H,
-                    instability: gyro.instability.map(|i| Instability {
+                    gauss_markov: gyro.gauss_markov.map(|i| GaussMarkov {
                         sigma: i.sigma_deg_per_h.0 * DEG_PER_H,
                         correlation_time: i.correlation_time_s.0,
                     }),
                 },
                 accel: Noise {
                     random_walk: accel.velocity_random_walk_ug_per_sqrt_hz.0 * MICRO_G_PER_SQRT_HZ,
-                    instability: accel.instability.map(|i| Instability {
+                    gauss_markov: accel.gauss_markov.map(|i| GaussMarkov {
                         sigma: i.sigma_ug.0 * MICRO_G,
                         correlation_time: i.correlation_time_s.0,
                     }),
@@ -152,7 +152,7 @@ impl Instrument {
                     bias: accel.bias_ug.times(MICRO_G),
                 },
             },
-            further_sigma: terms.in_si(),
+            term_sigma: terms.in_si(),
         })
     }
 
@@ -184,7 +184,7 @@ struct InstrumentFile {
     terms: TermsFile,
 }
 
-/// Further terms, each as in a run's `[imu.terms]`.
+/// Error terms, each as in a run's `[imu.terms]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 struct TermsFile {
@@ -202,8 +202,8 @@ struct TermFile {
 }
 
 impl TermsFile {
-    fn in_si(&self) -> FurtherVector {
-        let mut sigma = FurtherVector::zeros();
+    fn in_si(&self) -> TermVector {
+        let mut sigma = TermVector::zeros();
         for term in Term::ALL {
             let given = match term {
                 Term::AccelSecondOrder => self.accel_second_order,
@@ -225,7 +225,8 @@ impl TermsFile {
 struct GyroFile {
     pulse_arcsec: Positive,
     angle_random_walk_deg_per_sqrt_h: NonNegative,
-    instability: Option<GyroInstabilityFile>,
+    #[serde(alias = "instability")]
+    gauss_markov: Option<GyroGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_deg_per_h: SpreadFile,
 }
@@ -235,21 +236,22 @@ struct GyroFile {
 struct AccelFile {
     pulse_um_per_s: Positive,
     velocity_random_walk_ug_per_sqrt_hz: NonNegative,
-    instability: Option<AccelInstabilityFile>,
+    #[serde(alias = "instability")]
+    gauss_markov: Option<AccelGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_ug: SpreadFile,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct GyroInstabilityFile {
+struct GyroGaussMarkovFile {
     sigma_deg_per_h: NonNegative,
     correlation_time_s: Positive,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct AccelInstabilityFile {
+struct AccelGaussMarkovFile {
     sigma_ug: NonNegative,
     correlation_time_s: Positive,
 }

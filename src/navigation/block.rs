@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::increments::Increments;
 use super::state::State;
 use crate::attitude::skew;
-use crate::imu::{FurtherResponse, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, Triad};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, TermResponse, Triad};
 
 /// Attitude, velocity and position error.
 pub const NAVIGATION: usize = 9;
@@ -33,16 +33,16 @@ pub struct Block {
     pub navigation: BlockMatrix,
     /// Transition from the parameter errors of each triad.
     pub parameters: PerSensor<ParameterBlock>,
-    /// Transition from the parameter errors of further terms that are on.
-    pub further: Vec<FurtherColumn>,
+    /// Transition from the parameter errors of error terms that are on.
+    pub terms: Vec<TermColumn>,
     /// Covariance that noise adds to the navigation errors.
     pub noise: BlockMatrix,
 }
 
-/// What the error of one further parameter makes of the navigation errors.
+/// What the error of one term parameter makes of the navigation errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FurtherColumn {
-    /// The parameter's index among [`crate::imu::FURTHER`].
+pub struct TermColumn {
+    /// The parameter's index among [`crate::imu::TERM_PARAMETERS`].
     pub parameter: usize,
     /// Navigation errors by the parameter's error, true − estimated.
     pub column: SVector<f64, NAVIGATION>,
@@ -63,12 +63,12 @@ pub(super) struct Moments {
     /// ∫f_n dt.
     force: Vector3<f64>,
     duration: f64,
-    further: Vec<FurtherMoment>,
+    terms: Vec<TermMoment>,
 }
 
-/// Integrals of what one further parameter does.
+/// Integrals of what one term parameter does.
 #[derive(Debug, Clone)]
-struct FurtherMoment {
+struct TermMoment {
     parameter: usize,
     sensor: Sensor,
     /// ∫C_b_n ∂t/∂q dt.
@@ -78,10 +78,10 @@ struct FurtherMoment {
 }
 
 impl Moments {
-    /// Of no time, with these further parameters on.
-    pub(super) fn with_further(parameters: &[usize]) -> Self {
+    /// Of no time, with these term parameters on.
+    pub(super) fn with_terms(parameters: &[usize]) -> Self {
         let moment = |&parameter: &usize| {
-            Some(FurtherMoment {
+            Some(TermMoment {
                 parameter,
                 sensor: Term::of(parameter)?.sensor(),
                 input: Vector3::zeros(),
@@ -89,21 +89,21 @@ impl Moments {
             })
         };
         Self {
-            further: parameters.iter().filter_map(moment).collect(),
+            terms: parameters.iter().filter_map(moment).collect(),
             ..Self::default()
         }
     }
 
-    /// Adds a sample's worth of further terms: attitude at its middle, response of both triads, velocity
+    /// Adds a sample's worth of error terms: attitude at its middle, response of both triads, velocity
     /// change by specific force in `n`.
-    pub(super) fn add_further(
+    pub(super) fn add_terms(
         &mut self,
         attitude: &Matrix3<f64>,
-        responses: &PerSensor<FurtherResponse>,
+        responses: &PerSensor<TermResponse>,
         force: &Vector3<f64>,
         period: f64,
     ) {
-        for moment in &mut self.further {
+        for moment in &mut self.terms {
             let response = responses.get(moment.sensor).column(moment.parameter);
             let step = attitude * response * period;
             moment.tilt += force.cross(&(moment.input + step * 0.5));
@@ -156,21 +156,21 @@ impl Moments {
             accel: integrals(attitude.tr_mul(force)).into(),
             force: force * duration,
             duration,
-            further: Vec::new(),
+            terms: Vec::new(),
         }
     }
 
-    /// Adds further terms to those of a body that stands.
-    pub(super) fn stand_further(
+    /// Adds error terms to those of a body that stands.
+    pub(super) fn stand_terms(
         &mut self,
         parameters: &[usize],
         attitude: &Matrix3<f64>,
-        responses: &PerSensor<FurtherResponse>,
+        responses: &PerSensor<TermResponse>,
     ) {
-        self.further = Self::with_further(parameters).further;
+        self.terms = Self::with_terms(parameters).terms;
         // A tilt that grows evenly acts on the force of the whole time for half of it, as in a sample.
         let (force, duration) = (self.force, self.duration);
-        self.add_further(attitude, responses, &force, duration);
+        self.add_terms(attitude, responses, &force, duration);
     }
 
     /// The block of these integrals. `noise` is the covariance, in `n`, that white noise of each triad
@@ -217,7 +217,7 @@ impl Moments {
                 .copy_from(&(velocity * (t / 2.0)));
         }
 
-        let further = self.further.iter().map(|moment| {
+        let terms = self.terms.iter().map(|moment| {
             let mut column = SVector::<f64, NAVIGATION>::zeros();
             let mut set = |row: usize, v: Vector3<f64>| {
                 column.fixed_rows_mut::<3>(3 * row).copy_from(&v);
@@ -233,7 +233,7 @@ impl Moments {
                     set(2, moment.input * (t / 2.0));
                 }
             }
-            FurtherColumn {
+            TermColumn {
                 parameter: moment.parameter,
                 column,
             }
@@ -244,7 +244,7 @@ impl Moments {
             duration: t,
             navigation,
             parameters,
-            further: further.collect(),
+            terms: terms.collect(),
             noise: self.noise(noise),
         }
     }

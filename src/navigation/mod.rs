@@ -20,13 +20,13 @@ mod state;
 mod strapdown;
 mod trajectory;
 
-pub use block::{Block, BlockMatrix, FurtherColumn, NAVIGATION, ParameterBlock};
+pub use block::{Block, BlockMatrix, NAVIGATION, ParameterBlock, TermColumn};
 pub use error_model::{
     ErrorMatrix, ErrorModel, ErrorVector, InputMatrix, Sensitivity, Transition, sensed_errors,
 };
 pub use increments::{Increments, Motion};
 pub use navigation_error::NavigationError;
-pub use site_fixed::{FurtherTerms, Navigator};
+pub use site_fixed::{Navigator, TermValues};
 pub use state::State;
 pub(crate) use strapdown::within_reach;
 pub use strapdown::{Height, LARGEST_LATITUDE, NearPole, Solution, Strapdown};

@@ -9,30 +9,30 @@ use super::increments::Increments;
 use super::state::State;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
-use crate::imu::{FurtherResponse, FurtherVector, PerSensor, Sensed, Sensor, Triad};
-use crate::run::ImuRecord;
+use crate::imu::{PerSensor, Sensed, Sensor, TermResponse, TermVector, Triad};
+use crate::recording::ImuSamples;
 
 /// Navigates through a record with given triads and accumulates the error model as it goes.
 #[derive(Debug, Clone)]
 pub struct Navigator<'a> {
-    imu: &'a ImuRecord,
+    imu: &'a ImuSamples,
     random_walk: PerSensor<f64>,
     gravity: Vector3<f64>,
     earth_rate: Vector3<f64>,
     earth_turn: Matrix3<f64>,
     instrument: PerSensor<Instrument>,
-    further: FurtherTerms,
+    terms: TermValues,
     /// Where navigation stands.
     pub state: State,
 }
 
-/// Further terms of the instrument that navigation knows of.
+/// Error terms of the instrument that navigation knows of.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct FurtherTerms {
+pub struct TermValues {
     /// Parameters that are on, whatever their values.
     pub on: Vec<usize>,
     /// Values of all parameters; zero where off.
-    pub values: FurtherVector,
+    pub values: TermVector,
 }
 
 /// A triad, ready for use sample by sample.
@@ -48,7 +48,7 @@ impl<'a> Navigator<'a> {
     /// Starts at a state with these triads; `None` if the sensitivity of one is singular.
     /// `random_walk` are the noise densities in rad/√s and (m/s)/√s.
     pub fn new(
-        imu: &'a ImuRecord,
+        imu: &'a ImuSamples,
         site: &Site,
         random_walk: PerSensor<f64>,
         triads: &PerSensor<Triad>,
@@ -62,20 +62,20 @@ impl<'a> Navigator<'a> {
             earth_rate,
             earth_turn: exp(-earth_rate * imu.period),
             instrument: instruments(triads, imu.period)?,
-            further: FurtherTerms::default(),
+            terms: TermValues::default(),
             state,
         })
     }
 
-    /// The same with further terms.
-    pub fn with_further(mut self, further: FurtherTerms) -> Self {
-        self.further = further;
+    /// The same with error terms.
+    pub fn with_terms(mut self, terms: TermValues) -> Self {
+        self.terms = terms;
         self
     }
 
-    /// Goes on with other values of the further terms.
-    pub fn set_further(&mut self, values: FurtherVector) {
-        self.further.values = values;
+    /// Goes on with other values of the error terms.
+    pub fn set_terms(&mut self, values: TermVector) {
+        self.terms.values = values;
     }
 
     /// Goes on with other triads; `None` if the sensitivity of one is singular.
@@ -85,11 +85,11 @@ impl<'a> Navigator<'a> {
     }
 
     /// Increments along body axes of sample `k`, corrected by the triads (Eq. 11) and, at about this
-    /// attitude, by further terms; and where these are on, what the body then senses.
+    /// attitude, by error terms; and where these are on, what the body then senses.
     #[inline]
     fn increments(&self, k: usize, attitude: &Matrix3<f64>) -> (Increments, Option<Sensed>) {
         let of_triads = self.of_triads(k);
-        if self.further.on.is_empty() {
+        if self.terms.on.is_empty() {
             return (of_triads, None);
         }
         let period = self.imu.period;
@@ -97,7 +97,7 @@ impl<'a> Navigator<'a> {
         let mut sensed = self.sensed(k, &increments, attitude);
         // Triads see u + t(u), and u is what is looked for; the second round leaves the third order.
         for _ in 0..2 {
-            let added = |sensor| sensed.added(sensor, &self.further.values) * period;
+            let added = |sensor| sensed.added(sensor, &self.terms.values) * period;
             increments = Increments {
                 angle: of_triads.angle - added(Sensor::Gyro),
                 velocity: of_triads.velocity - added(Sensor::Accel),
@@ -132,21 +132,21 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    fn responses(&self, sensed: &Sensed) -> PerSensor<FurtherResponse> {
-        PerSensor::from_fn(|sensor| sensed.response(sensor, &self.further.values))
+    fn responses(&self, sensed: &Sensed) -> PerSensor<TermResponse> {
+        PerSensor::from_fn(|sensor| sensed.response(sensor, &self.terms.values))
     }
 
     /// Navigates through these samples of the record and gives their block. Where the record has a
     /// sample before the first of them, coning and sculling take it into account.
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let period = self.imu.period;
-        let mut moments = Moments::with_further(&self.further.on);
+        let mut moments = Moments::with_terms(&self.terms.on);
         self.navigate(samples.clone(), |navigator, step| {
             let middle = (step.before + step.after) * 0.5;
             moments.add(&middle, &step.increments, &step.change, period);
             if let Some(sensed) = &step.sensed {
                 let responses = navigator.responses(sensed);
-                moments.add_further(&middle, &responses, &step.change, period);
+                moments.add_terms(&middle, &responses, &step.change, period);
             }
         });
         self.block(&samples, &moments)
@@ -161,7 +161,7 @@ impl<'a> Navigator<'a> {
         let attitude = self.state.attitude;
         let force = -self.gravity;
         let mut moments = Moments::standing(&attitude, &self.earth_rate, &force, duration);
-        if !self.further.on.is_empty() {
+        if !self.terms.on.is_empty() {
             let sensed = Sensed {
                 rate: attitude.tr_mul(&self.earth_rate),
                 rate_over_earth: Vector3::zeros(),
@@ -169,7 +169,7 @@ impl<'a> Navigator<'a> {
                 force: attitude.tr_mul(&force),
             };
             let responses = self.responses(&sensed);
-            moments.stand_further(&self.further.on, &attitude, &responses);
+            moments.stand_terms(&self.terms.on, &attitude, &responses);
         }
         self.block(&samples, &moments)
     }
@@ -243,7 +243,7 @@ struct Step {
     increments: Increments,
     /// Velocity change by specific force.
     change: Vector3<f64>,
-    /// What the body senses, where further terms are on.
+    /// What the body senses, where error terms are on.
     sensed: Option<Sensed>,
 }
 

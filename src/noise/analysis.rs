@@ -6,8 +6,9 @@ use super::allan::{Curve, cluster_sizes, overlapping};
 use super::identify::{Clusters, Found, Hidden, Identified, mean, of_kind};
 use super::process::Process;
 use super::standing::Stretch;
-use crate::imu::{Instability, Noise, PerSensor, Sensor};
-use crate::run::{Run, SIGMA_OF_MEDIAN, median};
+use crate::imu::{GaussMarkov, Noise, PerSensor, Sensor};
+use crate::run::Run;
+use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
 /// Neighbouring samples that differ by more than this many σ are no noise.
 const KNOCK: f64 = 8.0;
@@ -64,20 +65,20 @@ pub struct NoiseFigures {
 impl NoiseAnalysis {
     /// Examines a stretch of a run.
     pub fn new(run: &Run, stretch: Stretch) -> Self {
-        let period = run.imu.period;
+        let period = run.recording.imu.period;
         let sizes = cluster_sizes(stretch.samples.len());
         let clusters = Clusters::new(stretch.samples.len(), period, sizes);
         let triads = PerSensor::from_fn(|sensor| {
             let all = match sensor {
-                Sensor::Gyro => &run.imu.gyro,
-                Sensor::Accel => &run.imu.accel,
+                Sensor::Gyro => &run.recording.imu.gyro,
+                Sensor::Accel => &run.recording.imu.accel,
             };
             let samples = all.get(stretch.samples.clone()).unwrap_or_default();
             TriadNoise::new(samples, period, &clusters)
         });
         Self {
             period,
-            pulse: run.imu.pulse,
+            pulse: run.recording.imu.pulse,
             triads,
             stretch,
         }
@@ -101,11 +102,11 @@ impl NoiseAnalysis {
             .map(|found| found.strength)
             .or(limit().map(|h| h.limit))?;
         let longest = mean.curve.tau.last().copied().unwrap_or_default();
-        let instability = identified
+        let gauss_markov = identified
             .for_filter
             .iter()
             .find_map(|found| match found.process {
-                Process::GaussMarkov { correlation_time } => Some(Instability {
+                Process::GaussMarkov { correlation_time } => Some(GaussMarkov {
                     sigma: found.strength,
                     correlation_time,
                 }),
@@ -114,12 +115,12 @@ impl NoiseAnalysis {
         Some(NoiseFigures {
             noise: Noise {
                 random_walk,
-                instability,
+                gauss_markov,
             },
             random_walk_is_limit: white.is_none(),
             // The hump of its Allan deviation is at 1.89 correlation times.
-            correlation_is_open: instability
-                .is_some_and(|instability| 1.89 * instability.correlation_time > longest),
+            correlation_is_open: gauss_markov
+                .is_some_and(|gauss_markov| 1.89 * gauss_markov.correlation_time > longest),
         })
     }
 }

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use crate::run::{Run, Segment};
+use crate::recording::Segment;
+use crate::run::Run;
 
 /// Part of a stretch that must lie in one standstill.
 const STANDING: f64 = 0.95;
@@ -75,7 +76,7 @@ impl Stretch {
     pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {
         let stretch = match label {
             Some(label) => Self::labelled(run, label)?,
-            None if !run.imu.continuous => Self::section(run)?,
+            None if !run.recording.imu.continuous => Self::section(run)?,
             None => Self::standstill(run)?,
         };
         if stretch.samples.len() < FEWEST {
@@ -88,12 +89,17 @@ impl Stretch {
     }
 
     fn labelled(run: &Run, label: &str) -> Result<Self, StretchError> {
-        let of_label = || run.segments.iter().filter(|s| s.label == label);
+        let of_label = || run.recording.segments.iter().filter(|s| s.label == label);
         let longest = of_label().max_by(|a, b| length(a).total_cmp(&length(b)));
         let Some(segment) = longest else {
             return Err(StretchError::UnknownLabel {
                 label: label.to_owned(),
-                labels: run.segments.iter().map(|s| s.label.clone()).collect(),
+                labels: run
+                    .recording
+                    .segments
+                    .iter()
+                    .map(|s| s.label.clone())
+                    .collect(),
             });
         };
         let which = match of_label().count() {
@@ -104,24 +110,27 @@ impl Stretch {
     }
 
     fn section(run: &Run) -> Result<Self, StretchError> {
-        let sections = run.segments.iter();
+        let sections = run.recording.segments.iter();
         let stretch = sections
-            .map(|segment| Self::of_segment(run, segment, "the longest segment that stands,"))
+            .map(|segment| Self::of_segment(run, segment, "the longest static segment,"))
             .filter(|stretch| stretch.stands)
             .max_by_key(|stretch| stretch.samples.len());
         match stretch {
             Some(stretch) => Ok(stretch),
-            None if run.segments.is_empty() => Err(StretchError::NoSections),
+            None if run.recording.segments.is_empty() => Err(StretchError::NoSections),
             None => Err(StretchError::NoStandstill),
         }
     }
 
     fn standstill(run: &Run) -> Result<Self, StretchError> {
-        let dwells = run.dwells().into_iter().map(|dwell| dwell.samples);
+        let dwells = run
+            .dwells(run.aiding())
+            .into_iter()
+            .map(|dwell| dwell.samples);
         let samples = dwells
             .max_by_key(|samples| samples.len())
             .ok_or(StretchError::NoStandstill)?;
-        let name = if samples.len() == run.imu.len() {
+        let name = if samples.len() == run.recording.imu.len() {
             "the whole record".to_owned()
         } else {
             format!("the longest standstill, {}", times(run, &samples))
@@ -136,7 +145,7 @@ impl Stretch {
     fn of_segment(run: &Run, segment: &Segment, which: &str) -> Self {
         let samples = segment.samples.clone();
         let needed = STANDING * samples.len() as f64;
-        let stands = run.dwells().iter().any(|dwell| {
+        let stands = run.dwells(run.aiding()).iter().any(|dwell| {
             let begin = samples.start.max(dwell.samples.start);
             let end = samples.end.min(dwell.samples.end);
             end.saturating_sub(begin) as f64 >= needed
@@ -154,6 +163,6 @@ fn length(segment: &Segment) -> f64 {
 }
 
 fn times(run: &Run, samples: &Range<usize>) -> String {
-    let at = |sample| run.imu.time(sample);
+    let at = |sample| run.recording.imu.time(sample);
     format!("{:.1} s to {:.1} s", at(samples.start), at(samples.end))
 }

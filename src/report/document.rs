@@ -20,7 +20,7 @@ pub struct Document {
     pub blocks: Vec<(Medium, Block)>,
     /// The figures by name, with the unit in the name; what is not a number is null.
     pub data: Value,
-    /// Further files by name, such as a table as CSV.
+    /// Auxiliary files by name, such as a table as CSV.
     pub files: Vec<(String, String)>,
 }
 

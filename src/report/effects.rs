@@ -5,14 +5,14 @@ use super::document::{NONE, Table, cells};
 use super::group::Group;
 use super::number::{three_digits, value};
 use super::terms::title;
-use crate::calibration::BlockEffect;
+use crate::calibration::ErrorTermTest;
 
 /// Costs of the error terms that were on.
-pub(super) fn costs(effects: &[BlockEffect]) -> Table {
-    let row = |effect: &BlockEffect| {
-        let cells = effect.cost.iter();
+pub(super) fn costs(effects: &[ErrorTermTest]) -> Table {
+    let row = |effect: &ErrorTermTest| {
+        let cells = effect.sigma_factors.iter();
         let cells = cells.map(|cost| cost.map_or(NONE.to_owned(), |cost| value(cost, 0.1)));
-        let name = title(effect.block).to_owned();
+        let name = title(effect.term).to_owned();
         std::iter::once(name).chain(cells).collect()
     };
     let columns = std::iter::once("term".to_owned()).chain(Group::all().map(Group::short));
@@ -25,22 +25,22 @@ pub(super) fn costs(effects: &[BlockEffect]) -> Table {
 }
 
 /// What those explain that were on or that the data show.
-pub(super) fn explained(effects: &[BlockEffect]) -> Table {
-    let row = |effect: &BlockEffect| {
+pub(super) fn explained(effects: &[ErrorTermTest]) -> Table {
+    let row = |effect: &ErrorTermTest| {
         let yes_no = |yes: bool, words: [&str; 2]| words[usize::from(!yes)].to_owned();
         cells![
-            title(effect.block),
+            title(effect.term),
             yes_no(effect.on, ["on", "off"]),
             nis(effect),
             three_digits(effect.gain),
             format!("< {}", three_digits(effect.limit)),
-            yes_no(effect.asked_for(), ["yes", "no"]),
+            yes_no(effect.significant(), ["yes", "no"]),
         ]
     };
     let shown = |on| {
         effects
             .iter()
-            .filter(move |e| e.on == on && (e.on || e.asked_for()))
+            .filter(move |e| e.on == on && (e.on || e.significant()))
     };
     let columns = [
         "term",
@@ -59,25 +59,10 @@ pub(super) fn explained(effects: &[BlockEffect]) -> Table {
         .note("Terms that are off are tried with their usual σ and shown where they are significant.")
 }
 
-fn nis(effect: &BlockEffect) -> String {
+fn nis(effect: &ErrorTermTest) -> String {
     let digits = |nis: f64| match nis < 10.0 {
         true => value(nis, 0.01),
         false => three_digits(nis),
     };
     format!("{} → {}", digits(effect.without), digits(effect.with))
-}
-
-/// Where terms that are off are significant: which of them most.
-pub(super) fn advice(effects: &[BlockEffect]) -> Option<String> {
-    let significant = effects
-        .iter()
-        .filter(|effect| !effect.on && effect.asked_for());
-    let best = significant.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    Some(format!(
-        "The data show errors that are not modelled. Of the error terms that are off, {} would explain most \
-         (NIS {}): use --with {}, then look again.",
-        title(best.block),
-        nis(best),
-        best.block.name()
-    ))
 }

@@ -1,7 +1,7 @@
 //! How the six groups are spoken of: names, and the unit of each.
 
-use crate::calibration::outcome::parameter_name;
-use crate::calibration::states::ParameterVector;
+use crate::calibration::ParameterVector;
+use crate::calibration::parameter_name;
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
 use crate::units;
 

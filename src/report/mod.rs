@@ -36,6 +36,7 @@ pub mod calibration;
 pub mod check;
 pub mod comparison;
 pub mod conversion;
+pub mod demo;
 mod effects;
 pub mod experiment;
 mod group;

@@ -13,9 +13,9 @@ use super::number::{or_dash, three_digits, value};
 use super::plot::{Panel, Plot, Series};
 use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
+use crate::imu::BodyFrame;
 use crate::imu::Sensor;
-use crate::run::record::BodyFrame;
-use crate::study::navigation::{INTERVAL, Mission, Moment, Motion};
+use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion};
 use crate::units::{DEGREE, NAUTICAL_MILE};
 
 const HOUR: f64 = 3600.0;
@@ -42,7 +42,7 @@ pub struct Navigation<'a> {
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
-    pub moments: &'a [Moment],
+    pub moments: &'a [Epoch],
 }
 
 impl Navigation<'_> {
@@ -151,8 +151,8 @@ impl Navigation<'_> {
     }
 
     fn row(&self, quantity: Quantity) -> Vec<String> {
-        let error = |moment: &Moment| quantity.error(&moment.error);
-        let magnitude = |m: &&Moment| error(m).abs();
+        let error = |moment: &Epoch| quantity.error(&moment.error);
+        let magnitude = |m: &&Epoch| error(m).abs();
         let moments = self.moments.iter();
         let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
         let last = self.moments.last();
@@ -267,7 +267,7 @@ fn by_key(of: impl Fn(Quantity) -> f64) -> Map<String, Value> {
 }
 
 /// Errors and their predicted σ at one time.
-fn at(moment: &Moment) -> Value {
+fn at(moment: &Epoch) -> Value {
     let mut row = Map::from_iter([("t_h".to_owned(), (moment.time / HOUR).into())]);
     row.extend(by_key(|quantity| quantity.error(&moment.error)));
     let sigma = moment.covariance.as_ref();
@@ -276,7 +276,7 @@ fn at(moment: &Moment) -> Value {
     row.into()
 }
 
-fn largest<'m>(moments: impl Iterator<Item = &'m Moment> + Clone) -> Value {
+fn largest<'m>(moments: impl Iterator<Item = &'m Epoch> + Clone) -> Value {
     let of = |quantity: Quantity| {
         moments
             .clone()

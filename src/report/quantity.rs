@@ -6,7 +6,7 @@ use super::plot::{Axis, Panel, Point, Series, Shape};
 
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
-use crate::study::navigation::Moment;
+use crate::study::navigation::Epoch;
 use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
 const KILOMETRE: f64 = 1000.0;
@@ -142,7 +142,7 @@ impl Quantity {
     }
 
     /// Predicted 1σ in the usual unit; of a horizontal length the root of its mean square.
-    pub(super) fn sigma(self, moment: &Moment) -> Option<f64> {
+    pub(super) fn sigma(self, moment: &Epoch) -> Option<f64> {
         Some(self.of_sigma(&moment.sigma()?))
     }
 

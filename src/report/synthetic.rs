@@ -9,12 +9,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::calibration::{ClosedForm, Navigated, Report};
-use crate::calibration::outcome::*;
-use crate::calibration::states::{ParameterMatrix, ParameterVector, sensor_and_parameter};
+use crate::calibration::result::TermRecord;
+use crate::calibration::*;
 use crate::calibration::{AttitudePrior, Direction, Linearisation, Observability, Part};
+use crate::calibration::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::*;
 use crate::run::Run;
-use crate::run::record::TermRecord;
 use crate::simulation::Scenario;
 use crate::study::navigation::Mission;
 use crate::units::ARCSEC;
@@ -35,15 +35,16 @@ impl Synthetic {
         Report {
             title: "Calibration of a made-up instrument",
             run: &self.run,
-            body_frame: self.run.body_frame(),
+            aiding: self.run.aiding(),
+            body_frame: self.run.aiding().body_frame(),
             outcome: Some(&self.outcome),
+            findings: &self.outcome.findings,
             effects: &[],
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {
                 estimate: &self.closed,
                 note: "six positions for each triad, 60 min of its own",
-                warnings: &[],
             }),
             truth: Some(&self.truth),
             dwells: &self.dwells,
@@ -82,20 +83,20 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     scenario.integrator.period = 0.1;
     let simulated = scenario.simulate(7, 0).unwrap();
     let mut run = simulated.run;
-    run.name = "three-axis-made-up".to_owned();
+    run.recording.name = "three-axis-made-up".to_owned();
     let instrument = (
         "instrument".to_owned(),
         "navigation-grade FOG <IMU> & co".to_owned(),
     );
-    run.meta.extend([instrument]);
+    run.recording.meta.extend([instrument]);
     let seconds = |dwell: crate::run::Dwell| {
-        run.imu.time(dwell.samples.start)..run.imu.time(dwell.samples.end)
+        run.recording.imu.time(dwell.samples.start)..run.recording.imu.time(dwell.samples.end)
     };
-    let dwells: Vec<Range<f64>> = run.dwells().into_iter().map(seconds).collect();
+    let dwells: Vec<Range<f64>> = run.dwells(run.aiding()).into_iter().map(seconds).collect();
     let truth = PerSensor::from_fn(|sensor| simulated.truth.get(sensor).in_form(form));
     let prior_sigma = ParameterVector::from_fn(|i, _| {
         let (sensor, p) = sensor_and_parameter(i);
-        let sigma = run.prior.get(sensor).sigma(form)[p];
+        let sigma = run.instrument.prior.get(sensor).sigma(form)[p];
         if Triad::has_parameter(form, p) {
             sigma
         } else {
@@ -103,14 +104,14 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         }
     });
     let final_sigma = prior_sigma * 1e-3;
-    let (drawn, length) = (vector(rng), run.imu.duration());
+    let (drawn, length) = (vector(rng), run.recording.imu.duration());
     let history = |gain: f64| {
         let moment = |k: u32| {
             let time = length * f64::from(k) / 400.0;
             let sigma = final_sigma * (length / time).min(1e3);
             let error = sigma.component_mul(&drawn) * (1.0 + gain * (time / 40.0).sin());
             let estimate = to_vector(&truth) + error;
-            Moment {
+            Epoch {
                 time,
                 estimate,
                 sigma,
@@ -132,10 +133,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             }));
         }
     }
-    let pass = |live, largest_step, merit, rejected| Pass {
-        live,
+    let pass = |feedback, largest_step, cost, rejected| Pass {
+        feedback,
         largest_step,
-        merit,
+        cost,
         observations: 7200,
         rejected,
     };
@@ -149,17 +150,21 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         parameter,
         component,
     };
-    let prior_mean = to_vector(&PerSensor::from_fn(|s| run.prior.get(s).mean(form)));
+    let prior_mean = to_vector(&PerSensor::from_fn(|s| {
+        run.instrument.prior.get(s).mean(form)
+    }));
     let outcome = Outcome {
         form_test: None,
         estimate: estimate(&truth, &final_sigma, &drawn),
         prior_sigma,
         prior_mean,
-        further: Default::default(),
-        prior_attitude: AttitudePrior {
+        auxiliary: Default::default(),
+        gravity: (run.site.gravity, 0.0),
+        aiding: run.aiding(),
+        prior_attitudes: vec![AttitudePrior {
             mean: Matrix3::identity(),
             sigma: Vector3::repeat(60.0 * ARCSEC),
-        },
+        }],
         attitude_sigma: Vector3::repeat(ARCSEC),
         observability: Observability {
             directions: vec![Direction {
@@ -171,8 +176,8 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         },
         linearised_at: Linearisation {
             triads: truth,
-            further: Default::default(),
-            initial_attitude: Matrix3::identity(),
+            terms: Default::default(),
+            initial_attitudes: vec![Matrix3::identity()],
         },
         passes: vec![
             pass(true, 812.0, 9.1e5, 4),
@@ -181,7 +186,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         ],
         converged: true,
         log_determinant: 0.0,
-        live_history: history(0.8),
+        feedback_history: history(0.8),
         history: history(0.3),
         innovations,
         consistency: Consistency {
@@ -190,10 +195,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             table: nis(1.051, 1197),
         },
         velocity_sigma: 1.2e-5,
-        warnings: vec![
-            "The path turns about z by less than a full turn; gyro K z rests on one move."
+        findings: vec![Finding::Recording {
+            note: "The path turns about z by less than a full turn; gyro K z rests on one move."
                 .to_owned(),
-        ],
+        }],
     };
     let closed = estimate(&truth, &(final_sigma * 40.0), &vector(rng));
     let mission = Mission::standing_level(&run.site, 600);

@@ -4,45 +4,45 @@ use std::collections::BTreeMap;
 
 use super::document::NONE;
 use super::number::{plus_minus, three_digits, value};
-use crate::calibration::further::{Constant, Further, constant_name};
-use crate::calibration::outcome::OBSERVED_BELOW;
+use crate::calibration::ErrorTerm;
+use crate::calibration::OBSERVED_BELOW;
+use crate::calibration::result::TermRecord;
+use crate::calibration::{Auxiliary, AuxiliaryKind, auxiliary_name};
 use crate::imu::Term;
-use crate::run::StateBlock;
-use crate::run::record::TermRecord;
 use crate::units::ARCSEC;
 
 /// An error term in words.
-pub(super) fn title(block: StateBlock) -> &'static str {
+pub(super) fn title(block: ErrorTerm) -> &'static str {
     match block {
-        StateBlock::WanderingBias => "Gauss–Markov biases",
-        StateBlock::TableBase => "table level and north",
-        StateBlock::TableAxes => "table axes",
-        StateBlock::Term(Term::AccelSecondOrder) => "accel second order",
-        StateBlock::Term(Term::AccelAsymmetry) => "accel asymmetry",
-        StateBlock::Term(Term::SizeEffect) => "accel lever arm",
-        StateBlock::Term(Term::TimeOffset) => "accel time offset",
-        StateBlock::Term(Term::GSensitivity) => "gyro g-sensitivity",
+        ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
+        ErrorTerm::TableBase => "table level and north",
+        ErrorTerm::TableAxes => "table axes",
+        ErrorTerm::Instrument(Term::AccelSecondOrder) => "accel second order",
+        ErrorTerm::Instrument(Term::AccelAsymmetry) => "accel asymmetry",
+        ErrorTerm::Instrument(Term::SizeEffect) => "accel lever arm",
+        ErrorTerm::Instrument(Term::TimeOffset) => "accel time offset",
+        ErrorTerm::Instrument(Term::GSensitivity) => "gyro g-sensitivity",
     }
 }
 
 /// Symbol and SI value of the unit that its parameters are shown in.
-pub(super) fn unit(block: StateBlock) -> (&'static str, f64) {
+pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
-        StateBlock::Term(term) => term.unit(),
-        StateBlock::TableBase | StateBlock::TableAxes | StateBlock::WanderingBias => ("″", ARCSEC),
+        ErrorTerm::Instrument(term) => term.unit(),
+        ErrorTerm::TableBase | ErrorTerm::TableAxes | ErrorTerm::GaussMarkovBias => ("″", ARCSEC),
     }
 }
 
 /// Rows of the table of parameters; errors where `errors` asks for them and the truth states them.
 pub(super) fn rows(
-    further: &Further,
+    auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
     errors: bool,
 ) -> Vec<Vec<String>> {
-    let posterior = further.sigma();
+    let posterior = auxiliary.sigma();
     let row = |k: usize| {
-        let (name, (unit, in_si)) = (constant_name(k)?, unit(Constant::of(k)?.block()));
-        let (of, own, prior) = (further.values[k], posterior[k], further.prior_sigma[k]);
+        let (name, (unit, in_si)) = (auxiliary_name(k)?, unit(AuxiliaryKind::of(k)?.error_term()));
+        let (of, own, prior) = (auxiliary.values[k], posterior[k], auxiliary.prior_sigma[k]);
         let truth = truth.get(&name).map(|truth| of - truth.value);
         let mut row = vec![
             name,
@@ -58,7 +58,7 @@ pub(super) fn rows(
         }
         Some(row)
     };
-    further.estimated().filter_map(row).collect()
+    auxiliary.estimated().filter_map(row).collect()
 }
 
 /// Prior over posterior σ, with words where the data did not observe the parameter.

@@ -1,4 +1,4 @@
-//! Where the instrument stands: dwells, found from the table's readings or, without a table, from the
+//! Where the instrument is at rest: dwells, found from the table's readings or, without a table, from the
 //! instrument itself.
 
 mod imu;
@@ -8,12 +8,13 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{ImuRecord, LabelledMotion, Run, Segment};
+use super::{Aiding, Run};
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
+use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
 
-/// A stretch of samples during which the instrument stands.
+/// Samples during which the instrument is at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dwell {
     /// Samples that lie wholly within it.
@@ -31,7 +32,7 @@ pub struct Position {
     pub attitude: Matrix3<f64>,
 }
 
-/// Readings of a standing table differ by less than this many σ of their noise …
+/// Readings of a table at rest differ by less than this many σ of their noise …
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
@@ -41,7 +42,7 @@ const SHORTEST: f64 = 0.5;
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 /// … beyond their noise …
 const STILL_SIGMAS: f64 = 6.0;
-/// … and more than the worst bias may wander, rad/s.
+/// … and more than the worst bias may drift, rad/s.
 const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 
 impl Run {
@@ -50,8 +51,11 @@ impl Run {
     /// Where a table's log says where it stands, the gyros have a say: a standstill of the log during
     /// which they turn is none (two readings may miss a full turn). Two between which they do not turn
     /// are one (a wild reading, or a knock, parted them).
-    pub fn dwells(&self) -> Vec<Dwell> {
-        let standstills = match &self.table {
+    pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
+        if !self.recording.imu.continuous && !self.recording.segments.is_empty() {
+            return self.labelled_dwells();
+        }
+        let standstills = match self.observed_table(aiding) {
             Some(table) => self.standstills_of_table(table),
             None => self.standstills_of_imu(),
         };
@@ -65,46 +69,50 @@ impl Run {
                 _ => dwells.push(dwell),
             }
         }
-        let unbridged = || self.imu.faults.iter().filter(|fault| !fault.bridged);
+        let unbridged = || {
+            self.recording
+                .imu
+                .faults
+                .iter()
+                .filter(|fault| !fault.bridged)
+        };
         dwells.retain_mut(|dwell| {
             unbridged().for_each(|fault| dwell.leave_out(&fault.samples));
-            dwell.samples.len() as f64 * self.imu.period >= SHORTEST
+            dwell.samples.len() as f64 * self.recording.imu.period >= SHORTEST
         });
         dwells
     }
 
-    /// The dwells; in a record of sections laid end to end those labelled as positions, for of what lies
-    /// between sections nothing is known.
-    pub fn rests(&self) -> Vec<Dwell> {
-        if !self.imu.is_sections() {
-            return self.dwells();
-        }
+    /// In a recording of sections laid end to end those labelled as positions, for of what lies between
+    /// sections nothing is known.
+    fn labelled_dwells(&self) -> Vec<Dwell> {
         let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
-        let positions = self.segments.iter().filter(|s| stands(s.motion));
-        positions.map(Segment::as_dwell).collect()
+        let positions = self.recording.segments.iter().filter(|s| stands(s.motion));
+        positions.map(Dwell::of_segment).collect()
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {
         let same_reading = match (&before.position, &after.position) {
             (Some(before), Some(after)) => {
                 let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
-                let reading_sigma = self.table.as_ref().map_or(0.0, |t| t.reading_sigma);
+                let reading_sigma = self.table.reading_sigma;
                 let limit = STANDING_ANGLE.max(STANDING_SIGMAS * reading_sigma * share.sqrt());
                 log(&(after.attitude * before.attitude.transpose())).norm() < limit
             }
             _ => true,
         };
-        same_reading && !self.turns(before.samples.end..after.samples.start, before)
+        let between = before.samples.end..after.samples.start;
+        same_reading && self.recording.imu.unbroken(&between) && !self.turns(between, before)
     }
 
     /// Whether the gyros turn during these samples, with their mean output at rest as zero.
     fn turns(&self, samples: Range<usize>, at_rest: &Dwell) -> bool {
-        let gyro = &self.imu.gyro;
+        let gyro = &self.recording.imu.gyro;
         let zero = gyro[at_rest.samples.clone()].iter().sum::<Vector3<f64>>()
             / at_rest.samples.len() as f64;
-        let duration = samples.len() as f64 * self.imu.period;
+        let duration = samples.len() as f64 * self.recording.imu.period;
         let limit = STILL_ANGLE
-            + STILL_SIGMAS * self.noise.gyro.random_walk * duration.sqrt()
+            + STILL_SIGMAS * self.instrument.noise.gyro.random_walk * duration.sqrt()
             + STILL_RATE * duration;
         let mut angle = Vector3::zeros();
         gyro[samples].iter().any(|increment| {
@@ -125,24 +133,32 @@ pub struct MeanOutput {
 }
 
 impl Dwell {
+    /// A section as a dwell, whether it is static or not.
+    pub fn of_segment(segment: &Segment) -> Self {
+        Self {
+            samples: segment.samples.clone(),
+            position: None,
+        }
+    }
+
     /// Mean output of a triad over it.
     pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
         let samples = match sensor {
-            Sensor::Gyro => &run.imu.gyro,
-            Sensor::Accel => &run.imu.accel,
+            Sensor::Gyro => &run.recording.imu.gyro,
+            Sensor::Accel => &run.recording.imu.accel,
         };
-        let duration = self.samples.len() as f64 * run.imu.period;
+        let duration = self.samples.len() as f64 * run.recording.imu.period;
         let sum: Vector3<f64> = samples[self.samples.clone()].iter().sum();
         let mut interpolated = Vector3::<f64>::zeros();
-        for (bridge, part) in run.imu.bridged(&self.samples) {
+        for (bridge, part) in run.recording.imu.bridged(&self.samples) {
             if bridge.sensor == sensor {
                 interpolated[bridge.axis] += bridge.variance * part;
             }
         }
         MeanOutput {
             output: sum / duration,
-            variance: run.noise.get(sensor).random_walk.powi(2) / duration
-                + run.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration)
+            variance: run.instrument.noise.get(sensor).random_walk.powi(2) / duration
+                + run.recording.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration)
                 + interpolated.max() / (duration * duration),
         }
     }
@@ -162,7 +178,7 @@ impl Dwell {
     }
 
     /// The first seconds of it; the attitude is that of all its readings.
-    pub fn first_seconds(&self, duration: f64, imu: &ImuRecord) -> Self {
+    pub fn first_seconds(&self, duration: f64, imu: &ImuSamples) -> Self {
         let samples = (duration / imu.period).round() as usize;
         let end = self.samples.end.min(self.samples.start + samples);
         Self {
@@ -193,7 +209,7 @@ impl Position {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::TableRecord;
+    use crate::recording::TableLog;
     use crate::simulation::Scenario;
 
     fn reading(dwell: &Dwell) -> Range<usize> {
@@ -204,16 +220,16 @@ mod tests {
     fn dwells_lie_within_the_standstills_of_the_table_and_miss_little_of_them() {
         let scenario = Scenario::load("demo").unwrap();
         let run = scenario.simulate(1, 0).unwrap().run;
-        let dwells = run.dwells();
+        let dwells = run.dwells(run.aiding());
         // The path: 60 s, then 15 s after each of 17 moves but the last, 30 s after that.
         assert_eq!(dwells.len(), 18);
         let standing: f64 = dwells
             .iter()
-            .map(|d| d.samples.len() as f64 * run.imu.period)
+            .map(|d| d.samples.len() as f64 * run.recording.imu.period)
             .sum();
         assert!((310.0..330.0).contains(&standing), "{standing} s");
         for dwell in &dwells {
-            let rate = |k: usize| (run.imu.gyro[k] / run.imu.period).norm();
+            let rate = |k: usize| (run.recording.imu.gyro[k] / run.recording.imu.period).norm();
             // Earth rate and 25 °/h of bias; a table that turns is thousands of times faster.
             let fastest = dwell.samples.clone().map(rate).fold(0.0, f64::max);
             assert!(fastest < 1e-3, "{fastest} rad/s");
@@ -223,14 +239,14 @@ mod tests {
     #[test]
     fn a_reading_that_takes_up_the_next_position_before_the_turn_ends_the_dwell() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let before = reading(&run.dwells()[0]);
-        let table = run.table.as_mut().unwrap();
+        let before = reading(&run.dwells(run.aiding())[0]);
+        let table = run.recording.table.as_mut().unwrap();
         let early = 20;
         for reading in before.end - early..before.end {
             table.attitude[reading] =
                 exp(Vector3::new(0.0, 3.0 * ARCSEC, 0.0)) * table.attitude[reading];
         }
-        let after = reading(&run.dwells()[0]);
+        let after = reading(&run.dwells(run.aiding())[0]);
         assert!(after.end <= before.end - early);
         assert!(after.end + early + 20 > before.end);
     }
@@ -238,11 +254,11 @@ mod tests {
     #[test]
     fn one_wild_reading_does_not_make_two_positions_of_one() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let before = run.dwells();
-        let table = run.table.as_mut().unwrap();
+        let before = run.dwells(run.aiding());
+        let table = run.recording.table.as_mut().unwrap();
         let wild = reading(&before[3]).start + 40;
         table.attitude[wild] = exp(Vector3::new(0.0, 0.01, 0.0)) * table.attitude[wild];
-        let after = run.dwells();
+        let after = run.dwells(run.aiding());
         assert_eq!(after.len(), before.len());
         assert_eq!(after[3].samples, before[3].samples);
         let attitude = |dwells: &[Dwell]| dwells[3].position.clone().unwrap().attitude;
@@ -251,25 +267,31 @@ mod tests {
     }
 
     #[test]
-    fn full_turns_that_end_where_they_began_part_two_positions() {
-        // The first three moves of the path are two full turns each, seen by the gyros alone if the
-        // table is read too seldom.
-        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let all = run.dwells().len();
-        let table = run.table.as_mut().unwrap();
-        let seldom = |k: &usize| k.is_multiple_of(60);
-        let kept: Vec<usize> = (0..table.time.len()).filter(seldom).collect();
-        table.time = kept.iter().map(|&k| table.time[k]).collect();
-        table.attitude = kept.iter().map(|&k| table.attitude[k]).collect();
-        let dwells = run.dwells();
-        assert!(!dwells.is_empty() && dwells.len() <= all);
-        for dwell in &dwells {
-            let fastest = dwell
-                .samples
-                .clone()
-                .map(|k| run.imu.gyro[k].norm() / run.imu.period)
-                .fold(0.0, f64::max);
-            assert!(fastest < 1e-3, "{fastest} rad/s");
+    fn full_turns_that_end_where_they_began_are_no_standstill() {
+        // The first three moves of the path are two full turns each. A log that is read seldom, or at rest
+        // alone, hardly shows them; the gyros do.
+        let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        let all = run.dwells(run.aiding());
+        let seldom: Vec<usize> = (0..run.recording.table.as_ref().unwrap().time.len())
+            .step_by(60)
+            .collect();
+        let at_rest: Vec<usize> = all.iter().flat_map(reading).collect();
+        for kept in [seldom, at_rest] {
+            let mut run = run.clone();
+            let table = run.recording.table.as_mut().unwrap();
+            table.time = kept.iter().map(|&k| table.time[k]).collect();
+            table.attitude = kept.iter().map(|&k| table.attitude[k]).collect();
+            let dwells = run.dwells(run.aiding());
+            assert!(dwells.len() > 3, "{}", dwells.len());
+            // What is cut off at each end, in samples.
+            let margin = (0.2 / run.recording.imu.period).round() as usize;
+            for found in &dwells {
+                let within = |known: &&Dwell| {
+                    known.samples.start <= found.samples.start + margin
+                        && found.samples.end <= known.samples.end + margin
+                };
+                assert_eq!(all.iter().filter(within).count(), 1, "{found:?}");
+            }
         }
     }
 
@@ -282,17 +304,14 @@ mod tests {
             let angle = (t - 20.0).clamp(0.0, 20.0) * 0.5 * DEGREE;
             exp(Vector3::new(0.0, 0.0, angle))
         };
-        run.table = Some(TableRecord {
+        run.recording.table = Some(TableLog {
             attitude: time.iter().map(attitude).collect(),
             time,
-            position_sigma: ARCSEC,
-            reading_sigma: 0.5 * ARCSEC,
-            geometry: Default::default(),
             tilts: Vec::new(),
         });
-        let dwells = run.dwells();
+        let dwells = run.dwells(run.aiding());
         assert_eq!(dwells.len(), 2);
-        assert!(run.imu.time(dwells[0].samples.end) <= 20.0);
-        assert!(run.imu.time(dwells[1].samples.start) >= 40.0);
+        assert!(run.recording.imu.time(dwells[0].samples.end) <= 20.0);
+        assert!(run.recording.imu.time(dwells[1].samples.start) >= 40.0);
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::earth::Site;
-use crate::imu::{self, FurtherVector, PerSensor, Sensor};
+use crate::imu::{self, PerSensor, Sensor, TermVector};
 use crate::turntable::Motion;
 
 /// How increments are integrated.
@@ -21,16 +21,16 @@ pub struct Integrator {
 ///
 /// `ω_ib = ω_nb + C_n_b ω_ie`, `f = −C_n_b g + ω̇_ib × r + ω_ib × (ω_ib × r)`, with r the lever arm.
 ///
-/// to which the instrument's further terms with these parameters are added. While the table stands both are constant and computed once.
+/// to which the instrument's error terms with these parameters are added. While the table stands both are constant and computed once.
 pub fn true_increments(
     motion: &Motion,
     site: &Site,
     integrator: &Integrator,
-    further: &FurtherVector,
+    terms: &TermVector,
 ) -> PerSensor<Vec<Vector3<f64>>> {
     let &Integrator { period, .. } = integrator;
     let samples = (motion.duration() / period + 1e-6) as usize;
-    let sensed = Sensed::new(motion, site, integrator.lever_arm, *further);
+    let sensed = Sensed::new(motion, site, integrator.lever_arm, *terms);
     let mut gyro = Vec::with_capacity(samples);
     let mut accel = Vec::with_capacity(samples);
     let mut push = |(angle, velocity): (Vector3<f64>, Vector3<f64>)| {
@@ -67,22 +67,17 @@ struct Sensed<'a> {
     earth_rate_n: Vector3<f64>,
     gravity_n: Vector3<f64>,
     lever_arm: Vector3<f64>,
-    further: FurtherVector,
+    terms: TermVector,
 }
 
 impl<'a> Sensed<'a> {
-    fn new(
-        motion: &'a Motion,
-        site: &Site,
-        lever_arm: Vector3<f64>,
-        further: FurtherVector,
-    ) -> Self {
+    fn new(motion: &'a Motion, site: &Site, lever_arm: Vector3<f64>, terms: TermVector) -> Self {
         Self {
             motion,
             earth_rate_n: site.earth_rate_n(),
             gravity_n: site.gravity_n(),
             lever_arm,
-            further,
+            terms,
         }
     }
 
@@ -95,7 +90,7 @@ impl<'a> Sensed<'a> {
         let r = self.lever_arm;
         let force = acceleration.cross(&r) + rate.cross(&rate.cross(&r))
             - state.attitude.tr_mul(&self.gravity_n);
-        if self.further == FurtherVector::zeros() {
+        if self.terms == TermVector::zeros() {
             return (rate, force);
         }
         let sensed = imu::Sensed {
@@ -104,7 +99,7 @@ impl<'a> Sensed<'a> {
             angular_acceleration: acceleration,
             force,
         };
-        let added = |sensor| sensed.added(sensor, &self.further);
+        let added = |sensor| sensed.added(sensor, &self.terms);
         (rate + added(Sensor::Gyro), force + added(Sensor::Accel))
     }
 
@@ -179,7 +174,7 @@ mod tests {
             &motion,
             &site,
             &integrator(Vector3::zeros(), 4),
-            &FurtherVector::zeros(),
+            &TermVector::zeros(),
         );
         for (start, end) in motion.dwells() {
             let still = sample(start) + 1..sample(end) - 1;
@@ -211,7 +206,7 @@ mod tests {
             period: MILLISECOND,
             ..integrator(lever_arm, 2)
         };
-        let ideal = true_increments(motion, site, &fine, &FurtherVector::zeros());
+        let ideal = true_increments(motion, site, &fine, &TermVector::zeros());
         let mut attitude = motion.at(0.0).attitude;
         let mut velocity = Vector3::zeros();
         let (mut last_angle, mut last_force) = (Vector3::zeros(), Vector3::zeros());
@@ -266,13 +261,8 @@ mod tests {
     fn increments_do_not_depend_on_the_step() {
         let (motion, site) = demo();
         let arm = Vector3::new(0.3, -0.2, 0.1);
-        let coarse = true_increments(&motion, &site, &integrator(arm, 4), &FurtherVector::zeros());
-        let fine = true_increments(
-            &motion,
-            &site,
-            &integrator(arm, 16),
-            &FurtherVector::zeros(),
-        );
+        let coarse = true_increments(&motion, &site, &integrator(arm, 4), &TermVector::zeros());
+        let fine = true_increments(&motion, &site, &integrator(arm, 16), &TermVector::zeros());
         for (coarse, fine) in coarse.gyro.iter().zip(&fine.gyro) {
             assert!((coarse - fine).norm() < 1e-14);
         }

@@ -15,12 +15,13 @@ pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 
 use crate::attitude::exp;
-use crate::imu::{FurtherVector, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, Triad};
-use crate::run::{
-    ImuRecord, Run, SET_BY_HAND, Standstill, TABLE_GEOMETRY, TableGeometry, TableRecord, Tilts,
-    across, tilts,
+use crate::imu::{
+    Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
 };
+use crate::recording::{ImuSamples, Recording, TableLog};
+use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::turntable::{Imperfection, Motion, Moves, TableError};
+use crate::turntable::{TABLE_GEOMETRY, TableAccuracy, TableGeometry, Tilts, across, tilts};
 
 /// A run and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,9 +30,9 @@ pub struct Simulated {
     pub run: Run,
     /// The instrument's true parameters.
     pub truth: PerSensor<Triad>,
-    /// Those of its further terms.
-    pub further: FurtherVector,
-    /// The table's true geometry, in the order of [`crate::run::TableGeometry::vector`], rad.
+    /// Those of its error terms.
+    pub terms: TermVector,
+    /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
     /// What a sample holds when the run is written to a file.
     pub output: Output,
@@ -47,7 +48,7 @@ enum Draws {
     Imperfection,
     Positions,
     Readings,
-    Further,
+    Terms,
 }
 
 impl Draws {
@@ -75,8 +76,8 @@ impl Scenario {
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
         let motion = Motion::new(&self.table, &self.path, &imperfection)?;
         let read = Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))?;
-        let further = self.draw_further(&mut Draws::Further.generator(seed, stream));
-        let ideal = true_increments(&motion, &self.site, &self.integrator, &further);
+        let terms = self.draw_terms(&mut Draws::Terms.generator(seed, stream));
+        let ideal = true_increments(&motion, &self.site, &self.integrator, &terms);
 
         let truth = PerSensor::from_fn(|sensor| {
             let draws = match sensor {
@@ -114,47 +115,54 @@ impl Scenario {
                 draws.generator(seed, stream),
             )
         };
+        let imu = ImuSamples {
+            pulse,
+            ..ImuSamples::made(
+                0.0,
+                self.integrator.period,
+                sensed(Sensor::Gyro, Draws::GyroNoise, &ideal.gyro),
+                sensed(Sensor::Accel, Draws::AccelNoise, &ideal.accel),
+            )
+        };
+        let meta = [
+            ("instrument", &self.instrument.name),
+            ("table", &self.table_name),
+        ];
         let run = Run {
-            name: self.name.clone(),
-            site: self.site,
-            meta: [
-                ("instrument", &self.instrument.name),
-                ("table", &self.table_name),
-            ]
-            .map(|(key, value)| (key.to_owned(), value.clone()))
-            .into(),
-            imu: ImuRecord {
-                start: 0.0,
-                period: self.integrator.period,
-                continuous: true,
-                gyro: sensed(Sensor::Gyro, Draws::GyroNoise, &ideal.gyro),
-                accel: sensed(Sensor::Accel, Draws::AccelNoise, &ideal.accel),
-                pulse,
-                faults: Vec::new(),
-                bridges: Vec::new(),
-                log: None,
+            recording: Recording {
+                name: self.name.clone(),
+                meta: meta
+                    .map(|(key, value)| (key.to_owned(), value.clone()))
+                    .into(),
+                imu,
+                table: Some(self.readings(&read, seed, stream)),
+                segments: Vec::new(),
+                files: Vec::new(),
+                notes: Vec::new(),
             },
-            noise: self.instrument.noise,
-            prior: PerSensor::from_fn(|sensor| self.instrument.prior(sensor, &self.installation)),
-            further_sigma: self.instrument.further_sigma,
-            nominal,
-            unit,
+            instrument: Instrument {
+                nominal,
+                unit,
+                prior: PerSensor::from_fn(|sensor| {
+                    self.instrument.prior(sensor, &self.installation)
+                }),
+                noise: self.instrument.noise,
+                term_sigma: self.instrument.term_sigma,
+            },
+            site: self.site,
+            table: self.table_accuracy(),
             standstill: Standstill {
                 velocity_sigma: None,
                 position_sigma: Standstill::default()
                     .position_sigma
                     .max(self.integrator.lever_arm.norm()),
             },
-            table: Some(self.readings(&read, seed, stream)),
-            files: Vec::new(),
-            notes: Vec::new(),
-            segments: Vec::new(),
             segment_sigma: SET_BY_HAND,
         };
         Ok(Simulated {
             run,
             truth,
-            further,
+            terms,
             geometry: self.geometry(&imperfection),
             output: self.output,
         })
@@ -212,7 +220,7 @@ impl Scenario {
     }
 
     /// The table's log: `exp(−[τ×]) C_b_n`, τ the error of the position in force and white noise.
-    fn readings(&self, motion: &Motion, seed: u64, stream: u64) -> TableRecord {
+    fn readings(&self, motion: &Motion, seed: u64, stream: u64) -> TableLog {
         let errors = &self.table.errors;
         let mut positions = Draws::Positions.generator(seed, stream);
         let mut readings = Draws::Readings.generator(seed, stream);
@@ -230,7 +238,16 @@ impl Scenario {
                 (time, exp(-tau) * motion.at(time).attitude)
             })
             .unzip();
-        TableRecord {
+        TableLog {
+            tilts: self.tilts(motion, &time),
+            time,
+            attitude,
+        }
+    }
+
+    fn table_accuracy(&self) -> TableAccuracy {
+        let errors = &self.table.errors;
+        TableAccuracy {
             position_sigma: errors.position,
             reading_sigma: errors.reading,
             geometry: TableGeometry {
@@ -242,9 +259,6 @@ impl Scenario {
                     Moves::Body { .. } => SVector::zeros(),
                 },
             },
-            tilts: self.tilts(motion, &time),
-            time,
-            attitude,
         }
     }
 }

@@ -6,13 +6,14 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 use super::Integrator;
+use crate::calibration::ErrorTerm;
+use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, USUAL_TILT, usual_variation};
 use crate::earth::Site;
-use crate::imu::{ANGLES, FurtherVector, InstallationForm, Output, PerSensor, Sensor, Triad};
+use crate::imu::BodyFrame;
+use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
 use crate::models::{
     self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
 };
-use crate::run::record::BodyFrame;
-use crate::run::state_block::{StateBlock, USUAL_LEVEL, USUAL_NORTH, USUAL_TILT};
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
@@ -121,28 +122,28 @@ impl Scenario {
         Ok(self)
     }
 
-    /// The same scenario with the errors of a block, of usual size unless its models state one.
-    pub fn with_block(mut self, block: StateBlock) -> Self {
+    /// The same scenario with an error term, of usual magnitude unless its models state one.
+    pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
-            StateBlock::WanderingBias => {
+            ErrorTerm::GaussMarkovBias => {
                 let noise = &mut self.instrument.noise;
                 for noise in [&mut noise.gyro, &mut noise.accel] {
-                    noise.instability.get_or_insert(noise.usual_instability());
+                    noise.gauss_markov.get_or_insert(usual_variation(noise));
                 }
             }
-            StateBlock::TableBase | StateBlock::TableAxes => {
+            ErrorTerm::TableBase | ErrorTerm::TableAxes => {
                 let errors = &mut self.table.errors;
                 let base = errors.level == 0.0 && errors.north == 0.0;
-                if block == StateBlock::TableBase && base {
+                if block == ErrorTerm::TableBase && base {
                     (errors.level, errors.north) = (USUAL_LEVEL, USUAL_NORTH);
                 }
-                if block == StateBlock::TableAxes && errors.nonorthogonality == 0.0 {
+                if block == ErrorTerm::TableAxes && errors.nonorthogonality == 0.0 {
                     errors.nonorthogonality = USUAL_TILT;
                 }
             }
-            StateBlock::Term(term) => {
+            ErrorTerm::Instrument(term) => {
                 for parameter in term.parameters() {
-                    let sigma = &mut self.instrument.further_sigma[parameter];
+                    let sigma = &mut self.instrument.term_sigma[parameter];
                     if *sigma == 0.0 {
                         *sigma = term.usual_sigma();
                     }
@@ -153,18 +154,18 @@ impl Scenario {
     }
 
     /// Whether its runs have the states of a block.
-    pub fn has(&self, block: StateBlock) -> bool {
+    pub fn has(&self, block: ErrorTerm) -> bool {
         let sees_table = self.body_frame == BodyFrame::Table;
         let errors = &self.table.errors;
         match block {
-            StateBlock::WanderingBias => {
-                let wanders = |sensor| self.instrument.noise.get(sensor).instability.is_some();
-                Sensor::ALL.into_iter().any(wanders)
+            ErrorTerm::GaussMarkovBias => {
+                let varies = |sensor| self.instrument.noise.get(sensor).gauss_markov.is_some();
+                Sensor::ALL.into_iter().any(varies)
             }
-            StateBlock::TableBase => sees_table && errors.level.max(errors.north) > 0.0,
-            StateBlock::TableAxes => sees_table && errors.nonorthogonality > 0.0,
-            StateBlock::Term(term) => {
-                let sigma = &self.instrument.further_sigma;
+            ErrorTerm::TableBase => sees_table && errors.level.max(errors.north) > 0.0,
+            ErrorTerm::TableAxes => sees_table && errors.nonorthogonality > 0.0,
+            ErrorTerm::Instrument(term) => {
+                let sigma = &self.instrument.term_sigma;
                 term.parameters().any(|k| sigma[k] > 0.0)
             }
         }
@@ -212,9 +213,9 @@ impl Scenario {
         Ok(())
     }
 
-    /// The true parameters of further terms.
-    pub(super) fn draw_further(&self, rng: &mut ChaCha8Rng) -> FurtherVector {
-        self.instrument.further_sigma.map(|sigma| {
+    /// The true parameters of error terms.
+    pub(super) fn draw_terms(&self, rng: &mut ChaCha8Rng) -> TermVector {
+        self.instrument.term_sigma.map(|sigma| {
             let unit: f64 = StandardNormal.sample(rng);
             sigma * unit
         })
@@ -288,10 +289,8 @@ impl SiteFile {
             self.longitude_deg.0 * DEGREE,
             self.height_m.0,
         );
-        Site {
-            gravity: self.gravity_m_s2.map_or(site.gravity, |g| g.0),
-            ..site
-        }
+        // What is simulated is known.
+        site.with_gravity(self.gravity_m_s2.map_or(site.gravity, |g| g.0), 0.0)
     }
 }
 

@@ -25,8 +25,8 @@ fn table_errors_move_neither_truth_nor_noise() {
     scenario.table.errors.reading = 0.0;
     let other = scenario.simulate(7, 3).unwrap();
     assert_eq!(plain.truth, other.truth);
-    assert_eq!(plain.run.imu, other.run.imu);
-    assert_ne!(plain.run.table, other.run.table);
+    assert_eq!(plain.run.recording.imu, other.run.recording.imu);
+    assert_ne!(plain.run.recording.table, other.run.recording.table);
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn the_paper_s_draw_keeps_its_bounds_in_every_form() {
 
 #[test]
 fn the_prior_is_the_draw_s_mean_and_standard_deviation() {
-    let prior = demo().simulate(1, 0).unwrap().run.prior;
+    let prior = demo().simulate(1, 0).unwrap().run.instrument.prior;
     let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-6;
     assert!(close(prior.gyro.scale_sigma.x, 2500.0 * PPM / 3f64.sqrt()));
     assert!(close(
@@ -75,7 +75,13 @@ fn the_prior_is_the_draw_s_mean_and_standard_deviation() {
 fn a_position_error_stays_while_the_table_stands_and_is_new_after_each_move() {
     let mut scenario = demo();
     scenario.table.errors.reading = 0.0;
-    let table = scenario.simulate(1, 0).unwrap().run.table.unwrap();
+    let table = scenario
+        .simulate(1, 0)
+        .unwrap()
+        .run
+        .recording
+        .table
+        .unwrap();
     let motion = Motion::new(
         &scenario.table,
         &scenario.path,
@@ -110,15 +116,19 @@ fn level_and_north_errors_move_the_truth_but_not_the_reading() {
     crooked.table.errors.north = 20.0 * ARCSEC;
     crooked.table.errors.nonorthogonality = 3.0 * ARCSEC;
     let [plain, crooked] = [demo(), crooked].map(|scenario| scenario.simulate(1, 0).unwrap());
-    let [read, of_crooked] = [&plain, &crooked].map(|made| made.run.table.as_ref().unwrap());
+    let [read, of_crooked] =
+        [&plain, &crooked].map(|made| made.run.recording.table.as_ref().unwrap());
     assert_eq!(read.attitude, of_crooked.attitude);
-    assert!(!read.geometry.any() && of_crooked.geometry.any());
-    assert_ne!(plain.run.imu.accel, crooked.run.imu.accel);
+    assert!(!plain.run.table.geometry.any() && crooked.run.table.geometry.any());
+    assert_ne!(
+        plain.run.recording.imu.accel,
+        crooked.run.recording.imu.accel
+    );
 }
 
 #[test]
 fn pulses_add_up_to_the_increments_within_a_count() {
-    let pulses = demo().simulate(1, 0).unwrap().run.imu;
+    let pulses = demo().simulate(1, 0).unwrap().run.recording.imu;
     let increments = Scenario {
         output: Output::Increment,
         ..demo()
@@ -126,6 +136,7 @@ fn pulses_add_up_to_the_increments_within_a_count() {
     .simulate(1, 0)
     .unwrap()
     .run
+    .recording
     .imu;
     for (counted, integral, pulse) in [
         (&pulses.gyro, &increments.gyro, pulses.pulse.gyro),
@@ -148,12 +159,12 @@ fn what_standing_still_leaves_beside_the_model_is_the_stated_random_walk() {
         ..demo()
     };
     let simulated = scenario.simulate(1, 0).unwrap();
-    let imu = &simulated.run.imu;
+    let imu = &simulated.run.recording.imu;
     // The first dwell: model output is constant, so the scatter is the noise.
     let still = 0..5900;
     for (samples, noise) in [
-        (&imu.gyro, &simulated.run.noise.gyro),
-        (&imu.accel, &simulated.run.noise.accel),
+        (&imu.gyro, &simulated.run.instrument.noise.gyro),
+        (&imu.accel, &simulated.run.instrument.noise.accel),
     ] {
         let samples = &samples[still.clone()];
         let mean = samples.iter().sum::<Vector3<f64>>() / samples.len() as f64;
@@ -232,7 +243,7 @@ fn every_attitude_of_the_nineteen_positions_agrees_with_an_independent_simulatio
             [-0.00097803267715, -0.0019560653543, -0.00293409803145],
         ),
     };
-    let imu = scenario.simulate(1, 0).unwrap().run.imu;
+    let imu = scenario.simulate(1, 0).unwrap().run.recording.imu;
     assert_eq!(imu.len(), 98_200);
     for (k, gyro, accel) in samples {
         // The gyros differ by the last digit of the Earth's rate, the accelerometers by the printing.

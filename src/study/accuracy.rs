@@ -3,30 +3,30 @@
 //!
 //! Everything is compared in the general form and in the body frame of the table.
 
+mod auxiliary;
 mod baseline;
 mod figures;
-mod further;
 mod navigation;
 mod trial;
 
 use rayon::prelude::*;
 
 use super::navigation::NavigationStudyError;
-use crate::calibration::outcome::Nis;
-use crate::calibration::states::{PARAMETERS, ParameterVector};
-use crate::calibration::{BlockEffect, CalibrationError, Group, mean_square_interval};
+use crate::calibration::ErrorTerm;
+use crate::calibration::Nis;
+use crate::calibration::{CalibrationError, ErrorTermTest, Group, mean_square_interval};
+use crate::calibration::{PARAMETERS, ParameterVector};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
-use crate::run::StateBlock;
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
 use figures::{Squares, rms};
 use navigation::Way;
 
+pub use auxiliary::ErrorTermAccuracy;
 pub use baseline::Baseline;
 pub use figures::Figures;
-pub use further::FurtherAccuracy;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
@@ -37,8 +37,8 @@ pub struct AccuracyStudy {
     pub scenario: Scenario,
     /// The filter's installation form; the truth has that of the scenario.
     pub form: InstallationForm,
-    /// Blocks of states whose errors are there and that the filter does not have.
-    pub unmodelled: Vec<StateBlock>,
+    /// Error terms that are there and that the filter does not have.
+    pub unmodelled: Vec<ErrorTerm>,
     /// Number of runs.
     pub runs: u64,
     /// Seed; each run has its own streams of it.
@@ -84,9 +84,9 @@ pub struct Accuracy {
     /// NEES/n over all runs; `None` if no run gave an estimate.
     pub anees: Option<Anees>,
     /// Figures of each block of constants beside the parameters that was estimated.
-    pub further: Vec<FurtherAccuracy>,
-    /// What each block of states did to the filter in the first run: see [`crate::calibration::block_effects`].
-    pub effects: Vec<BlockEffect>,
+    pub error_terms: Vec<ErrorTermAccuracy>,
+    /// What each error term did to the filter in the first run: see [`crate::calibration::test_error_terms`].
+    pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
     /// NIS of table attitude over all runs.
@@ -162,7 +162,7 @@ impl AccuracyStudy {
                 .collect(),
             navigation,
             not_navigated,
-            further: further::figures(&trials),
+            error_terms: auxiliary::figures(&trials),
             effects: trials
                 .first()
                 .map_or_else(Vec::new, |trial| trial.effects.clone()),

@@ -8,16 +8,16 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::states::{PARAMETERS, ParameterMatrix, parameter};
 use crate::calibration::{Comparison, ComparisonError, Named, compare};
+use crate::calibration::{PARAMETERS, ParameterMatrix, parameter};
 use crate::earth::Site;
+use crate::imu::BodyFrame;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{INPUTS, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorModel, ErrorVector, Height, Increments, NavigationError, NearPole,
     Sensitivity, Solution, Strapdown, Trajectory, Transition, sensed_errors, within_reach,
 };
-use crate::run::record::BodyFrame;
 use course::Course;
 
 pub use outlook::Outlook;
@@ -63,13 +63,13 @@ pub struct Pair {
     pub truth: PerSensor<Triad>,
     /// What it is taken for.
     pub calibration: PerSensor<Triad>,
-    /// Covariance of the calibration less the truth; none if no σ is claimed.
+    /// Covariance of the calibration minus the truth; none if no σ is claimed.
     pub covariance: Option<ParameterMatrix>,
 }
 
 /// Navigation errors of one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct Epoch {
     /// Time since the start, s.
     pub time: f64,
     /// The actual error.
@@ -79,7 +79,7 @@ pub struct Moment {
     pub covariance: Option<ErrorMatrix>,
 }
 
-impl Moment {
+impl Epoch {
     /// Predicted 1σ of each error, in the order of [`NavigationError::to_vector`].
     pub fn sigma(&self) -> Option<SVector<f64, STATES>> {
         let covariance = self.covariance.as_ref()?;
@@ -207,7 +207,7 @@ impl Mission {
     ///
     /// # Errors
     /// If the mission leads to a pole or the calibration is singular.
-    pub fn navigate(&self, pair: &Pair) -> Result<Vec<Moment>, NavigationStudyError> {
+    pub fn navigate(&self, pair: &Pair) -> Result<Vec<Epoch>, NavigationStudyError> {
         let mut moments = self.errors(pair)?;
         if let Some(covariance) = &pair.covariance {
             for (moment, exposure) in moments.iter_mut().zip(self.exposure(&pair.truth)?) {
@@ -221,7 +221,7 @@ impl Mission {
     ///
     /// # Errors
     /// As for [`Self::navigate`].
-    pub fn errors(&self, pair: &Pair) -> Result<Vec<Moment>, NavigationStudyError> {
+    pub fn errors(&self, pair: &Pair) -> Result<Vec<Epoch>, NavigationStudyError> {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
@@ -233,7 +233,7 @@ impl Mission {
         &self,
         start: &ErrorVector,
         pair: &Pair,
-    ) -> Result<Vec<Moment>, NavigationStudyError> {
+    ) -> Result<Vec<Epoch>, NavigationStudyError> {
         let sensed = pair.sensed()?;
         let steps = match &self.motion {
             Motion::Standing(_) => STANDING_STEPS,
@@ -329,8 +329,8 @@ impl Exposure {
     }
 }
 
-fn moment(time: f64, navigation: &Strapdown, truth: &Solution) -> Moment {
-    Moment {
+fn moment(time: f64, navigation: &Strapdown, truth: &Solution) -> Epoch {
+    Epoch {
         time,
         error: NavigationError::of(navigation.solution(), truth),
         covariance: None,

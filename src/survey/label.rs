@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 use super::rest::{Rest, mean};
 use super::turn::{Turn, zero};
 use crate::imu::Sensor;
-use crate::run::{LabelledMotion, Run, Segment};
+use crate::recording::{LabelledMotion, Segment};
+use crate::run::Dwell;
+use crate::run::Run;
 use crate::units::DEGREE;
 
 /// A label's axis further than this from the plumb line is another one, rad.
@@ -76,7 +78,7 @@ pub(super) fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
         segment: segment.clone(),
         verdict: verdict(run, rests, segment),
     };
-    run.segments.iter().map(check).collect()
+    run.recording.segments.iter().map(check).collect()
 }
 
 fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
@@ -84,7 +86,8 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
     match segment.motion {
         None => Verdict::Unknown,
         Some(LabelledMotion::Stands { up }) => {
-            let force = mean(run, &segment.as_dwell(), Sensor::Accel) - run.prior.accel.bias;
+            let force = mean(run, &Dwell::of_segment(segment), Sensor::Accel)
+                - run.instrument.prior.accel.bias;
             Verdict::Position {
                 off: force.angle(&up),
                 moving: moving(run, rests, &samples),
@@ -93,11 +96,11 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
         Some(LabelledMotion::Turns { axis, .. }) => {
             let zero = zero(run, rests, samples.start);
             let turn = Turn::of(run, samples.clone(), &zero);
-            let length = ((END / run.imu.period).round() as usize)
+            let length = ((END / run.recording.imu.period).round() as usize)
                 .max(1)
                 .min(samples.len());
             let rate = |samples: Range<usize>| {
-                angle(run, samples, &zero).norm() / length as f64 / run.imu.period
+                angle(run, samples, &zero).norm() / length as f64 / run.recording.imu.period
             };
             let ends = [
                 samples.start..samples.start + length,
@@ -105,7 +108,7 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
             ];
             let at_ends = ends.into_iter().any(|end| rate(end) > TURNING);
             // Beyond sections laid end to end lies something else.
-            let whole = if run.imu.continuous {
+            let whole = if run.recording.imu.continuous {
                 to_rests(rests, &samples)
             } else {
                 samples.clone()
@@ -117,7 +120,7 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
             Verdict::Turn {
                 angle: within,
                 off: off.min(std::f64::consts::PI - off),
-                cut: at_ends && (!run.imu.continuous || lost.abs() > LOST),
+                cut: at_ends && (!run.recording.imu.continuous || lost.abs() > LOST),
             }
         }
     }
@@ -125,8 +128,8 @@ fn verdict(run: &Run, rests: &[Rest], segment: &Segment) -> Verdict {
 
 /// Sum of the gyros over some samples, rad.
 fn angle(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Vector3<f64> {
-    let section = &run.imu.gyro[samples];
-    section.iter().sum::<Vector3<f64>>() - zero * (section.len() as f64 * run.imu.period)
+    let section = &run.recording.imu.gyro[samples];
+    section.iter().sum::<Vector3<f64>>() - zero * (section.len() as f64 * run.recording.imu.period)
 }
 
 /// Some samples and those between them and the rests before and after.
@@ -147,5 +150,5 @@ fn moving(run: &Run, rests: &[Rest], samples: &Range<usize>) -> f64 {
             .saturating_sub(start.max(samples.start))
     };
     let standing: usize = rests.iter().map(of).sum();
-    samples.len().saturating_sub(standing) as f64 * run.imu.period
+    samples.len().saturating_sub(standing) as f64 * run.recording.imu.period
 }

@@ -92,8 +92,8 @@ fn directions(rests: &[Rest]) -> usize {
 
 /// A step of the file's values as a rate.
 fn step(run: &Run, sensor: Sensor, axis: usize) -> Option<f64> {
-    let column = &run.imu.log.as_ref()?.columns.get(sensor)[axis];
-    Some((column.step? * column.unit / run.imu.period).abs())
+    let column = &run.recording.imu.log.as_ref()?.columns.get(sensor)[axis];
+    Some((column.step? * column.unit / run.recording.imu.period).abs())
 }
 
 #[cfg(test)]

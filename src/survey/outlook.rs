@@ -1,10 +1,10 @@
 //! What each method could see of the instrument.
 
-use crate::calibration::outcome::{Estimate, OBSERVED_BELOW, parameter_name};
-use crate::calibration::states::sensor_and_parameter;
+use crate::calibration::sensor_and_parameter;
 use crate::calibration::{CalibrationError, Group, bound, coarse_start, six_position};
-use crate::imu::{FurtherVector, InstallationForm};
-use crate::run::Run;
+use crate::calibration::{Estimate, OBSERVED_BELOW, Options, Problem, parameter_name};
+use crate::imu::{InstallationForm, TermVector};
+use crate::run::{Aiding, Run};
 
 /// Forms differ by what the data must say, not by what they can.
 const FORM: InstallationForm = InstallationForm::General;
@@ -62,14 +62,13 @@ pub(super) fn methods(run: &Run) -> Vec<MethodOutlook> {
 
 fn expected(run: &Run, path: Path) -> Result<Expected, String> {
     let estimate = match path {
-        Path::SixPosition => six_position(run, FORM).map(|closed| closed.estimate),
-        Path::TableAiding if run.table.is_none() => Err(CalibrationError::NoTable),
-        Path::TableAiding => filtered(run),
-        Path::VelocityAiding if run.table.is_none() => filtered(run),
-        Path::VelocityAiding => filtered(&Run {
-            table: None,
-            ..run.clone()
-        }),
+        Path::SixPosition => {
+            let problem = Problem::new(run, &Options::default());
+            six_position(&problem).map(|closed| closed.estimate)
+        }
+        Path::TableAiding if run.recording.table.is_none() => Err(CalibrationError::NoTable),
+        Path::TableAiding => filtered(run, Aiding::Table),
+        Path::VelocityAiding => filtered(run, Aiding::Velocity),
     };
     match estimate {
         Ok(estimate) => Ok(summary(run, &estimate)),
@@ -78,12 +77,10 @@ fn expected(run: &Run, path: Path) -> Result<Expected, String> {
 }
 
 /// The covariance that the filter ends with, linearised where it would begin.
-fn filtered(run: &Run) -> Result<Estimate, CalibrationError> {
-    if !run.imu.continuous {
-        return Err(CalibrationError::not_continuous(&run.imu));
-    }
-    let start = coarse_start(run, &run.dwells(), FORM)?;
-    Ok(bound(run, &start.at.triads, &FurtherVector::zeros())?.estimate)
+fn filtered(run: &Run, aiding: Aiding) -> Result<Estimate, CalibrationError> {
+    let problem = Problem::new(run, &Options::default().aiding(aiding));
+    let start = coarse_start(&problem)?;
+    Ok(bound(&problem, &start.at.triads, &TermVector::zeros())?.estimate)
 }
 
 fn summary(run: &Run, estimate: &Estimate) -> Expected {
@@ -95,7 +92,7 @@ fn summary(run: &Run, estimate: &Estimate) -> Expected {
     };
     let hidden = |&k: &usize| {
         let (sensor, of_triad) = sensor_and_parameter(k);
-        sigma[k] > OBSERVED_BELOW * run.prior.get(sensor).sigma(FORM)[of_triad]
+        sigma[k] > OBSERVED_BELOW * run.instrument.prior.get(sensor).sigma(FORM)[of_triad]
     };
     Expected {
         sigma: Group::all().map(group).collect(),

@@ -50,7 +50,7 @@ impl Up {
 
 impl Rest {
     fn of(run: &Run, dwell: Dwell) -> Self {
-        let force = mean(run, &dwell, Sensor::Accel) - run.prior.accel.bias;
+        let force = mean(run, &dwell, Sensor::Accel) - run.instrument.prior.accel.bias;
         Self {
             up: Up::of(&force),
             force,
@@ -61,7 +61,10 @@ impl Rest {
     /// Begin and end, s.
     pub fn times(&self, run: &Run) -> [f64; 2] {
         let samples = &self.dwell.samples;
-        [run.imu.time(samples.start), run.imu.time(samples.end)]
+        [
+            run.recording.imu.time(samples.start),
+            run.recording.imu.time(samples.end),
+        ]
     }
 
     /// Angle between gravity as the accelerometers see it and as the table holds the instrument, rad.
@@ -72,7 +75,7 @@ impl Rest {
 
     /// s.
     pub fn duration(&self, run: &Run) -> f64 {
-        self.dwell.samples.len() as f64 * run.imu.period
+        self.dwell.samples.len() as f64 * run.recording.imu.period
     }
 }
 
@@ -82,6 +85,6 @@ pub(super) fn mean(run: &Run, dwell: &Dwell, sensor: Sensor) -> Vector3<f64> {
 
 /// Where it stands.
 pub(super) fn rests(run: &Run) -> Vec<Rest> {
-    let rests = run.rests().into_iter();
+    let rests = run.dwells(run.aiding()).into_iter();
     rests.map(|dwell| Rest::of(run, dwell)).collect()
 }

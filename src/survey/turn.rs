@@ -7,7 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::rest::{Rest, mean};
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
-use crate::run::{LabelledMotion, Run};
+use crate::recording::LabelledMotion;
+use crate::run::Run;
 use crate::units::DEGREE;
 
 /// Turns about one axis go along it for this part of their way at least …
@@ -46,11 +47,11 @@ pub struct Turn {
 
 impl Turn {
     pub(super) fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
-        let period = run.imu.period;
+        let period = run.recording.imu.period;
         let length = ((STEP / period).round() as usize).max(1);
         let mut attitude = Matrix3::identity();
         let (mut sum, mut way, mut fastest) = (Vector3::zeros(), 0.0, 0.0f64);
-        for step in run.imu.gyro[samples.clone()].chunks(length) {
+        for step in run.recording.imu.gyro[samples.clone()].chunks(length) {
             let turned = step.iter().sum::<Vector3<f64>>() - zero * (step.len() as f64 * period);
             for increment in step {
                 attitude *= exp(increment - zero * period);
@@ -105,7 +106,7 @@ pub(super) fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
         start.saturating_sub(sample).max(sample.saturating_sub(end))
     };
     let nearest = rests.iter().min_by_key(apart);
-    nearest.map_or(run.prior.gyro.bias, |rest| {
+    nearest.map_or(run.instrument.prior.gyro.bias, |rest| {
         mean(run, &rest.dwell, Sensor::Gyro)
     })
 }
@@ -116,11 +117,11 @@ pub(super) fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
         let samples = pair[0].dwell.samples.end..pair[1].dwell.samples.start;
         (Some(from), samples)
     });
-    let labelled = run.segments.iter().filter_map(|segment| {
+    let labelled = run.recording.segments.iter().filter_map(|segment| {
         let turns = matches!(segment.motion, Some(LabelledMotion::Turns { .. }));
         turns.then(|| (None, segment.samples.clone()))
     });
-    let all: Vec<(Option<usize>, Range<usize>)> = match run.imu.continuous {
+    let all: Vec<(Option<usize>, Range<usize>)> = match run.recording.imu.continuous {
         true => between.collect(),
         false => labelled.collect(),
     };

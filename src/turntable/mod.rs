@@ -5,13 +5,19 @@
 //! wobble) moves the true attitude but not the reading, see [`Imperfection`]; what it reads wrongly
 //! (position error and reading noise) is left to whoever makes the readings.
 
+mod accuracy;
 mod chain;
+mod geometry;
 mod motion;
 mod path;
 mod profile;
 mod table;
 
+pub use accuracy::TableAccuracy;
 pub use chain::Kinematics;
+pub use geometry::{
+    AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,
+};
 pub use motion::Motion;
 pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
 pub use profile::{Profile, Turned};

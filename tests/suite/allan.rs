@@ -103,6 +103,8 @@ fn the_noise_of_a_simulated_instrument_comes_back_and_is_read_by_a_run() {
             found["sigma"].as_f64().unwrap(),
         );
         assert!((value - stated(key)).abs() < 4.0 * sigma, "{key} {found}");
+        // A minute at 100 Hz shows white noise to some per cent.
+        assert!(sigma < 0.1 * value, "{key} {found}");
         assert_eq!(document["imu_noise"][key].as_f64(), Some(value));
         // A minute shows no floor, so no coefficient.
         let coefficients = &document[triad]["triad"]["coefficients"];

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
-use turncal::export::HEADER;
-use turncal::imu::{FurtherVector, Output, PerSensor, Sensor, Term};
-use turncal::run::record::{TermRecord, TriadRecord};
-use turncal::run::{CalibrationRecord, Run};
+use turncal::formats::export::HEADER;
+use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
+use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
@@ -54,7 +55,7 @@ fn log(
 }
 
 /// A calibration with every kind of error, in these units.
-fn calibration(units: [&str; 2], scale: [f64; 2]) -> CalibrationRecord {
+fn calibration(units: [&str; 2], scale: [f64; 2]) -> Calibration {
     let triad = |scale: f64, sign: f64| TriadRecord {
         scale: [scale * 1.01, scale * 0.99, scale * 1.002],
         installation: [
@@ -64,12 +65,12 @@ fn calibration(units: [&str; 2], scale: [f64; 2]) -> CalibrationRecord {
         ],
         bias: [0.01 * scale, -0.02 * scale, sign * 0.03 * scale],
     };
-    CalibrationRecord {
+    Calibration {
         unit: Some(PerSensor {
             gyro: units[0].to_owned(),
             accel: units[1].to_owned(),
         }),
-        ..CalibrationRecord::new(triad(scale[0], 1.0), triad(scale[1], -1.0))
+        ..Calibration::new(triad(scale[0], 1.0), triad(scale[1], -1.0))
     }
 }
 
@@ -169,14 +170,14 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
     scenario.table.errors = Default::default();
     for term in terms {
         for parameter in term.parameters() {
-            scenario.instrument.further_sigma[parameter] = term.usual_sigma();
+            scenario.instrument.term_sigma[parameter] = term.usual_sigma();
         }
     }
     let simulated = scenario.simulate(3, 0).unwrap();
     let run = &simulated.run;
     let mut record = truth_record(&simulated.truth, run);
     for parameter in terms.iter().flat_map(|term| term.parameters()) {
-        let value = simulated.further[parameter];
+        let value = simulated.terms[parameter];
         assert!(value != 0.0);
         let name = Term::parameter_name(parameter).unwrap();
         record.terms.insert(name, TermRecord { value, sigma: None });
@@ -186,10 +187,10 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
     let Scenario {
         site, integrator, ..
     } = &scenario;
-    let ideal = true_increments(&motion, site, integrator, &FurtherVector::zeros());
-    let largest = |record: &CalibrationRecord| {
+    let ideal = true_increments(&motion, site, integrator, &TermVector::zeros());
+    let largest = |record: &Calibration| {
         let correction = Correction::for_run(record, run).unwrap();
-        let period = run.imu.period;
+        let period = run.recording.imu.period;
         let mut largest = PerSensor::from_fn(|_| 0.0_f64);
         for (k, sample) in correction.samples(run).enumerate() {
             let rate = (sample.rate - ideal.gyro[k] / period).amax();
@@ -271,8 +272,8 @@ fn the_calibrated_record_is_a_record_again() {
     fs::write(again.join("run.toml"), toml).unwrap();
     let read = Run::read(&again.join("run.toml")).unwrap();
     let expected = by_hand(&record.gyro, [1.0, 2.0, 3.0]);
-    assert!((read.imu.gyro[50] / 0.01 - expected).amax() < 1e-12);
-    assert_eq!(read.imu.start, 0.0);
+    assert!((read.recording.imu.gyro[50] / 0.01 - expected).amax() < 1e-12);
+    assert_eq!(read.recording.imu.start(), 0.0);
 }
 
 /// A calibration and a log of two rows, both in SI.
@@ -306,7 +307,7 @@ fn a_calibration_of_another_instrument_is_refused_with_the_reason() {
     let (units, scale) = (["count", "count"], [2e6, 1e5]);
     let row = [0.0, 0.0, 0.0, 0.0, 0.0, 9800.0];
     let run = log(root.path(), "output = \"pulse\"", units, scale, [row; 2]);
-    let of = |name: &str, record: &CalibrationRecord| {
+    let of = |name: &str, record: &Calibration| {
         let path = written(root.path(), name, record);
         failure(&mut turncal(&[Path::new("apply"), &path, &run]), 1)
     };

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use turncal::run::CalibrationRecord;
+use turncal::calibration::result::{Calibration, Method};
 
 fn turncal() -> Command {
     Command::new(env!("CARGO_BIN_EXE_turncal"))
@@ -82,7 +82,7 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
             .assert()
             .success();
         let document = &output.get_output().stdout;
-        let record: CalibrationRecord = serde_json::from_slice(document).unwrap();
+        let record: Calibration = serde_json::from_slice(document).unwrap();
         assert_eq!(record.parameters.len(), record.covariance.len());
         let sigma = record.sigma.unwrap();
         for (name, variance) in [
@@ -94,6 +94,21 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
             assert!((covariance / variance - 1.0).abs() < 1e-12, "{name}");
         }
         let correction = record.correction.unwrap();
+        for (triad, matrix) in [
+            (&record.gyro, correction.gyro),
+            (&record.accel, correction.accel),
+        ] {
+            // Its inverse is K C, whichever way round it was meant.
+            for i in 0..3 {
+                for j in 0..3 {
+                    let product: f64 = (0..3)
+                        .map(|k| matrix[i][k] * triad.scale[k] * triad.installation[k][j])
+                        .sum();
+                    let expected = f64::from(u8::from(i == j));
+                    assert!((product - expected).abs() < 1e-12, "{i} {j}: {product}");
+                }
+            }
+        }
         for vector in &record.test_vectors {
             // u = correction (N − bias), as a user would write it.
             for (triad, matrix, first) in [
@@ -114,37 +129,74 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
 }
 
 #[test]
-fn an_existing_output_is_kept_unless_forced() {
+fn an_existing_output_is_kept_unless_forced_and_a_users_file_in_any_case() {
     let directory = tempfile::tempdir().unwrap();
     let output = directory.path().join("out");
-    fs::create_dir(&output).unwrap();
-    fs::write(output.join("mine.txt"), "precious").unwrap();
-    let refused = turncal()
-        .args(["simulate", "demo", "-o"])
-        .arg(&output)
-        .assert();
-    let refused = refused.code(1);
-    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    let simulate = |arguments: &[&str]| {
+        let mut command = turncal();
+        command.args(["simulate", "demo", "-o"]).arg(&output);
+        command.args(arguments).assert()
+    };
+    let refusal = |arguments: &[&str]| {
+        let refused = simulate(arguments).code(1);
+        String::from_utf8_lossy(&refused.get_output().stderr).into_owned()
+    };
+    simulate(&[]).success();
+    let first = bytes_below(&output);
+    let message = refusal(&["--seed", "7"]);
     assert!(message.contains("--force"), "{message}");
-    assert!(output.join("mine.txt").exists());
-    turncal()
-        .args(["simulate", "demo", "--force", "-o"])
-        .arg(&output)
-        .assert()
-        .success();
-    assert!(output.join("truth.json").exists());
+    assert!(bytes_below(&output) == first);
+    simulate(&["--seed", "7", "--force"]).success();
+    let second = bytes_below(&output);
+    assert!(second.keys().eq(first.keys()) && second != first);
+
+    fs::write(output.join("mine.txt"), "precious").unwrap();
+    let message = refusal(&["--force"]);
+    assert!(message.contains("`mine.txt`"), "{message}");
+    assert_eq!(bytes_below(&output)["mine.txt"], b"precious");
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn both_methods_may_follow_one_another_without_a_name_for_their_output() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = |arguments: &[&str]| {
+        let mut command = turncal();
+        command.current_dir(&directory).args(arguments);
+        command.assert().success();
+    };
+    here(&["simulate", "demo", "-o", "mine"]);
+    here(&["calibrate", "mine/run.toml"]);
+    here(&["calibrate", "mine/run.toml", "--method", "six-position"]);
+    let method = |name: &str| {
+        let path = directory.path().join(name).join("calibration.json");
+        let record = Calibration::read(&path).unwrap();
+        record.method
+    };
+    assert_eq!(method("mine-calibration"), Some(Method::Ekf));
+    assert_eq!(
+        method("mine-calibration-six-position"),
+        Some(Method::SixPosition)
+    );
 }
 
 #[test]
 fn wrong_usage_is_status_two_and_names_the_way() {
-    for arguments in [
-        &["calibrate"][..],
-        &["calibrate", "run.toml", "--installation", "four-angle"],
-        &["simulate", "demo"],
-        &["dance"],
-        &["demo", "--seed", "many"],
+    for (arguments, way) in [
+        (&["calibrate"][..], "Usage: turncal calibrate <RUN.toml>"),
+        (
+            &["calibrate", "run.toml", "--installation", "four-angle"],
+            "general, six-angle, three-angle",
+        ),
+        (&["simulate", "demo"], "--output <DIR>"),
+        (&["dance"], "unrecognized subcommand 'dance'"),
+        (&["demo", "--seed", "many"], "'many' for '--seed <SEED>'"),
     ] {
-        turncal().args(arguments).assert().code(2);
+        let refused = turncal().args(arguments).assert().code(2).stdout("");
+        let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        for said in [way, "--help"] {
+            assert!(message.contains(said), "no `{said}` in {message}");
+        }
     }
 }
 

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use assert_cmd::Command;
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::TermRecord;
 use turncal::imu::PerSensor;
-use turncal::run::CalibrationRecord;
-use turncal::run::record::TermRecord;
 
 use crate::calibration_file::{record, written};
 
 /// A calibration of it whose gyro scale factor x is `ppm` too large, with σ 1 ppm.
-fn calibration(ppm: f64) -> CalibrationRecord {
+fn calibration(ppm: f64) -> Calibration {
     let mut record = record();
     record.gyro.scale[0] *= 1.0 + ppm * 1e-6;
     record.parameters = vec!["gyro.scale.x".to_owned()];

@@ -7,14 +7,15 @@ use std::process;
 
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
-use turncal::export::{Exported, Format, write};
-use turncal::imu::{Instability, Noise, Nominal, PerSensor};
-use turncal::run::record::{BodyFrame, TermRecord, TestVector, TriadRecord};
-use turncal::run::{CalibrationRecord, Run};
+use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
+use turncal::formats::export::{Exported, Format, write};
+use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
+use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
 
 use crate::calibration_file::written;
 use crate::door::made::made_run;
+use crate::shared::skipped;
 
 const INPUTS: [[f64; 6]; 3] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 9.8],
@@ -36,7 +37,7 @@ fn halves(six: &[f64; 6]) -> [Vector3<f64>; 2] {
 }
 
 /// A calibration of counts with every kind of error and test vectors.
-fn record() -> CalibrationRecord {
+fn record() -> Calibration {
     let gyro = TriadRecord {
         scale: [2.0651e6, 2.0598e6, 2.0634e6],
         installation: [
@@ -56,14 +57,14 @@ fn record() -> CalibrationRecord {
         installation: [[0.0, 1e-6, 1e-6], [1e-6, 0.0, 1e-6], [1e-6, 1e-6, 0.0]],
         bias: [bias, 2.0 * bias, 3.0 * bias],
     };
-    CalibrationRecord {
+    Calibration {
         unit: Some(PerSensor::from_fn(|_| "count".to_owned())),
         sigma: Some(PerSensor {
             gyro: sigma(0.5, 0.03),
             accel: sigma(0.04, 0.4),
         }),
         test_vectors: INPUTS.map(|u| vector(&gyro, &accel, u)).to_vec(),
-        ..CalibrationRecord::new(gyro, accel)
+        ..Calibration::new(gyro, accel)
     }
 }
 
@@ -75,7 +76,7 @@ fn vector(gyro: &TriadRecord, accel: &TriadRecord, calibrated: [f64; 6]) -> Test
     TestVector { raw, calibrated }
 }
 
-fn with_terms(mut record: CalibrationRecord) -> CalibrationRecord {
+fn with_terms(mut record: Calibration) -> Calibration {
     let mut term = |name: &str, value| {
         let term = TermRecord {
             value,
@@ -90,7 +91,7 @@ fn with_terms(mut record: CalibrationRecord) -> CalibrationRecord {
     record
 }
 
-fn exported(record: &CalibrationRecord, format: Format) -> Exported {
+fn exported(record: &Calibration, format: Format) -> Exported {
     write(record, format, None).unwrap()
 }
 
@@ -118,7 +119,7 @@ fn numbers(text: &str) -> Vec<f64> {
 fn of_program(program: &str) -> bool {
     let there = process::Command::new(program).arg("--version").output();
     if there.is_err() {
-        println!("skipped: no {program}");
+        skipped(&format!("no {program}"));
     }
     there.is_ok()
 }
@@ -393,14 +394,14 @@ fn kf_gins_takes_the_sigma_of_biases_and_scale_factors_in_its_units_and_axes() {
 /// A run of the record's instrument.
 fn run() -> Run {
     let mut run = made_run("made");
-    run.unit = PerSensor::from_fn(|_| "count".to_owned());
-    run.nominal = PerSensor {
+    run.instrument.unit = PerSensor::from_fn(|_| "count".to_owned());
+    run.instrument.nominal = PerSensor {
         gyro: Nominal(Vector3::new(2e6, 2.1e6, 2.2e6)),
         accel: Nominal(Vector3::repeat(1e5)),
     };
-    run.noise.gyro = Noise {
+    run.instrument.noise.gyro = Noise {
         random_walk: 2e-5,
-        instability: Some(Instability {
+        gauss_markov: Some(GaussMarkov {
             sigma: 4e-7,
             correlation_time: 200.0,
         }),
@@ -503,7 +504,7 @@ fn a_record_that_is_read_and_written_again_is_the_same_to_the_bit() {
     record.covariance = vec![vec![1.0 / 3.0]];
     record.warnings = vec!["line\nbreak \"quoted\" µ".to_owned()];
     let first = written(root.path(), "first.json", &record);
-    let read = CalibrationRecord::read(&first).unwrap();
+    let read = Calibration::read(&first).unwrap();
     assert_eq!(read, record);
     let second = written(root.path(), "second.json", &read);
     assert_eq!(fs::read(&first).unwrap(), fs::read(&second).unwrap());
@@ -564,7 +565,7 @@ fn wrong_use_of_export_says_what_to_do() {
     .code(1);
     assert_eq!(fs::read(&path).unwrap(), before);
     let mut other = run();
-    other.nominal.accel = Nominal(Vector3::repeat(1e3));
+    other.instrument.nominal.accel = Nominal(Vector3::repeat(1e3));
     let error = write(&record(), Format::Kalibr, Some(&other)).unwrap_err();
     assert!(error.to_string().contains("accel x"), "{error}");
 }

@@ -2,6 +2,7 @@
 //!
 //! `PROPTEST_CASES=1000000 cargo test --release --test suite fuzz` goes on for a million inputs a format.
 
+use std::cell::Cell;
 use std::fs;
 use std::path::Path;
 
@@ -10,16 +11,21 @@ use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use proptest::test_runner::{Config, TestRunner};
 use tempfile::TempDir;
-use turncal::calibration::{Correction, estimate, six_position};
-use turncal::draft::Draft;
-use turncal::imu::{InstallationForm, Output};
+use turncal::calibration::result::Calibration;
+use turncal::calibration::{Correction, Options, Problem, estimate, six_position};
+use turncal::formats::draft::Draft;
+use turncal::formats::write_run;
+use turncal::imu::Output;
 use turncal::models;
 use turncal::noise::Stretch;
 use turncal::noise::conventions::convert;
 use turncal::report::check;
-use turncal::run::{CalibrationRecord, Run, write_run};
+use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::survey::Survey;
+
+/// The files of [`small_run`].
+const FILES: [&str; 4] = ["run.toml", "imu.csv", "table.csv", "segments.csv"];
 
 /// Cases of each format where `PROPTEST_CASES` says nothing.
 const CASES: u32 = 200;
@@ -126,8 +132,21 @@ fn numbers(content: &[u8]) -> Vec<std::ops::Range<usize>> {
     numbers
 }
 
-/// Spoils one file of a directory again and again; `read` says what became of it.
-fn fuzz(directory: &TempDir, file: &str, read: impl Fn(&Path) -> Result<(), String>) {
+/// The names of files that an error may be about: those of the directory, and what the spoilt file calls them.
+fn names_a_file(message: &str, directory: &Path, content: &[u8]) -> bool {
+    let content = String::from_utf8_lossy(content);
+    let mut called = content.split(['"', '\'']).skip(1).step_by(2);
+    let mut files = fs::read_dir(directory).unwrap();
+    files.any(|file| message.contains(&*file.unwrap().path().to_string_lossy()))
+        || called.any(|name| {
+            let named = directory.join(name);
+            !name.is_empty() && message.contains(&*named.to_string_lossy())
+        })
+}
+
+/// Spoils one file of a directory again and again; `read` says what became of it. Gives how often it was read
+/// all the same: if never, nothing behind the door was tried.
+fn fuzz(directory: &TempDir, file: &str, read: impl Fn(&Path) -> Result<(), String>) -> u32 {
     let path = directory.path().join(file);
     let good = fs::read(&path).unwrap();
     read(directory.path()).unwrap();
@@ -136,20 +155,28 @@ fn fuzz(directory: &TempDir, file: &str, read: impl Fn(&Path) -> Result<(), Stri
         failure_persistence: None,
         ..Config::default()
     };
+    let (read_all_the_same, refused) = (Cell::new(0), Cell::new(0));
     let outcome = TestRunner::new(config).run(&vec(Spoil::any(), 1..5), |spoils| {
         let mut content = good.clone();
         spoils.iter().for_each(|spoil| spoil.apply(&mut content));
         fs::write(&path, &content).unwrap();
-        if let Err(message) = read(directory.path()) {
-            // The file itself, or one that it names.
-            prop_assert!(message.contains('/'), "no file named: {message}");
+        match read(directory.path()) {
+            Ok(()) => read_all_the_same.set(read_all_the_same.get() + 1),
+            Err(message) => {
+                let named = names_a_file(&message, directory.path(), &content);
+                prop_assert!(named, "no file named: {message}");
+                refused.set(refused.get() + 1);
+            }
         }
         Ok(())
     });
     if let Err(error) = outcome {
         panic!("{file}: {error}");
     }
+    let (kept, refused) = (read_all_the_same.get(), refused.get());
+    println!("{file}: {kept} read all the same, {refused} refused");
     fs::write(&path, good).unwrap();
+    kept
 }
 
 /// A small run with dwells and turns, a table and labels.
@@ -195,14 +222,15 @@ path = "path.toml"
 /// Reads a run and does what needs no filter.
 fn read_run(directory: &Path) -> Result<(), String> {
     let mut run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
-    let _ = run.dwells();
+    let _ = run.dwells(run.aiding());
     let _ = Stretch::find(&run, None);
     for without_table in [false, true] {
         if without_table {
-            run.table = None;
+            run.recording.table = None;
         }
-        if let Ok(closed_form) = six_position(&run, InstallationForm::General) {
-            let _ = closed_form.quality(&run);
+        let problem = Problem::new(&run, &Options::default());
+        if let Ok(closed_form) = six_position(&problem) {
+            let _ = closed_form.quality(&problem);
         }
     }
     Ok(())
@@ -211,15 +239,14 @@ fn read_run(directory: &Path) -> Result<(), String> {
 #[test]
 fn spoilt_runs() {
     let run = small_run();
-    for file in ["run.toml", "imu.csv", "table.csv", "segments.csv"] {
-        fuzz(&run, file, read_run);
-    }
+    let kept = FILES.map(|file| fuzz(&run, file, read_run));
+    assert!(kept.iter().sum::<u32>() > 0);
 }
 
 #[test]
 fn runs_that_make_no_sense_are_looked_at_all_the_same() {
     let run = small_run();
-    for file in ["run.toml", "imu.csv", "table.csv", "segments.csv"] {
+    let kept = FILES.map(|file| {
         fuzz(&run, file, |directory| {
             let run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
             let survey = Survey::of(&run);
@@ -227,20 +254,22 @@ fn runs_that_make_no_sense_are_looked_at_all_the_same() {
             let _ = turncal::report::terminal::text(&document, Some(80));
             let _ = turncal::report::json(&document);
             Ok(())
-        });
-    }
+        })
+    });
+    assert!(kept.iter().sum::<u32>() > 0);
 }
 
 #[test]
 fn spoilt_logs_of_which_nothing_is_known() {
     let run = small_run();
-    fuzz(&run, "imu.csv", |directory| {
+    let kept = fuzz(&run, "imu.csv", |directory| {
         let draft =
             Draft::of_file(&directory.join("imu.csv")).map_err(|error| error.to_string())?;
         let text = draft.to_toml("imu.csv");
         assert!(text.parse::<toml::Table>().is_ok(), "{text}");
         Ok(())
     });
+    assert!(kept > 0);
 }
 
 #[test]
@@ -265,10 +294,11 @@ fn runs_whose_figures_make_no_sense_are_calibrated_or_refused() {
         };
         for without_table in [false, true] {
             if without_table {
-                run.table = None;
+                run.recording.table = None;
             }
-            if let Ok(outcome) = estimate(&run, InstallationForm::General, &|_| {}) {
-                let _ = outcome.quality(&run);
+            let problem = Problem::new(&run, &Options::default());
+            if let Ok(outcome) = estimate(&problem, &|_| {}) {
+                let _ = outcome.quality(&problem);
             }
         }
         Ok(())
@@ -300,39 +330,42 @@ fn spoilt_models() {
         let _ = scenario.duration();
         Ok(())
     };
-    for file in [
+    let files = [
         "scenario.toml",
         "imu.toml",
         "installation.toml",
         "table.toml",
         "path.toml",
-    ] {
-        fuzz(&directory, file, load);
-    }
-    fuzz(&directory, "trajectory.toml", |directory| {
+    ];
+    let kept = files.map(|file| fuzz(&directory, file, load));
+    assert!(kept.iter().sum::<u32>() > 0);
+    let kept = fuzz(&directory, "trajectory.toml", |directory| {
         let trajectory = directory.join("trajectory.toml");
         let place = models::Place::CommandLine;
         models::trajectory(trajectory.to_str().unwrap(), &place).map_err(|e| e.to_string())?;
         Ok(())
     });
+    assert!(kept > 0);
 }
 
 #[test]
 fn spoilt_calibrations() {
     let run = small_run();
     let read = Run::read(&run.path().join("run.toml")).unwrap();
-    let outcome = estimate(&read, InstallationForm::General, &|_| {}).unwrap();
-    let record = outcome.record(&read, &[], &outcome.quality(&read).unwrap());
+    let problem = Problem::new(&read, &Options::default());
+    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let record = outcome.record(&problem, &[], &outcome.quality(&problem).unwrap());
     let path = run.path().join("calibration.json");
     record.write(&path, false).unwrap();
-    fuzz(&run, "calibration.json", |directory| {
+    let kept = fuzz(&run, "calibration.json", |directory| {
         let path = directory.join("calibration.json");
-        let record = CalibrationRecord::read(&path).map_err(|error| error.to_string())?;
+        let record = Calibration::read(&path).map_err(|error| error.to_string())?;
         if let Ok(correction) = Correction::for_run(&record, &read) {
             let _ = correction.samples(&read).last();
         }
         Ok(())
     });
+    assert!(kept > 0);
 }
 
 proptest! {

@@ -47,10 +47,12 @@ fn completed(draft: &str, known: &BTreeMap<&str, String>) -> String {
 /// What the file says in a row.
 fn raw(run: &Run, sensor: Sensor, k: usize) -> [f64; 3] {
     let samples = match sensor {
-        Sensor::Gyro => &run.imu.gyro,
-        Sensor::Accel => &run.imu.accel,
+        Sensor::Gyro => &run.recording.imu.gyro,
+        Sensor::Accel => &run.recording.imu.accel,
     };
-    samples[k].component_mul(&run.nominal.get(sensor).0).into()
+    samples[k]
+        .component_mul(&run.instrument.nominal.get(sensor).0)
+        .into()
 }
 
 #[test]
@@ -75,7 +77,7 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
         let error = Run::read(&path).unwrap_err().to_string();
         assert!(error.contains("no `latitude_deg`"), "{error}");
 
-        let scale = given.nominal.gyro.0.x.to_string();
+        let scale = given.instrument.nominal.gyro.0.x.to_string();
         let known = BTreeMap::from([
             ("site.latitude_deg", "49.6".to_owned()),
             ("site.height_m", "280.0".to_owned()),
@@ -88,22 +90,27 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
         ]);
         fs::write(&path, completed(&draft, &known)).unwrap();
         let found = Run::read(&path).unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
-        assert_eq!(found.unit, given.unit, "{name}");
-        assert_eq!(found.imu.continuous, given.imu.continuous, "{name}");
+        assert_eq!(found.instrument.unit, given.instrument.unit, "{name}");
+        assert_eq!(
+            found.recording.imu.continuous, given.recording.imu.continuous,
+            "{name}"
+        );
         assert!(
-            (found.imu.period / given.imu.period - 1.0).abs() < 1e-5,
+            (found.recording.imu.period / given.recording.imu.period - 1.0).abs() < 1e-5,
             "{name}"
         );
         for sensor in Sensor::ALL {
-            let (found_scale, given_scale) =
-                (found.nominal.get(sensor).0.x, given.nominal.get(sensor).0.x);
+            let (found_scale, given_scale) = (
+                found.instrument.nominal.get(sensor).0.x,
+                given.instrument.nominal.get(sensor).0.x,
+            );
             assert!(
                 (found_scale / given_scale - 1.0).abs() < 0.1,
                 "{name} {found_scale} {given_scale}"
             );
             for k in [0, 1000, 5000] {
-                let [found, given] =
-                    [&found, &given].map(|run| raw(run, sensor, k).map(|v| v / run.imu.period));
+                let [found, given] = [&found, &given]
+                    .map(|run| raw(run, sensor, k).map(|v| v / run.recording.imu.period));
                 let same = found
                     .iter()
                     .zip(given)

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use serde_json::Value;
+use turncal::calibration::result::Calibration;
+use turncal::calibration::result::TriadRecord;
 use turncal::imu::InstallationForm;
-use turncal::run::CalibrationRecord;
-use turncal::run::record::TriadRecord;
 
 use crate::calibration_file::{record, written};
 use crate::shared::shared;
@@ -41,14 +41,14 @@ fn the_cases_of_an_independent_program_agree_hour_by_hour() {
             bias: numbers(bias),
         };
         let (gyro, accel) = (&case["gyro"], &case["accel"]);
-        let truth = CalibrationRecord::new(
+        let truth = Calibration::new(
             triad(&case["Kg"], &gyro["C_true"], &case["Dg"]),
             triad(&case["Ka"], &accel["C_true"], &case["Da"]),
         );
         let found = |of: &Value| triad(&of["K_hat"], &of["C_hat"], &of["D_hat"]);
-        let calibration = CalibrationRecord {
+        let calibration = Calibration {
             installation_form: Some(InstallationForm::ThreeAngle),
-            ..CalibrationRecord::new(found(gyro), found(accel))
+            ..Calibration::new(found(gyro), found(accel))
         };
         let name = case["name"].as_str().unwrap();
         let truth = written(root.path(), &format!("{name}-truth.json"), &truth);
@@ -91,7 +91,7 @@ fn the_cases_of_an_independent_program_agree_hour_by_hour() {
 }
 
 /// A calibration whose east gyro's bias is wrong by 0.01 °/h, with σ 0.02 °/h.
-fn calibration() -> CalibrationRecord {
+fn calibration() -> Calibration {
     let count = 2e6 * std::f64::consts::PI / 180.0 / 3600.0;
     let mut record = record();
     record.gyro.bias[0] += 0.01 * count;

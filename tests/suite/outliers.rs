@@ -6,16 +6,14 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::attitude::exp;
-use turncal::calibration::outcome::{Observation, to_vector};
-use turncal::calibration::states::{PARAMETERS, ParameterVector};
-use turncal::calibration::{Outcome, estimate};
-use turncal::imu::InstallationForm;
+use turncal::calibration::{
+    Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem, estimate, to_vector,
+};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
 
 /// Fixed before the first run was made.
 const SEED: u64 = 1616;
-const RUNS: u64 = 24;
 /// Size of an outlier in σ of its observation.
 const SIZE: f64 = 20.0;
 /// One in so many.
@@ -26,8 +24,8 @@ fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng) {
-    let table = run.table.as_mut().unwrap();
-    let turn = exp(direction(rng) * (size * table.reading_sigma));
+    let turn = exp(direction(rng) * (size * run.table.reading_sigma));
+    let table = run.recording.table.as_mut().unwrap();
     table.attitude[reading] = turn * table.attitude[reading];
 }
 
@@ -35,14 +33,15 @@ fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng)
 /// none.
 fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
     // What a velocity is known to after a stretch: the walk since the last one, and a pulse's share.
-    let variance = run.noise.accel.random_walk.powi(2) * 0.1 + run.imu.pulse.accel.powi(2) / 12.0;
+    let variance = run.instrument.noise.accel.random_walk.powi(2) * 0.1
+        + run.recording.imu.pulse.accel.powi(2) / 12.0;
     let velocity = direction(rng) * (SIZE * variance.sqrt());
-    run.imu.accel[sample] += velocity;
-    run.imu.accel[sample + 1] -= velocity;
+    run.recording.imu.accel[sample] += velocity;
+    run.recording.imu.accel[sample + 1] -= velocity;
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
-    let outcome = estimate(&simulated.run, InstallationForm::General, &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&simulated.run, &Options::default()), &|_| {}).unwrap();
     assert!(outcome.converged);
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
@@ -58,10 +57,22 @@ fn rejected(outcome: &Outcome, observation: Observation) -> usize {
 }
 
 #[test]
+fn one_outlier_in_a_hundred_costs_little_and_is_rejected() {
+    // Few runs scatter by more than the tenth that many allow.
+    one_outlier_in_a_hundred(3, 1.3);
+}
+
+#[test]
+#[ignore = "statistical: 48 runs"]
 fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
+    one_outlier_in_a_hundred(24, 1.1);
+}
+
+/// RMS errors over so many runs with outliers are below `limit` times those without.
+fn one_outlier_in_a_hundred(runs: u64, limit: f64) {
     let scenario = Scenario::load("demo").unwrap();
     let squares = |spoilt: bool| -> (f64, usize, usize, usize) {
-        (0..RUNS)
+        (0..runs)
             .into_par_iter()
             .map(|stream| {
                 let mut simulated = scenario.simulate(SEED, stream).unwrap();
@@ -69,7 +80,7 @@ fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
                 let mut made = 0;
                 if spoilt {
                     let run = &mut simulated.run;
-                    for dwell in run.dwells() {
+                    for dwell in run.dwells(run.aiding()) {
                         for reading in dwell.position.unwrap().readings {
                             if rng.random_bool(1.0 / ONE_IN) {
                                 spoil_reading(run, reading, SIZE, &mut rng);
@@ -98,12 +109,12 @@ fn one_outlier_in_a_hundred_costs_less_than_a_tenth_of_the_accuracy() {
     let (spoilt, made, velocity, table) = squares(true);
     let ratio = (spoilt / clean).sqrt();
     println!(
-        "RMS/σ {:.3} clean, {:.3} with outliers, ratio {ratio:.4} over {RUNS} runs; {made} outliers, \
+        "RMS/σ {:.3} clean, {:.3} with outliers, ratio {ratio:.4} over {runs} runs; {made} outliers, \
          rejected {velocity} velocities and {table} readings",
-        (clean / (RUNS as f64 * PARAMETERS as f64)).sqrt(),
-        (spoilt / (RUNS as f64 * PARAMETERS as f64)).sqrt(),
+        (clean / (runs as f64 * PARAMETERS as f64)).sqrt(),
+        (spoilt / (runs as f64 * PARAMETERS as f64)).sqrt(),
     );
-    assert!(ratio < 1.1, "{ratio}");
+    assert!(ratio < limit, "{ratio}");
     let share = (velocity + table) as f64 / made as f64;
     assert!(
         (0.9..1.1).contains(&share),
@@ -119,7 +130,7 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
     // A larger one would still be taken for part of the turn.
     const HIDDEN: f64 = 12.0;
     let run = &mut simulated.run;
-    for dwell in &run.dwells()[1..] {
+    for dwell in &run.dwells(run.aiding())[1..] {
         spoil_reading(
             run,
             dwell.position.as_ref().unwrap().readings.start,
@@ -127,7 +138,7 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
             &mut rng,
         );
     }
-    let dwells = run.dwells();
+    let dwells = run.dwells(run.aiding());
     for dwell in &dwells[1..] {
         jerk(run, dwell.samples.start + 9, &mut rng);
     }

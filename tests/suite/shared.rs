@@ -1,5 +1,6 @@
 //! Runs made by other programs and by real sensors, where they are there.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use turncal::run::Run;
@@ -19,8 +20,16 @@ pub fn shared(run: &str) -> Option<PathBuf> {
         "no {}; set TURNCAL_DATA",
         directory.display()
     );
-    println!("skipped: no {}", directory.display());
+    skipped(&format!("no {}", directory.display()));
     None
+}
+
+/// Says that a test is not made, or not all of it. What goes to standard error by hand is shown of tests that
+/// pass, too.
+pub fn skipped(why: &str) {
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or_default();
+    let _ = writeln!(std::io::stderr(), "SKIPPED {test}: {why}");
 }
 
 pub fn read(directory: &Path) -> Run {

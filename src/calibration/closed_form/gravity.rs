@@ -1,40 +1,35 @@
-//! Without a table and without labels: every dwell and every turn between two, by gravity alone.
+//! Without a table and without labels: every dwell and every move between two, by gravity alone.
 
 use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
-use super::{ClosedForm, Reference, remarks};
-use crate::imu::{InstallationForm, PerSensor};
-use crate::run::{Dwell, Run};
+use super::super::finding::Finding;
+use super::super::problem::Problem;
+use super::result::{ClosedForm, Reference, remarks};
+use crate::imu::PerSensor;
 
 /// Weighted residuals above this times what noise makes are worth a warning.
 const DOUBTFUL: f64 = 1.2;
 
 /// Both triads from whatever positions there are, tied down by the prior where they are too few.
-pub(super) fn by_gravity(
-    run: &Run,
-    dwells: &[Dwell],
-    form: InstallationForm,
-) -> Result<ClosedForm, CalibrationError> {
-    if !run.imu.continuous {
-        return Err(CalibrationError::not_continuous(&run.imu));
+pub(super) fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let ByGravity { estimate, misfit } = coarse::by_gravity(problem)?;
+    let mut findings = remarks(&problem.model, &estimate, Reference::Gravity);
+    let ratio = misfit.sqrt();
+    if ratio > DOUBTFUL {
+        findings.push(Finding::ResidualsLarge { ratio });
     }
-    let ByGravity { estimate, misfit } = coarse::by_gravity(run, dwells, form)?;
-    let mut warnings = remarks(run, &estimate, Reference::Gravity);
-    let misfit = misfit.sqrt();
-    if misfit > DOUBTFUL {
-        warnings.push(format!(
-            "Residuals of dwells and turns are {misfit:.1} times as large as noise figures and Earth rate \
-             say: what is not modelled, such as flicker of the sensors or a hand that is not still, is as \
-             much larger than noise, and the σ are as much too small."
-        ));
-    }
-    let samples: usize = dwells.iter().map(|dwell| dwell.samples.len()).sum();
+    let stretches = problem.stretches();
+    let time_at_rest = stretches.iter().map(|stretch| {
+        let samples: usize = stretch.dwells.iter().map(|dwell| dwell.samples.len()).sum();
+        samples as f64 * stretch.run.recording.imu.period
+    });
+    let dwells = problem.dwells().count();
     Ok(ClosedForm {
         estimate,
         reference: Reference::Gravity,
-        positions: PerSensor::from_fn(|_| dwells.len()),
-        turns: dwells.len() - 1,
-        standing_time: samples as f64 * run.imu.period,
-        warnings,
+        positions: PerSensor::from_fn(|_| dwells),
+        turns: dwells - stretches.len(),
+        standing_time: time_at_rest.sum(),
+        findings,
     })
 }

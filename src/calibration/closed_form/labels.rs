@@ -8,28 +8,34 @@
 use nalgebra::Vector3;
 
 use super::super::error::CalibrationError;
-use super::{ClosedForm, Position, Reference, across, both_triads, remarks};
+use super::super::finding::Finding;
+use super::super::model::Model;
+use super::super::problem::Problem;
+use super::least_squares::{Position, across, both_triads};
+use super::result::{ClosedForm, Reference, remarks};
 use crate::earth::ROTATION_RATE;
-use crate::imu::{InstallationForm, PerSensor, Sensor};
-use crate::run::{LabelledMotion, Run};
+use crate::imu::{PerSensor, Sensor};
+use crate::recording::LabelledMotion;
+use crate::run::{Dwell, Run};
 
 /// Both triads from the sections whose labels say how the instrument stands or turns.
-pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm, CalibrationError> {
+pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let (run, model): (&Run, &Model) = (problem.run(), &problem.model);
     let mut positions = PerSensor::<Vec<Position>>::default();
     let mut turns = 0;
     let mut standing_time = 0.0;
     let sigma = run.segment_sigma;
     let mut lost = Vec::new();
-    for segment in &run.segments {
+    for segment in &run.recording.segments {
         let Some(motion) = segment.motion else {
             continue;
         };
-        if run.imu.is_lost(&segment.samples) {
+        if run.recording.imu.is_lost(&segment.samples) {
             lost.push(format!("`{}`", segment.label));
             continue;
         }
-        let section = segment.as_dwell();
-        let duration = section.samples.len() as f64 * run.imu.period;
+        let section = Dwell::of_segment(segment);
+        let duration = section.samples.len() as f64 * run.recording.imu.period;
         let of_gyro = section.mean(Sensor::Gyro, run);
         let noise = Vector3::repeat(of_gyro.variance);
         match motion {
@@ -61,18 +67,20 @@ pub(super) fn by_labels(run: &Run, form: InstallationForm) -> Result<ClosedForm,
     }
     let undetermined = |sensor| CalibrationError::TooFewSections {
         sensor,
-        labels: run.segments.iter().map(|s| s.label.clone()).collect(),
+        labels: run
+            .recording
+            .segments
+            .iter()
+            .map(|s| s.label.clone())
+            .collect(),
     };
-    let estimate = both_triads(&positions, form).map_err(undetermined)?;
-    let mut warnings = remarks(run, &estimate, Reference::Labels);
+    let estimate = both_triads(&positions, model.form).map_err(undetermined)?;
+    let mut findings = remarks(model, &estimate, Reference::Labels);
     if !lost.is_empty() {
-        warnings.push(format!(
-            "Not used, for a part of it is lost: section {}.",
-            lost.join(", ")
-        ));
+        findings.push(Finding::SectionsLost { labels: lost });
     }
     Ok(ClosedForm {
-        warnings,
+        findings,
         estimate,
         reference: Reference::Labels,
         positions: PerSensor {
@@ -126,11 +134,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    use super::super::six_position_triad;
+    use super::super::least_squares::six_position_triad;
     use super::*;
     use crate::attitude::exp;
     use crate::calibration::mean_square_interval;
-    use crate::imu::{ParameterKind, Triad, TriadVector};
+    use crate::imu::{InstallationForm, ParameterKind, Triad, TriadVector};
     use crate::units::DEGREE;
 
     /// Squared errors over variances of scale factors, installation and biases, from this many sets of

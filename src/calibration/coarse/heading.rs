@@ -1,13 +1,13 @@
-//! Heading and gyro biases from the rates at rest.
+//! Headings and gyro biases from the rates at rest.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use crate::attitude::exp;
 use crate::earth::{ROTATION_RATE, Site};
 
 /// What the gyros say at rest.
 pub(super) struct Rest {
-    /// Attitude up to a heading common to all, body to level.
+    /// Attitude up to a heading common to all of a stretch, body to level.
     pub attitude: Matrix3<f64>,
     /// Corrected rate along body axes, rad/s.
     pub rate: Vector3<f64>,
@@ -15,44 +15,69 @@ pub(super) struct Rest {
     pub variance: f64,
 }
 
-/// The heading common to all attitudes, and what the rates are wrong by.
+/// The heading common to all attitudes of a stretch.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Gyrocompass {
+pub(super) struct Heading {
     /// Turn about Up that brings the attitudes to East-North-Up, rad.
     pub turn: Matrix3<f64>,
     /// 1σ of its angle, rad; above one nothing is known of it.
     pub sigma: f64,
+}
+
+/// The headings of all stretches, and what the rates are wrong by.
+#[derive(Debug, Clone)]
+pub(super) struct Gyrocompass {
+    pub headings: Vec<Heading>,
     /// Error of the rate along body axes, rad/s.
     pub bias: Vector3<f64>,
 }
 
 /// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest
 /// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other.
-pub(super) fn gyrocompass(rests: &[Rest], site: &Site) -> Gyrocompass {
-    let earth_rate = site.earth_rate_n();
-    // Unknown: Earth rate along the two level axes, and b. Before any rate is seen neither exceeds
-    // Earth rate by much: b is what is left of a bias taken from these very rates.
-    let mut information = SMatrix::<f64, 5, 5>::identity() / ROTATION_RATE.powi(2);
-    let mut vector = SVector::<f64, 5>::zeros();
-    for rest in rests {
-        let mut rows = SMatrix::<f64, 3, 5>::zeros();
-        rows[(0, 0)] = 1.0;
-        rows[(1, 1)] = 1.0;
-        rows.fixed_columns_mut::<3>(2).copy_from(&rest.attitude);
-        let seen = rest.attitude * rest.rate - Vector3::z() * earth_rate.z;
-        // Tilts of a milliradian turn that much of Earth rate.
-        let weight = 1.0 / (rest.variance + (1e-3 * ROTATION_RATE).powi(2));
-        information += rows.transpose() * rows * weight;
-        vector += rows.transpose() * seen * weight;
+pub(super) fn gyrocompass(stretches: &[(Site, Vec<Rest>)]) -> Gyrocompass {
+    // Unknown: b, and for each stretch Earth rate along its two level axes. Before any rate is observed
+    // none exceeds Earth rate by much: b is what is left of a bias taken from these very rates.
+    let n = 3 + 2 * stretches.len();
+    let mut information = DMatrix::<f64>::identity(n, n) / ROTATION_RATE.powi(2);
+    let mut vector = DVector::<f64>::zeros(n);
+    for (number, (site, rests)) in stretches.iter().enumerate() {
+        let first = 3 + 2 * number;
+        for rest in rests {
+            let mut rows = SMatrix::<f64, 3, 5>::zeros();
+            rows.fixed_columns_mut::<3>(0).copy_from(&rest.attitude);
+            rows[(0, 3)] = 1.0;
+            rows[(1, 4)] = 1.0;
+            let up = Vector3::z() * site.earth_rate_n().z;
+            let observed = rest.attitude * rest.rate - up;
+            // Tilts of a milliradian turn that much of Earth rate.
+            let weight = 1.0 / (rest.variance + (1e-3 * ROTATION_RATE).powi(2));
+            let of_rest = rows.transpose() * rows * weight;
+            let of_vector = rows.transpose() * observed * weight;
+            let place = [0, 1, 2, first, first + 1];
+            for (i, &row) in place.iter().enumerate() {
+                for (j, &column) in place.iter().enumerate() {
+                    information[(row, column)] += of_rest[(i, j)];
+                }
+                vector[row] += of_vector[i];
+            }
+        }
     }
     // Positive definite by its first summand.
-    let covariance = information.try_inverse().unwrap_or_default();
-    let found = covariance * vector;
-    let angle = found[1].atan2(found[0]) - std::f64::consts::FRAC_PI_2;
-    let level = covariance.fixed_view::<2, 2>(0, 0).into_owned();
+    let covariance = information
+        .cholesky()
+        .map_or_else(|| DMatrix::zeros(n, n), |factor| factor.inverse());
+    let found = &covariance * vector;
+    let heading = |(number, (site, _)): (usize, &(Site, Vec<Rest>))| {
+        let first = 3 + 2 * number;
+        let angle = found[first + 1].atan2(found[first]) - std::f64::consts::FRAC_PI_2;
+        let level = covariance.fixed_view::<2, 2>(first, first).into_owned();
+        Heading {
+            turn: exp(Vector3::z() * -angle),
+            sigma: level.symmetric_eigenvalues().max().sqrt() / site.earth_rate_n().y.abs(),
+        }
+    };
     Gyrocompass {
-        turn: exp(Vector3::z() * -angle),
-        sigma: level.symmetric_eigenvalues().max().sqrt() / earth_rate.y.abs(),
-        bias: found.fixed_rows::<3>(2).into_owned(),
+        headings: stretches.iter().enumerate().map(heading).collect(),
+        bias: found.fixed_rows::<3>(0).into_owned(),
     }
 }

@@ -4,44 +4,45 @@ use nalgebra::Vector3;
 
 use super::super::error::CalibrationError;
 use super::super::linearisation::singular;
-use super::equations::Equations;
-use super::gauss_newton;
+use super::super::model::Model;
+use super::super::parameters::from_vector;
+use super::super::problem::{Problem, Stretch};
+use super::equations::{Equations, gauss_newton};
 use crate::attitude::log;
-use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
+use crate::imu::{PerSensor, Sensor, Triad};
 use crate::navigation::{Block, Navigator, State};
-use crate::run::{Dwell, Run, TableRecord};
 
 /// Both triads from the table's attitude alone: over each dwell the velocity must stay zero and the
 /// attitude must stay; over each turn between two dwells the gyros must turn by what the table says.
 /// The prior ties down what these do not see.
-pub(super) fn from_table(
-    run: &Run,
-    table: &TableRecord,
-    dwells: &[Dwell],
-    form: InstallationForm,
-) -> Result<PerSensor<Triad>, CalibrationError> {
-    gauss_newton(run.prior_mean(form), |triads| {
-        let mut equations = Equations::new(run, triads, &Sensor::ALL);
-        add_legs(&mut equations, run, table, dwells, triads)?;
+pub(super) fn from_table(problem: &Problem) -> Result<PerSensor<Triad>, CalibrationError> {
+    let model = &problem.model;
+    let prior = from_vector(model.form, &model.prior_mean);
+    gauss_newton(prior, |triads| {
+        let mut equations = Equations::new(model, triads, &Sensor::ALL);
+        for stretch in problem.stretches() {
+            add_legs(&mut equations, model, stretch, triads)?;
+        }
         Ok(equations)
     })
 }
 
 fn add_legs(
     equations: &mut Equations,
-    run: &Run,
-    table: &TableRecord,
-    dwells: &[Dwell],
+    model: &Model,
+    stretch: &Stretch,
     triads: &PerSensor<Triad>,
 ) -> Result<(), CalibrationError> {
-    let walk = PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
-    let attitude_variance = table.position_sigma.powi(2) + run.imu.pulse.gyro.powi(2) / 12.0;
+    let run = stretch.run;
+    let imu = &run.recording.imu;
+    let walk = PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
+    let attitude_variance = model.position_sigma.powi(2) + imu.pulse.gyro.powi(2) / 12.0;
     let at_rest = |attitude| {
         let state = State::at_rest(attitude);
-        Navigator::new(&run.imu, &run.site, walk, triads, state).ok_or_else(|| singular(triads))
+        Navigator::new(imu, &run.site, walk, triads, state).ok_or_else(|| singular(triads))
     };
     let mut before = None;
-    for dwell in dwells {
+    for dwell in &stretch.dwells {
         let Some(attitude) = dwell.position.as_ref().map(|p| p.attitude) else {
             continue;
         };
@@ -56,13 +57,13 @@ fn add_legs(
         }
         let stand = at_rest(attitude)?.advance_standing(dwell.samples.clone());
         let duration = stand.duration;
-        let pulses = run.imu.pulse.gyro.powi(2) / 6.0;
+        let pulses = imu.pulse.gyro.powi(2) / 6.0;
         let variance = pulses + walk.gyro.powi(2) * duration;
         equations.add_block(&stand, 0, error(&stand), variance);
         // A tilt of the table turns gravity into velocity.
         let variance = (run.site.gravity * duration).powi(2) * attitude_variance
             + walk.accel.powi(2) * duration
-            + run.imu.pulse.accel.powi(2) / 6.0;
+            + imu.pulse.accel.powi(2) / 6.0;
         equations.add_block(&stand, 3, stand.state.velocity, variance);
         before = Some((dwell.samples.end, attitude));
     }

@@ -1,18 +1,20 @@
-//! Gyros and attitude from gravity's direction and the rates at rest.
+//! Gyros and attitudes from gravity's direction and the rates at rest.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::super::error::CalibrationError;
 use super::super::linearisation::{Linearisation, singular};
-use super::super::outcome::{from_vector, to_vector};
+use super::super::model::Model;
+use super::super::parameters::{from_vector, to_vector};
+use super::super::problem::{Problem, Stretch};
 use super::equations::Equations;
-use super::gravity::{add_size, input_errors};
-use super::heading::{Gyrocompass, Rest, gyrocompass};
+use super::gravity::{add_magnitude, input_errors};
+use super::heading::{Heading, Rest, gyrocompass};
 use crate::attitude::{exp, level, skew, tilt};
 use crate::earth::ROTATION_RATE;
-use crate::imu::{FurtherVector, PARAMETERS, PerSensor, Sensor, Triad};
+use crate::imu::{PARAMETERS, PerSensor, Sensor, TermVector, Triad};
 use crate::navigation::{Block, Navigator, State};
-use crate::run::{Dwell, MeanOutput, Run};
+use crate::run::{Dwell, MeanOutput};
 
 /// Attitudes, heading and gyros are found in turns, each from the others. Scale factors wrong by
 /// percents need four rounds …
@@ -20,66 +22,91 @@ const ROUNDS_OF_GYROS: usize = 4;
 /// … before the accelerometers may move, too.
 const ROUNDS: usize = 8;
 
-/// Both triads and attitude as gravity and the rates at rest show them.
+/// Both triads and attitudes as gravity and the rates at rest show them.
 pub(super) struct Turned {
-    /// The triads, and the attitude at the first sample of the first dwell.
+    /// The triads, and the attitude at the first sample of each stretch.
     pub at: Linearisation,
-    /// 1σ of its heading, rad.
-    pub heading_sigma: f64,
+    /// 1σ of each heading, rad.
+    pub heading_sigma: Vec<f64>,
     /// What they are found from, made at them.
     pub equations: Equations,
 }
 
-/// The gyros and the attitude, and with them the accelerometers, whose installation the size of gravity
-/// alone shows badly where every dwell has an axis nearly up or down.
+/// The gyros and the attitudes, and with them the accelerometers, whose installation the magnitude of
+/// gravity alone shows badly where every dwell has an axis nearly up or down.
 ///
-/// Over a turn between two dwells the gyros must carry the direction of gravity from where the
-/// accelerometers saw it before to where they see it after; at rest they must sense Earth rate.
+/// Over a move between two dwells the gyros must carry the direction of gravity from where the
+/// accelerometers observed it before to where they observe it after; at rest they must sense Earth rate.
 ///
 /// Source: Tedaldi, Pretto, Menegatti 2014, "A robust and easy to implement method for IMU calibration
-/// without external equipments", ICRA, §IV, for the turns.
-pub(super) fn triads_and_attitude(
-    run: &Run,
-    dwells: &[Dwell],
+/// without external equipments", ICRA, §IV, for the moves.
+pub(super) fn triads_and_attitudes(
+    problem: &Problem,
     triads: &PerSensor<Triad>,
 ) -> Result<Turned, CalibrationError> {
-    let up = gravity_directions(run, dwells, triads)?;
-    let rests: Vec<MeanOutput> = dwells
-        .iter()
-        .map(|dwell| dwell.mean(Sensor::Gyro, run))
-        .collect();
+    let model = &problem.model;
+    let stretches = problem.stretches();
+    let directions = |triads: &PerSensor<Triad>| -> Result<Vec<Vec<Up>>, CalibrationError> {
+        let stretches = stretches.iter();
+        stretches.map(|s| gravity_directions(s, triads)).collect()
+    };
+    let rests = |stretch: &Stretch| -> Vec<MeanOutput> {
+        let dwells = stretch.dwells.iter();
+        dwells.map(|d| d.mean(Sensor::Gyro, stretch.run)).collect()
+    };
+    let rests: Vec<Vec<MeanOutput>> = stretches.iter().map(rests).collect();
     let mut at = Linearisation {
         triads: *triads,
-        further: FurtherVector::zeros(),
-        initial_attitude: level(&up[0].direction),
+        terms: TermVector::zeros(),
+        initial_attitudes: directions(triads)?
+            .iter()
+            .map(|up| level(&up[0].direction))
+            .collect(),
     };
     // Within Earth rate the output at rest is the bias.
-    let outputs: Vector3<f64> = rests.iter().map(|rest| rest.output).sum();
-    at.triads.gyro.bias = outputs / rests.len() as f64;
+    let outputs: Vector3<f64> = rests.iter().flatten().map(|rest| rest.output).sum();
+    at.triads.gyro.bias = outputs / rests.iter().map(Vec::len).sum::<usize>() as f64;
     let mut round = 0;
     loop {
-        let up = gravity_directions(run, dwells, &at.triads)?;
-        at.initial_attitude =
-            exp(tilt(&(at.initial_attitude * up[0].direction))) * at.initial_attitude;
-        let mut chain = Chain::new(run, dwells, &at, &up)?;
-        let compass = chain.gyrocompass(run, &at.triads, &rests)?;
-        chain.turn(&compass.turn);
-        at.initial_attitude = chain.attitudes[0];
+        let mut chains = Vec::new();
+        let parts = stretches.iter().zip(directions(&at.triads)?);
+        for ((stretch, up), attitude) in parts.zip(&mut at.initial_attitudes) {
+            *attitude = exp(tilt(&(*attitude * up[0].direction))) * *attitude;
+            chains.push(Chain::new(model, stretch, &at.triads, attitude, &up)?);
+        }
+        let correction = at.triads.gyro.correction();
+        let correction = correction.ok_or_else(|| singular(&at.triads))?;
+        let bias = at.triads.gyro.bias;
+        let of_chains = chains.iter().zip(&rests).zip(stretches);
+        let compass: Vec<_> = of_chains
+            .map(|((chain, rests), s)| (s.run.site, chain.rests(&correction, &bias, rests)))
+            .collect();
+        let compass = gyrocompass(&compass);
+        for ((chain, heading), attitude) in chains
+            .iter_mut()
+            .zip(&compass.headings)
+            .zip(&mut at.initial_attitudes)
+        {
+            chain.turn(&heading.turn);
+            *attitude = chain.attitudes[0];
+        }
         at.triads.gyro.bias += at.triads.gyro.sensitivity() * compass.bias;
-        let equations = if round < ROUNDS_OF_GYROS {
-            let mut equations = Equations::new(run, &at.triads, &[Sensor::Gyro]);
-            chain.add(&mut equations, run, &at.triads, &rests, &compass)?;
-            equations
-        } else {
-            let mut equations = Equations::new(run, &at.triads, &Sensor::ALL);
-            add_size(&mut equations, run, dwells, &at.triads)?;
-            chain.add(&mut equations, run, &at.triads, &rests, &compass)?;
-            equations
+        let sensors = match round < ROUNDS_OF_GYROS {
+            true => &[Sensor::Gyro][..],
+            false => &Sensor::ALL,
         };
+        let mut equations = Equations::new(model, &at.triads, sensors);
+        if sensors.contains(&Sensor::Accel) {
+            add_magnitude(&mut equations, problem, &at.triads)?;
+        }
+        let parts = chains.iter().zip(stretches).zip(&rests);
+        for (((chain, stretch), rests), heading) in parts.zip(&compass.headings) {
+            chain.add(&mut equations, stretch, &at.triads, rests, heading)?;
+        }
         if round == ROUNDS {
             return Ok(Turned {
                 at,
-                heading_sigma: compass.sigma,
+                heading_sigma: compass.headings.iter().map(|h| h.sigma).collect(),
                 equations,
             });
         }
@@ -94,21 +121,20 @@ pub(super) fn triads_and_attitude(
 
 /// Direction of specific force along body axes in each dwell, and with it Up.
 fn gravity_directions(
-    run: &Run,
-    dwells: &[Dwell],
+    stretch: &Stretch,
     triads: &PerSensor<Triad>,
 ) -> Result<Vec<Up>, CalibrationError> {
     let triad = &triads.accel;
     let correction = triad.correction().ok_or_else(|| singular(triads))?;
     let direction = |dwell: &Dwell| {
-        let output = dwell.mean(Sensor::Accel, run).output;
+        let output = dwell.mean(Sensor::Accel, stretch.run).output;
         let force = correction * (output - triad.bias);
         Up {
             direction: force.normalize(),
             error: input_errors(triad, &correction, &force) / force.norm(),
         }
     };
-    Ok(dwells.iter().map(direction).collect())
+    Ok(stretch.dwells.iter().map(direction).collect())
 }
 
 /// Up, along body axes.
@@ -118,7 +144,7 @@ struct Up {
     error: SMatrix<f64, 3, PARAMETERS>,
 }
 
-/// Attitudes of all dwells, one carried to the next by the gyros and levelled there.
+/// Attitudes of all dwells of a stretch, one carried to the next by the gyros and levelled there.
 struct Chain {
     attitudes: Vec<Matrix3<f64>>,
     turns: Vec<Turn>,
@@ -136,29 +162,31 @@ struct Turn {
 
 impl Chain {
     fn new(
-        run: &Run,
-        dwells: &[Dwell],
-        at: &Linearisation,
+        model: &Model,
+        stretch: &Stretch,
+        triads: &PerSensor<Triad>,
+        attitude: &Matrix3<f64>,
         up: &[Up],
     ) -> Result<Self, CalibrationError> {
-        let walk = PerSensor::from_fn(|sensor| run.noise.get(sensor).random_walk);
-        let mut attitudes = vec![at.initial_attitude];
+        let (run, dwells) = (stretch.run, &stretch.dwells);
+        let walk = PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
+        let mut attitudes = vec![*attitude];
         let mut turns = Vec::new();
         let of_gravity =
             |dwell: &Dwell| dwell.mean(Sensor::Accel, run).variance / run.site.gravity.powi(2);
         let legs = dwells.iter().zip(&dwells[1..]);
         for ((before, after), up) in legs.zip(up.iter().zip(&up[1..])) {
             let start = State::at_rest(attitudes[attitudes.len() - 1]);
-            let block = Navigator::new(&run.imu, &run.site, walk, &at.triads, start)
-                .ok_or_else(|| singular(&at.triads))?
+            let block = Navigator::new(&run.recording.imu, &run.site, walk, triads, start)
+                .ok_or_else(|| singular(triads))?
                 .advance(before.samples.end..after.samples.start);
             let tilt = tilt(&(block.state.attitude * up.1.direction));
             let attitude = exp(tilt) * block.state.attitude;
-            let seen = attitude * up.1.error - start.attitude * up.0.error;
+            let observed = attitude * up.1.error - start.attitude * up.0.error;
             attitudes.push(attitude);
             turns.push(Turn {
                 tilt,
-                of_accel: -skew(Vector3::z()) * seen,
+                of_accel: -skew(Vector3::z()) * observed,
                 variance: walk.gyro.powi(2) * block.duration
                     + of_gravity(before)
                     + of_gravity(after),
@@ -188,39 +216,35 @@ impl Chain {
         }
     }
 
-    fn gyrocompass(
+    /// What the gyros say at rest in each dwell, corrected.
+    fn rests(
         &self,
-        run: &Run,
-        triads: &PerSensor<Triad>,
+        correction: &Matrix3<f64>,
+        bias: &Vector3<f64>,
         rests: &[MeanOutput],
-    ) -> Result<Gyrocompass, CalibrationError> {
-        let correction = triads.gyro.correction().ok_or_else(|| singular(triads))?;
-        let rests: Vec<Rest> = self
-            .attitudes
-            .iter()
-            .zip(rests)
-            .map(|(attitude, rest)| Rest {
-                attitude: *attitude,
-                rate: correction * (rest.output - triads.gyro.bias),
-                variance: rest.variance,
-            })
-            .collect();
-        Ok(gyrocompass(&rests, &run.site))
+    ) -> Vec<Rest> {
+        let pairs = self.attitudes.iter().zip(rests);
+        let rest = |(attitude, rest): (&Matrix3<f64>, &MeanOutput)| Rest {
+            attitude: *attitude,
+            rate: correction * (rest.output - bias),
+            variance: rest.variance,
+        };
+        pairs.map(rest).collect()
     }
 
-    /// Adds what turns and rates at rest say.
+    /// Adds what moves and rates at rest say.
     fn add(
         &self,
         equations: &mut Equations,
-        run: &Run,
+        stretch: &Stretch,
         triads: &PerSensor<Triad>,
         rests: &[MeanOutput],
-        compass: &Gyrocompass,
+        heading: &Heading,
     ) -> Result<(), CalibrationError> {
         let triad = &triads.gyro;
         let correction = triad.correction().ok_or_else(|| singular(triads))?;
         // As much of Earth rate as heading may be wrong by, all of it at most.
-        let of_heading = (ROTATION_RATE * compass.sigma.clamp(1e-3, 1.0)).powi(2);
+        let of_heading = (ROTATION_RATE * heading.sigma.clamp(1e-3, 1.0)).powi(2);
         for turn in &self.turns {
             let variance = turn.variance + of_heading * turn.block.duration.powi(2);
             for axis in 0..2 {
@@ -232,7 +256,7 @@ impl Chain {
         }
         for (attitude, rest) in self.attitudes.iter().zip(rests) {
             let rate = correction * (rest.output - triad.bias);
-            let error = rate - attitude.tr_mul(&run.site.earth_rate_n());
+            let error = rate - attitude.tr_mul(&stretch.run.site.earth_rate_n());
             let errors = input_errors(triad, &correction, &rate);
             for axis in 0..3 {
                 let row = errors.row(axis).transpose();

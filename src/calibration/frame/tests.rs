@@ -8,12 +8,12 @@ use crate::attitude;
 use crate::calibration::comparison::{Named, compare};
 
 /// Scale factors in counts, installation of hundredths, biases; no σ.
-pub(in crate::calibration) fn record() -> CalibrationRecord {
+pub(in crate::calibration) fn record() -> Calibration {
     let rows = |v: [f64; 6]| {
         let c = InstallationForm::General.matrix(&v.into());
         [0, 1, 2].map(|i| [c[(i, 0)], c[(i, 1)], c[(i, 2)]])
     };
-    let mut record = CalibrationRecord::new(
+    let mut record = Calibration::new(
         TriadRecord {
             scale: [2.067e6, 2.059e6, 2.066e6],
             installation: rows([0.011, -0.004, 0.007, 0.014, -0.005, 0.017]),
@@ -31,9 +31,9 @@ pub(in crate::calibration) fn record() -> CalibrationRecord {
 
 /// σ of a good calibration, with correlations.
 pub(in crate::calibration) fn with_covariance(
-    mut record: CalibrationRecord,
+    mut record: Calibration,
     form: InstallationForm,
-) -> CalibrationRecord {
+) -> Calibration {
     let indices: Vec<usize> = (0..PARAMETERS)
         .filter(|&i| parameter_name(form, i).is_some())
         .collect();
@@ -65,7 +65,7 @@ pub(in crate::calibration) fn with_covariance(
 }
 
 /// The same instrument in a body frame that is rotated.
-fn seen_from(record: &CalibrationRecord, rotation: &Matrix3<f64>) -> CalibrationRecord {
+fn seen_from(record: &Calibration, rotation: &Matrix3<f64>) -> Calibration {
     let mut record = record.clone();
     for triad in [&mut record.gyro, &mut record.accel] {
         let c = Matrix3::from_fn(|i, j| triad.installation[i][j]) * rotation.transpose();
@@ -74,7 +74,7 @@ fn seen_from(record: &CalibrationRecord, rotation: &Matrix3<f64>) -> Calibration
     record
 }
 
-fn canonical(record: &CalibrationRecord, body_frame: BodyFrame) -> Canonical {
+fn canonical(record: &Calibration, body_frame: BodyFrame) -> Canonical {
     Canonical::new("a", record, &own_nominal(record), body_frame).unwrap()
 }
 
@@ -84,7 +84,7 @@ fn an_instrument_is_the_same_from_two_frames() {
     let rotation = attitude::exp(Vector3::new(0.02, -0.03, 0.05));
     let mut turned = seen_from(&on_table, &rotation);
     turned.body_frame = BodyFrame::Accelerometer;
-    let compared = |b: &CalibrationRecord| {
+    let compared = |b: &Calibration| {
         let [a, b] = [("a", &on_table), ("b", b)].map(|(name, record)| Named { name, record });
         compare(&[a, b], None).unwrap()
     };
@@ -142,7 +142,7 @@ fn the_general_form_in_its_own_frame_keeps_its_covariance() {
 }
 
 /// Moves each own parameter and looks where the canonical ones go.
-fn numeric_jacobian(record: &CalibrationRecord, body_frame: BodyFrame) -> ParameterMatrix {
+fn numeric_jacobian(record: &Calibration, body_frame: BodyFrame) -> ParameterMatrix {
     let nominal = own_nominal(record);
     let form = record.installation_form.unwrap();
     let own = to_vector(&triads_of(record, &nominal, form));
@@ -154,7 +154,7 @@ fn numeric_jacobian(record: &CalibrationRecord, body_frame: BodyFrame) -> Parame
                 if parameter_name(form, index).is_some() {
                     moved[index] += by;
                 }
-                let triads = crate::calibration::outcome::from_vector(form, &moved);
+                let triads = crate::calibration::from_vector(form, &moved);
                 let mut record = record.clone();
                 for (sensor, slot) in Sensor::ALL
                     .into_iter()
@@ -213,7 +213,7 @@ fn sigma_alone_stands_for_independent_parameters() {
     assert_eq!(canonical(&none, BodyFrame::Table).covariance, None);
 }
 
-fn sigma_of_zero(mut record: CalibrationRecord) -> CalibrationRecord {
+fn sigma_of_zero(mut record: Calibration) -> Calibration {
     record.sigma = Some(PerSensor::from_fn(|_| TriadRecord {
         scale: [0.0; 3],
         installation: [[0.0; 3]; 3],

@@ -1,5 +1,5 @@
-use super::super::outcome::from_vector;
-use super::super::states::{ParameterMatrix, parameter};
+use super::super::parameters::from_vector;
+use super::super::parameters::{ParameterMatrix, parameter};
 use super::*;
 use crate::imu::Sensor;
 
@@ -76,16 +76,10 @@ fn a_combination_of_observed_parameters_that_was_not_observed_is_named() {
         .collect();
     combinations.extend(six.windows(2).map(|w| vec![(w[0], 1.0), (w[1], -1.0)]));
     let combinations: Vec<&[(usize, f64)]> = combinations.iter().map(|c| &c[..]).collect();
-    let warnings = observed(&combinations).warnings(FORM, &[]);
+    let warnings = observed(&combinations).combinations(FORM, &[]);
     assert_eq!(warnings.len(), 1);
     assert!(
         warnings[0].contains("accel scale x with") || warnings[0].contains("with accel scale x"),
         "{warnings:?}"
     );
-}
-
-#[test]
-fn parameters_are_listed_by_sensor_and_kind() {
-    let parameters = ["gyro.scale.x", "gyro.scale.y", "accel.bias.z"].map(index);
-    assert_eq!(listed(FORM, &parameters), "gyro scale x, y; accel bias z");
 }

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use clap::error::ErrorKind;
+use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
-use turncal::run::record::BodyFrame;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
-use super::super::block::Block;
 use super::super::calibrate::{Aiding, Installation};
+use super::super::error_term::TermArgument;
+use super::super::input::{at_least_two, seed};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
 
@@ -25,7 +25,8 @@ use super::super::progress::Runs;
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
   turncal study accuracy nineteen-position --runs 200 -o nineteen
-  turncal study accuracy --truth-installation three-angle --installation three-angle
+  turncal study accuracy --installation three-angle \\
+      --truth-installation three-angle
   turncal study accuracy real-table --unmodelled table-base,table-axes
   turncal study accuracy --with accel-second-order,size-effect")]
 pub struct Accuracy {
@@ -45,17 +46,17 @@ pub struct Accuracy {
     /// scenario's]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
-    /// Blocks of states: their errors are simulated and estimated, beside those of the scenario
-    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
-    with: Vec<Block>,
-    /// Blocks whose errors are simulated and that the filter does not have
-    #[arg(long, value_name = "BLOCK", value_enum, value_delimiter = ',')]
-    unmodelled: Vec<Block>,
+    /// Error terms to simulate and to estimate, beside those of the scenario
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    with: Vec<TermArgument>,
+    /// Error terms to simulate and not to estimate
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    unmodelled: Vec<TermArgument>,
     /// Number of runs
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     delivery: Delivery,
@@ -74,18 +75,12 @@ impl Accuracy {
         if let Some(model) = &self.truth_installation {
             scenario.installation = InstallationModel::load(model, &Place::CommandLine)?;
         }
-        for block in self.with.iter().chain(&self.unmodelled) {
-            if self.aiding == Aiding::Velocity && block.of_table() {
-                let message = format!(
-                    "--aiding velocity does not see the table, so {} makes no difference; leave it out\n",
-                    block.0.name()
-                );
-                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-            }
-            scenario = scenario.with_block(block.0);
+        for term in self.with.iter().chain(&self.unmodelled) {
+            term.needs_table(Some(self.aiding));
+            scenario = scenario.with_error_term(term.0);
         }
         let study = AccuracyStudy {
-            unmodelled: self.unmodelled.iter().map(|block| block.0).collect(),
+            unmodelled: self.unmodelled.iter().map(|term| term.0).collect(),
             form: self.installation.into(),
             runs: self.runs,
             seed: self.seed.unwrap_or(scenario.seed),

@@ -8,7 +8,7 @@ use turncal::simulation::Scenario;
 use turncal::study::ExperimentStudy;
 use turncal::study::navigation::INTERVAL;
 
-use super::super::navigate::hours;
+use super::super::input::{at_least_two, hours, seed};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
 
@@ -17,10 +17,10 @@ const SCENARIO: &str = "experiment";
 
 /// The paper's turntable experiment: what each calibration is worth in 40 h of navigation
 ///
-/// Simulates many instruments on a table with position errors, with noise and wandering biases.
+/// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases.
 /// Calibrates each by the closed form on the paper's static positions and by the filter, in a sixth of
-/// that time and in the same time, in all installation forms, and navigates with what is left: standing,
-/// aligned by the calibrated instrument itself or perfectly, and moving. Shows the position error of
+/// that time and in the same time, in all installation forms, and navigates with the remaining
+/// errors: at rest, aligned by the calibrated instrument itself or perfectly, and moving. Shows the position error of
 /// every method, and which parameters make it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -29,15 +29,15 @@ const SCENARIO: &str = "experiment";
   turncal study experiment --trajectory vehicle --hours 2 --json")]
 pub struct Experiment {
     /// Number of instruments
-    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = at_least_two)]
     samples: u64,
     /// Seed of all random numbers [default: the scenario's]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     /// What the instrument that moves follows: a TOML file or an embedded name
     #[arg(long, value_name = "TRAJECTORY", default_value = "flight")]
     trajectory: String,
-    /// How long each navigates, to the minute, up to 1000
+    /// How many hours each navigates, to the minute, up to 1000
     #[arg(long, default_value_t = 40.0, value_parser = hours)]
     hours: f64,
     #[command(flatten)]

@@ -5,15 +5,14 @@ use turncal::study::Table1Study;
 use turncal::study::table1::paper;
 use turncal::units::DEGREE;
 
-use super::super::navigate::hours;
+use super::super::input::{at_least_two, hours, latitude, seed};
 use super::super::output::Delivery;
 use super::super::progress::Activity;
 
 /// The paper's Table 1: what a simplified installation form costs in 40 h of navigation
 ///
 /// Draws installation angles as the paper does, calibrates gyros and accelerometers by the closed form
-/// in the six-angle and the three-angle form, without noise, and navigates with what is left of their
-/// errors. Shows the largest errors beside the paper's figures, under every reading of its text, and
+/// in the six-angle and the three-angle form, without noise, and navigates with the remaining errors. Shows the largest errors beside the paper's figures, under every reading of its text, and
 /// says which of them a correct program gives.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a report with the paper's Figures 2 to 9")))]
@@ -23,16 +22,16 @@ use super::super::progress::Activity;
   turncal study table1 --hours 48 --latitude-deg 41.6")]
 pub struct Table1 {
     /// Number of samples
-    #[arg(long, default_value_t = paper::SAMPLES as u64, value_parser = clap::value_parser!(u64).range(2..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = paper::SAMPLES as u64, value_parser = at_least_two)]
     samples: u64,
     /// Seed of all random numbers
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     seed: u64,
     /// Length of a run in hours, a minute to 1000
     #[arg(long, default_value_t = paper::HOURS, value_parser = hours)]
     hours: f64,
     /// Geodetic latitude in degrees; the paper states none, its figures say 45.78
-    #[arg(long, default_value_t = paper::LATITUDE_DEG, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = paper::LATITUDE_DEG, value_name = "L", allow_negative_numbers = true, value_parser = latitude)]
     latitude_deg: f64,
     #[command(flatten)]
     delivery: Delivery,

@@ -241,9 +241,9 @@ const GYRO_INSTABILITY: [Convention; 6] = [
     convention(
         "°/h Gauss–Markov",
         Linear(DEG_PER_H / MARKOV),
-        "1σ whose Allan deviation peaks at that minimum: turncal `gyro_instability_deg_per_h`, \
+        "1σ whose Allan deviation peaks at that minimum: turncal `gyro_gauss_markov_sigma_deg_per_h`, \
          KF-GINS `gbstd`",
-        &["gyro_instability_deg_per_h", "gbstd"],
+        &["gyro_gauss_markov_sigma_deg_per_h", "gbstd"],
     ),
     convention(
         "rad/s Gauss–Markov",
@@ -276,8 +276,8 @@ const ACCEL_INSTABILITY: [Convention; 6] = [
     convention(
         "µg Gauss–Markov",
         Linear(MICRO_G / MARKOV),
-        "1σ whose Allan deviation peaks at that minimum: turncal `accel_instability_ug`",
-        &["accel_instability_ug"],
+        "1σ whose Allan deviation peaks at that minimum: turncal `accel_gauss_markov_sigma_ug`",
+        &["accel_gauss_markov_sigma_ug"],
     ),
     convention(
         "mGal Gauss–Markov",

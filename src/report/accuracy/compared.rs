@@ -1,6 +1,6 @@
 //! Everything whose error is compared, and how it is spoken of.
 
-use crate::calibration::outcome::Nis;
+use crate::calibration::Nis;
 use crate::imu::Sensor;
 use crate::study::accuracy::{Journey, Region};
 use crate::study::{Accuracy, Figures};

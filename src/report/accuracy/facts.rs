@@ -3,7 +3,7 @@
 use super::super::document::Facts;
 use super::super::number::{count, minutes, three_digits, value};
 use super::super::terms::title;
-use crate::run::StateBlock;
+use crate::calibration::ErrorTerm;
 use crate::study::Accuracy;
 use crate::units::DEGREE;
 
@@ -58,9 +58,9 @@ pub(super) fn facts(accuracy: &Accuracy) -> Facts {
 /// Which error terms the filter had, and which it should have had.
 fn terms(accuracy: &Accuracy) -> String {
     let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
-    let there = StateBlock::ALL.into_iter().filter(|&b| scenario.has(b));
+    let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
     let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
-    let named = |blocks: &[StateBlock]| {
+    let named = |blocks: &[ErrorTerm]| {
         let titles: Vec<&str> = blocks.iter().map(|&block| title(block)).collect();
         titles.join(", ")
     };

@@ -7,7 +7,7 @@ use super::super::plot::{Axis, Color, Mark, Panel, Plot, Point, Series, Shape};
 use super::compared::journey_name;
 use super::tables::{self, percent};
 use crate::calibration::Group;
-use crate::calibration::states::PARAMETERS;
+use crate::calibration::PARAMETERS;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, NavigationAccuracy};
 

@@ -3,12 +3,12 @@
 use std::cmp::Ordering;
 
 use super::super::document::Document;
-use super::super::effects;
 use super::super::number::{count, interval, minutes, value, with_interval};
 use super::compared::{compared, journey_name, region_name, white_within};
 use super::tables::{self, percent};
 
-use crate::calibration::outcome::Nis;
+use crate::calibration::ErrorTermTest;
+use crate::calibration::Nis;
 use crate::imu::Output;
 use crate::study::accuracy::Containment;
 use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
@@ -45,7 +45,7 @@ pub(super) fn say(document: &mut Document, accuracy: &Accuracy) {
         ));
     }
     form(accuracy).into_iter().for_each(&mut say);
-    if let Some(advice) = effects::advice(&accuracy.effects) {
+    if let Some(advice) = ErrorTermTest::most_significant(&accuracy.effects) {
         say((false, format!("In the first run: {advice}")));
     }
     gain(accuracy).into_iter().for_each(&mut say);

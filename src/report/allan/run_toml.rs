@@ -4,6 +4,7 @@ use serde_json::{Map, Value};
 
 use super::super::number::three_digits;
 use super::quantity::quantity;
+use crate::formats::NoiseKeys;
 use crate::imu::Sensor;
 use crate::noise::{NoiseAnalysis, Process, of_kind};
 
@@ -64,18 +65,18 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         value: figures.noise.random_walk / walk.value,
         comment: comment.to_owned(),
     }];
-    let Some(of) = figures.noise.instability else {
+    let Some(of) = figures.noise.gauss_markov else {
         return fields;
     };
-    let (key, time_key) = match sensor {
-        Sensor::Gyro => ("gyro_instability_deg_per_h", "gyro_correlation_time_s"),
-        Sensor::Accel => ("accel_instability_ug", "accel_correlation_time_s"),
-    };
+    let NoiseKeys {
+        gauss_markov: (key, unit),
+        correlation_time: time_key,
+        ..
+    } = NoiseKeys::of(sensor);
     let correlation_time = of.correlation_time;
-    let sigma = quantity(Process::GaussMarkov { correlation_time }, sensor);
     fields.push(Field {
         key,
-        value: of.sigma / sigma.value,
+        value: of.sigma / unit,
         comment: format!(
             "1σ of a Gauss–Markov process{}",
             in_place_of(analysis, sensor)

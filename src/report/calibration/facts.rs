@@ -4,16 +4,16 @@ use super::super::document::Facts;
 use super::super::number::{count, sigma, three_digits, value};
 use super::report::Report;
 use crate::imu::{Noise, Sensor};
-use crate::run::Run;
 use crate::units::{
     ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
 };
 
 /// What was recorded, where, and what was known before.
-pub(super) fn run(run: &Run) -> Facts {
-    let (imu, site) = (&run.imu, &run.site);
-    let mut facts = Facts::new("Run", [("run", run.name.clone())]);
-    for (name, value) in &run.meta {
+pub(super) fn run(report: &Report) -> Facts {
+    let run = report.run;
+    let (imu, site) = (&run.recording.imu, &run.site);
+    let mut facts = Facts::new("Run", [("run", run.recording.name.clone())]);
+    for (name, value) in &run.recording.meta {
         facts.push(name, value.clone());
     }
     let place = format!(
@@ -37,8 +37,8 @@ pub(super) fn run(run: &Run) -> Facts {
     for (sensor, input) in [(Sensor::Gyro, "rad/s"), (Sensor::Accel, "m/s²")] {
         let (name, of, unit) = (
             sensor.name(),
-            run.nominal.get(sensor).0,
-            run.unit.get(sensor),
+            run.instrument.nominal.get(sensor).0,
+            run.instrument.unit.get(sensor),
         );
         let scale = format!(
             "{}, {}, {} {unit} per second for 1 {input}",
@@ -47,17 +47,17 @@ pub(super) fn run(run: &Run) -> Facts {
         facts.push(&format!("{name} nominal scale"), scale);
         facts.push(
             &format!("{name} noise"),
-            noise(sensor, run.noise.get(sensor)),
+            noise(sensor, run.instrument.noise.get(sensor)),
         );
     }
     facts.push(
         "turntable",
-        run.table.as_ref().map_or("its log was not used".to_owned(), |table| {
+        report.table().map_or("its log was not used".to_owned(), |table| {
             format!(
                 "{} readings; position {} ″ (1σ, new at every position), reading {} ″ (1σ, white)",
                 count(table.time.len()),
-                sigma(table.position_sigma / ARCSEC),
-                sigma(table.reading_sigma / ARCSEC)
+                sigma(run.table.position_sigma / ARCSEC),
+                sigma(run.table.reading_sigma / ARCSEC)
             )
         }),
     );
@@ -73,7 +73,7 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
         "random walk {} {walk_unit}",
         sigma(noise.random_walk / walk)
     );
-    if let Some(of) = noise.instability {
+    if let Some(of) = noise.gauss_markov {
         let (of_bias, time) = (sigma(of.sigma / bias), sigma(of.correlation_time));
         text += &format!(", Gauss–Markov bias {of_bias} {bias_unit} over {time} s");
     }
@@ -95,7 +95,7 @@ impl Report<'_> {
             facts.push("installation form", estimate.form().name());
         }
         facts.push("body frame", self.body_frame.words());
-        let (observed, found_in) = match self.run.table {
+        let (observed, found_in) = match self.table() {
             Some(_) => (
                 "zero velocity in dwells and the attitude of the table",
                 "the table's log",
@@ -103,7 +103,7 @@ impl Report<'_> {
             None => ("zero velocity in dwells", "the IMU's own readings"),
         };
         if let Some(outcome) = self.outcome {
-            let iterations = outcome.passes.iter().filter(|pass| !pass.live).count();
+            let iterations = outcome.passes.iter().filter(|pass| !pass.feedback).count();
             let first = match iterations < outcome.passes.len() {
                 true => "a first pass with feedback and ",
                 false => "",

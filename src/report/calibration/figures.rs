@@ -6,7 +6,7 @@ use super::super::outlook;
 use super::super::plot::{Axis, Color, Mark, Matrix, Panel, Plot, Series};
 use super::report::Report;
 use super::{methods, path};
-use crate::calibration::outcome::{Estimate, Innovation, Moment, Nis, Observation, Outcome};
+use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome};
 
 /// Where the axis of estimates ends, in final σ: with the prior on it the end could not be read.
 const EXTENT: f64 = 300.0;
@@ -60,7 +60,7 @@ impl Report<'_> {
                     .label(format!("σ {}", axis_name(form, i)))
             };
             let error = truth.map(|truth| {
-                let of = |m: &Moment| Some(group.spread(&(m.estimate - truth), &indices)?.0);
+                let of = |m: &Epoch| Some(group.spread(&(m.estimate - truth), &indices)?.0);
                 let points = history.iter().filter_map(|m| Some((m.time, of(m)?)));
                 Series::line(points)
                     .color(Color::Ink)
@@ -97,13 +97,13 @@ impl Report<'_> {
         };
         let panel = |group: Group, index: usize| {
             let (unit, indices) = (group.unit_value(), group.estimated(estimate));
-            let of = |history: &[Moment], of: &dyn Fn(&Moment) -> f64| {
+            let of = |history: &[Epoch], of: &dyn Fn(&Epoch) -> f64| {
                 history
                     .iter()
                     .map(|m| (m.time, of(m) / unit))
                     .collect::<Vec<_>>()
             };
-            let error = |m: &Moment| m.estimate[index] - reference[index];
+            let error = |m: &Epoch| m.estimate[index] - reference[index];
             let sigma = group
                 .spread(&estimate.sigma(), &indices)
                 .map_or(1.0, |x| x.1);
@@ -118,7 +118,7 @@ impl Report<'_> {
                 ))
                 .with(Series::zero())
                 .with(
-                    Series::line(of(&outcome.live_history, &error))
+                    Series::line(of(&outcome.feedback_history, &error))
                         .nth(1)
                         .width(0.9),
                 )
@@ -134,7 +134,7 @@ impl Report<'_> {
             panels.extend(indices.into_iter().map(|index| panel(group, index)));
             panels.resize(panels.len().next_multiple_of(3), Panel::blank(""));
         }
-        let first = match outcome.live_history.is_empty() {
+        let first = match outcome.feedback_history.is_empty() {
             true => "",
             false => "; thin line: the first pass, with feedback, from the coarse start on",
         };

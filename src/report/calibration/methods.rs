@@ -2,8 +2,8 @@
 
 use super::super::group::{Group, axis_name, short_name};
 use super::super::plot::{Axis, Color, Mark, Panel, Plot, Series, Shape};
-use crate::calibration::outcome::Estimate;
-use crate::calibration::states::{ParameterVector, sensor_and_parameter};
+use crate::calibration::Estimate;
+use crate::calibration::{ParameterVector, sensor_and_parameter};
 
 /// Magnitude of each parameter's error by each method, with the σ that it claims.
 pub(super) fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {

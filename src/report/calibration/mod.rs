@@ -31,7 +31,7 @@ impl Report<'_> {
         document.both(self.groups());
         document.both(
             self.quality
-                .map_or_else(Table::default, |of| tables::residuals(of, self.run)),
+                .map_or_else(Table::default, |of| tables::residuals(of, self.table())),
         );
         if let Some(outcome) = self.outcome {
             document.page(tables::consistency(outcome));
@@ -47,25 +47,21 @@ impl Report<'_> {
             document.page(tables::weakest(outcome));
         }
         document.page(self.model());
-        document.page(facts::run(self.run));
+        document.page(facts::run(self));
         document
     }
 
     /// What must be known before the figures are used.
     fn warnings(&self) -> Vec<String> {
-        let of_closed_form = self.closed_form.map_or(&[][..], |closed| closed.warnings);
-        let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.warnings);
-        let mut warnings = [of_closed_form, of_outcome].concat();
-        warnings.extend(effects::advice(self.effects));
-        warnings
+        self.findings.iter().map(ToString::to_string).collect()
     }
 
     /// What ran on what.
     fn lead(&self) -> Vec<String> {
-        let imu = &self.run.imu;
+        let imu = &self.run.recording.imu;
         let mut run = format!(
             "Run {}: {} s, {} samples at {} Hz, {} dwells; body frame: {}",
-            self.run.name,
+            self.run.recording.name,
             value(imu.duration(), 10.0),
             count(imu.len()),
             three_digits(1.0 / imu.period),

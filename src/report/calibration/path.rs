@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use super::super::plot::{Axis, Panel, Plot, Point, Series};
 use super::report::Report;
 use crate::imu::AXES;
-use crate::run::{ImuRecord, TableRecord};
+use crate::recording::{ImuSamples, TableLog};
 use crate::units::DEGREE;
 
 /// Nearer to the plumb line than this an axis has no azimuth worth drawing.
@@ -27,11 +27,7 @@ pub(super) fn figure(report: &Report) -> Plot {
             .tagged(1, numbers())
             .with_all(lines)
     };
-    let table = report
-        .run
-        .table
-        .as_ref()
-        .filter(|table| !table.time.is_empty());
+    let table = report.table().filter(|table| !table.time.is_empty());
     let mut panels = Vec::new();
     let mut caption = String::new();
     if let Some(table) = table {
@@ -50,20 +46,20 @@ pub(super) fn figure(report: &Report) -> Plot {
     caption += "Rates are the raw gyro outputs about the body axes. Grey: dwells, numbered where there is room.";
     let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
     panels.push(panel("rate about the body axes, °/s", y, &|axis| {
-        rate(&report.run.imu, axis)
+        rate(&report.run.recording.imu, axis)
     }));
     Plot::new("path.svg", "Path", (1, 240), panels).caption(caption)
 }
 
 /// Elevation of a body axis above the horizon in degrees.
-fn elevation(table: &TableRecord, axis: usize) -> Vec<Point> {
+fn elevation(table: &TableLog, axis: usize) -> Vec<Point> {
     let line = table.time.iter().zip(&table.attitude);
     line.map(|(&t, c)| (t, axis_elevation(c, axis) / DEGREE))
         .collect()
 }
 
 /// Azimuth of a body axis clockwise from North in degrees, interrupted where it jumps and where it is steep.
-fn azimuth(table: &TableRecord, axis: usize) -> Vec<Point> {
+fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
     let gap = (f64::NAN, f64::NAN);
     let (mut last, mut line) = (f64::NAN, Vec::new());
     for (&t, c) in table.time.iter().zip(&table.attitude) {
@@ -91,7 +87,7 @@ fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
 }
 
 /// Mean rate of each sample about a body axis in degrees a second.
-fn rate(imu: &ImuRecord, axis: usize) -> Vec<Point> {
+fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
     let samples = imu.gyro.iter().enumerate();
     let rate = |(k, angle): (usize, &nalgebra::Vector3<f64>)| {
         (
@@ -107,16 +103,13 @@ mod tests {
     use super::*;
     use crate::attitude::from_pitch_roll_heading;
 
-    fn table(headings: impl Iterator<Item = f64>) -> TableRecord {
+    fn table(headings: impl Iterator<Item = f64>) -> TableLog {
         let attitude: Vec<_> = headings
             .map(|heading| from_pitch_roll_heading(0.0, 0.0, heading * DEGREE))
             .collect();
-        TableRecord {
+        TableLog {
             time: (0..attitude.len()).map(|k| k as f64).collect(),
             attitude,
-            position_sigma: 0.0,
-            reading_sigma: 0.0,
-            geometry: Default::default(),
             tilts: Vec::new(),
         }
     }

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::super::outlook::Navigated;
-use crate::calibration::outcome::{Estimate, Outcome, to_vector};
-use crate::calibration::states::ParameterVector;
-use crate::calibration::{BlockEffect, Quality};
-use crate::imu::{PerSensor, Triad};
-use crate::run::Run;
-use crate::run::record::{BodyFrame, TermRecord};
+use crate::calibration::result::TermRecord;
+use crate::calibration::{ErrorTermTest, Finding, ParameterVector, Quality};
+use crate::calibration::{Estimate, Outcome, to_vector};
+use crate::imu::{BodyFrame, PerSensor, Triad};
+use crate::recording::TableLog;
+use crate::run::{Aiding, Run};
 use crate::study::navigation::NavigationStudyError;
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the same body
@@ -20,12 +20,16 @@ pub struct Report<'a> {
     pub title: &'a str,
     /// The record.
     pub run: &'a Run,
+    /// What was observed at rest.
+    pub aiding: Aiding,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
     /// The filter's result, if it ran.
     pub outcome: Option<&'a Outcome>,
+    /// What must be known before the figures are used.
+    pub findings: &'a [Finding],
     /// What error terms did to it, or would do.
-    pub effects: &'a [BlockEffect],
+    pub effects: &'a [ErrorTermTest],
     /// The closed form's result, if there is one.
     pub closed_form: Option<ClosedForm<'a>>,
     /// The true triads, where they are known.
@@ -47,8 +51,6 @@ pub struct ClosedForm<'a> {
     pub estimate: &'a Estimate,
     /// What it was made of, such as `six positions, 60 min of its own`.
     pub note: &'a str,
-    /// What must be known before using it.
-    pub warnings: &'a [String],
 }
 
 impl Report<'_> {
@@ -58,14 +60,19 @@ impl Report<'_> {
         filtered.or(self.closed_form.map(|closed| closed.estimate))
     }
 
+    /// The table's readings, where they were observed.
+    pub(super) fn table(&self) -> Option<&TableLog> {
+        self.run.observed_table(self.aiding)
+    }
+
     pub(super) fn truth_vector(&self) -> Option<ParameterVector> {
         self.truth.map(to_vector)
     }
 
     /// Begin and end of the record, s.
     pub(super) fn time_span(&self) -> (f64, f64) {
-        let imu = &self.run.imu;
-        (imu.start, imu.start + imu.duration())
+        let imu = &self.run.recording.imu;
+        (imu.start(), imu.start() + imu.duration())
     }
 
     /// Both methods that ran, the closed form first.

@@ -5,10 +5,10 @@ use super::super::group::Group;
 use super::super::number::{self, count, plus_minus, sigma, three_digits, value};
 use super::super::terms::{self, improvement};
 use super::report::Report;
-use crate::calibration::outcome::{Estimate, Nis, Outcome, parameter_name};
+use crate::calibration::{Estimate, Nis, Outcome, parameter_name};
 use crate::calibration::{Measures, Quality, Spread};
 use crate::imu::ParameterKind;
-use crate::run::Run;
+use crate::recording::TableLog;
 use crate::units::{ARCSEC, DEGREE, MICRO_G, MILLI_G};
 
 /// How many of the directions that were observed are shown.
@@ -63,7 +63,7 @@ impl Report<'_> {
         }));
         if let Some(outcome) = self.outcome {
             table = table.section(terms::rows(
-                &outcome.further,
+                &outcome.auxiliary,
                 self.true_terms,
                 truth.is_some(),
             ));
@@ -146,15 +146,15 @@ pub(super) fn passes(outcome: &Outcome) -> Table {
     let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
         cells![
             (n + 1).to_string(),
-            if pass.live {
+            if pass.feedback {
                 "first, with feedback"
             } else {
                 "Gauss–Newton"
             },
             three_digits(pass.largest_step),
-            number::whole(pass.merit),
+            number::whole(pass.cost),
             count(pass.observations),
-            three_digits(pass.merit / pass.observations as f64),
+            three_digits(pass.cost / pass.observations as f64),
             count(pass.rejected),
         ]
     });
@@ -217,8 +217,8 @@ pub(super) fn consistency(outcome: &Outcome) -> Table {
 }
 
 /// Each residual over the whole record and over what was held out; empty where there is nothing to measure.
-pub(super) fn residuals(quality: &Quality, run: &Run) -> Table {
-    let turns = match run.table {
+pub(super) fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
+    let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",
         None => "labelled turns, gyros minus label",
     };

@@ -7,9 +7,9 @@ use super::super::group::Group;
 use super::super::synthetic::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
-use crate::calibration::outcome::{Nis, Observation, from_vector, parameter_name, to_vector};
-use crate::calibration::states::{PARAMETERS, ParameterMatrix};
-use crate::imu::{Instability, InstallationForm};
+use crate::calibration::{Nis, Observation, from_vector, parameter_name, to_vector};
+use crate::calibration::{PARAMETERS, ParameterMatrix};
+use crate::imu::{GaussMarkov, InstallationForm};
 use crate::navigation::NearPole;
 use crate::study::navigation::NavigationStudyError;
 use crate::units::{DEG_PER_H, PPM};
@@ -95,7 +95,7 @@ fn a_nis_outside_its_interval_is_called_so() {
 #[test]
 fn noise_is_given_in_the_units_of_data_sheets() {
     let mut made_up = synthetic(InstallationForm::General);
-    made_up.run.noise.gyro.instability = Some(Instability {
+    made_up.run.instrument.noise.gyro.gauss_markov = Some(GaussMarkov {
         sigma: 0.003 * DEG_PER_H,
         correlation_time: 3600.0,
     });
@@ -151,7 +151,7 @@ fn warnings_stand_before_every_figure_and_text_is_escaped() {
         .find(|(name, _)| name == "index.html")
         .unwrap()
         .1;
-    let warning = page.find(&made_up.outcome.warnings[0]).unwrap();
+    let warning = page.find(&made_up.outcome.findings[0].to_string()).unwrap();
     assert!(warning < page.find("<figure").unwrap());
     assert!(page.contains("&lt;IMU&gt; &amp; co"));
 }
@@ -211,9 +211,9 @@ fn a_closed_form_alone_is_reported() {
 #[test]
 fn a_run_without_a_table_is_reported() {
     let mut made_up = synthetic(InstallationForm::General);
-    made_up.run.table = None;
-    made_up.outcome.live_history.clear();
-    made_up.outcome.passes.retain(|pass| !pass.live);
+    made_up.run.recording.table = None;
+    made_up.outcome.feedback_history.clear();
+    made_up.outcome.passes.retain(|pass| !pass.feedback);
     let innovations = &mut made_up.outcome.innovations;
     innovations.retain(|i| i.observation == Observation::Velocity);
     made_up.outcome.consistency.table = Nis {
@@ -290,12 +290,12 @@ fn a_filter_that_saw_next_to_nothing_is_reported() {
             made_up.outcome.estimate.covariance = ParameterMatrix::zeros();
         }
         made_up.dwells.clear();
-        if let Some(table) = &mut made_up.run.table {
+        if let Some(table) = &mut made_up.run.recording.table {
             table.time.clear();
             table.attitude.clear();
         }
-        made_up.run.imu.gyro.truncate(moments);
-        made_up.run.imu.accel.truncate(moments);
+        made_up.run.recording.imu.gyro.truncate(moments);
+        made_up.run.recording.imu.accel.truncate(moments);
         let page = page(&made_up.report());
         assert!(!page.contains("NaN"));
         assert!(page.contains("NOT CONVERGED"));

@@ -7,12 +7,13 @@ use serde_json::{Map, Value, json};
 use super::tables::column_of;
 use super::words;
 use crate::imu::{AXES, Sensor};
-use crate::run::{Fault, LabelledMotion, Run};
+use crate::recording::{Fault, LabelledMotion};
+use crate::run::Run;
 use crate::survey::{LabelCheck, MethodOutlook, Rest, Survey, Turn, Verdict};
 use crate::units::DEGREE;
 
 pub(super) fn data(run: &Run, survey: &Survey) -> Value {
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let mut fault_samples: BTreeMap<&str, usize> = BTreeMap::new();
     for fault in &imu.faults {
         *fault_samples.entry(fault.kind.name()).or_default() += fault.samples.len();
@@ -24,14 +25,14 @@ pub(super) fn data(run: &Run, survey: &Survey) -> Value {
         .map(|(way, rests)| (words::way_up(way / 2, way % 2 == 1), rests))
         .collect();
     let mut data = json!({
-        "run": run.name,
+        "run": run.recording.name,
         "samples": imu.len(),
         "sample_period_s": imu.period,
         "rate_hz": imu.period.recip(),
         "duration_s": imu.duration(),
         "continuous": imu.continuous,
-        "table_readings": run.table.as_ref().map_or(0, |table| table.time.len()),
-        "unit": run.unit,
+        "table_readings": run.recording.table.as_ref().map_or(0, |table| table.time.len()),
+        "unit": run.instrument.unit,
     });
     if let Some(log) = log(run, survey) {
         data["log"] = log;
@@ -66,7 +67,7 @@ fn degrees(angle: f64) -> f64 {
 }
 
 fn log(run: &Run, survey: &Survey) -> Option<Value> {
-    let log = run.imu.log.as_ref()?;
+    let log = run.recording.imu.log.as_ref()?;
     let columns = Sensor::ALL.into_iter().flat_map(|sensor| {
         let steps = survey.steps.get(sensor);
         let columns = log.columns.get(sensor).iter().zip(steps).zip(AXES);
@@ -102,7 +103,7 @@ fn fault(run: &Run, fault: &Fault) -> Value {
         "kind": fault.kind.name(),
         "column": column_of(run, fault),
         "line": fault.line,
-        "start_s": run.imu.time(fault.samples.start),
+        "start_s": run.recording.imu.time(fault.samples.start),
         "samples": fault.samples.len(),
         "bridged": fault.bridged,
     })
@@ -123,7 +124,7 @@ fn dwell(run: &Run, rest: &Rest) -> Value {
 }
 
 fn turn(run: &Run, survey: &Survey, turn: &Turn) -> Value {
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let mut data = json!({
         "start_s": imu.time(turn.samples.start),
         "end_s": imu.time(turn.samples.end),

@@ -12,7 +12,7 @@ pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {
                        Grey: dwells, numbered as in the table and with the axis that is up; above the rates: \
                        turns, by axis and angle, or angle alone if about several axes, where there is room."
         .to_owned();
-    if !run.imu.faults.is_empty() {
+    if !run.recording.imu.faults.is_empty() {
         caption += " Crosses: faults of the log in the triad's samples, missing and duplicate rows in both.";
     }
     let panels = Sensor::ALL.map(|sensor| panel(run, survey, sensor));
@@ -20,7 +20,7 @@ pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {
 }
 
 fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let (samples, unit, title) = match sensor {
         Sensor::Gyro => (&imu.gyro, DEGREE, "angular rate, °/s"),
         Sensor::Accel => (&imu.accel, 1.0, "specific force, m/s²"),
@@ -54,7 +54,7 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
         .flat_map(|s| s.iter())
         .fold(0.0, |low: f64, &x| low.min(x));
     let foot = lowest / imu.period / unit;
-    let x = Axis::linear("time, s").between(imu.start, imu.start + imu.duration());
+    let x = Axis::linear("time, s").between(imu.start(), imu.start() + imu.duration());
     let y = Axis::linear("").including([0.0]).room(0.1, 0.3);
     Panel::new(title, x, y)
         .shaded(&dwells)
@@ -64,7 +64,7 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
 }
 
 fn of_turn(run: &Run, turn: &Turn) -> (f64, String) {
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let (start, end) = (imu.time(turn.samples.start), imu.time(turn.samples.end));
     (0.5 * (start + end), words::turn(turn))
 }

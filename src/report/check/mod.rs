@@ -12,10 +12,10 @@ use crate::survey::Survey;
 
 /// Everything that is said of a run and what was found in it.
 pub fn document(run: &Run, survey: &Survey) -> Document {
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let mut document = Document::new(format!(
         "Check of {}: {} s, {} samples at {} Hz, {}, {}",
-        run.name,
+        run.recording.name,
         value(imu.duration(), 10.0),
         count(imu.len()),
         three_digits(imu.period.recip()),
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn gyros_of_the_wrong_sign_or_unit_are_found_by_table_and_gravity() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        for sample in &mut run.imu.gyro {
+        for sample in &mut run.recording.imu.gyro {
             sample.x = -sample.x;
         }
         let said = terminal::text(&checked(&run), None);

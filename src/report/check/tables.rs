@@ -5,7 +5,8 @@ use super::super::number::{count, or_dash, sigma, three_digits, value, whole};
 use super::words::{degrees, direction, of_label, signed, way_up};
 use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
-use crate::run::{Fault, LabelledMotion, Run};
+use crate::recording::{Fault, LabelledMotion};
+use crate::run::Run;
 use crate::survey::{LabelCheck, Rest, Survey, Turn, Verdict};
 use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 
@@ -24,7 +25,7 @@ pub(super) fn columns(run: &Run, survey: &Survey) -> Table {
         "step",
         "as a rate",
     ];
-    let rows = run.imu.log.iter().flat_map(|log| {
+    let rows = run.recording.imu.log.iter().flat_map(|log| {
         Sensor::ALL.into_iter().flat_map(|sensor| {
             let steps = survey.steps.get(sensor);
             let columns = log.columns.get(sensor).iter().zip(steps).zip(AXES);
@@ -40,7 +41,7 @@ pub(super) fn columns(run: &Run, survey: &Survey) -> Table {
                     count(column.at_smallest),
                     exactly(column.largest),
                     count(column.at_largest),
-                    run.unit.get(sensor).as_str(),
+                    run.instrument.unit.get(sensor).as_str(),
                     or_dash(column.step, three_digits),
                     or_dash(rate, |rate| format!(
                         "{} {symbol}",
@@ -65,7 +66,7 @@ fn exactly(x: f64) -> String {
 }
 
 pub(super) fn faults(run: &Run) -> Table {
-    let imu = &run.imu;
+    let imu = &run.recording.imu;
     let row = |fault: &Fault| {
         let column = column_of(run, fault).unwrap_or("rows");
         cells![
@@ -91,7 +92,7 @@ pub(super) fn faults(run: &Run) -> Table {
 /// The file's column in which a fault is; none if it is in whole rows.
 pub(super) fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
     let (sensor, axis) = fault.axis?;
-    Some(&run.imu.log.as_ref()?.columns.get(sensor)[axis].name)
+    Some(&run.recording.imu.log.as_ref()?.columns.get(sensor)[axis].name)
 }
 
 pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
@@ -191,7 +192,7 @@ pub(super) fn methods(survey: &Survey) -> Table {
     let columns = std::iter::once(String::new()).chain(groups);
     let mut table = Table::new("What each method could observe, 1σ", columns).note(
         "RMS 1σ to be expected in the general form, from the prior's own σ on, linearised where the filter would \
-         begin; the closed form's from its equations. Further error terms are not in it.",
+         begin; the closed form's from its equations. Auxiliary error terms are not in it.",
     );
     let mut rows = Vec::new();
     for method in &survey.methods {

@@ -2,7 +2,8 @@
 
 use super::super::number::{count, three_digits, value};
 use crate::imu::AXES;
-use crate::run::{LabelledMotion, Run};
+use crate::recording::LabelledMotion;
+use crate::run::Run;
 use crate::survey::{APART, LabelCheck, Survey, Turn, Verdict};
 use crate::units::DEGREE;
 
@@ -56,13 +57,13 @@ pub(super) fn log(run: &Run, survey: &Survey) -> String {
         "Stationary for {} s in all, at most {} s at a time; {}.",
         three_digits(survey.standing.total),
         three_digits(survey.standing.longest),
-        match (&run.table, run.segments.len()) {
+        match (&run.recording.table, run.recording.segments.len()) {
             (Some(table), _) => format!("table log of {} readings", count(table.time.len())),
             (None, 0) => "no table log, no labelled sections".to_owned(),
             (None, labels) => format!("no table log, {labels} labelled sections"),
         }
     );
-    if let Some(log) = &run.imu.log {
+    if let Some(log) = &run.recording.imu.log {
         text += &format!(
             " {} rows; stamps are off the uniform clock by {} µs RMS, {} µs at most.",
             count(log.rows),
@@ -83,7 +84,7 @@ pub(super) fn log(run: &Run, survey: &Survey) -> String {
 
 /// What to look at and what to change, a sentence or two each.
 pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
-    let mut findings = run.notes.clone();
+    let mut findings = run.recording.notes.clone();
     findings.extend(of_units(run, survey));
     findings.extend(survey.labels.iter().filter_map(of_label));
     findings.extend(of_motion(survey));
@@ -144,7 +145,7 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
                  the order of axes.",
                 wrong.len(),
                 survey.turns.len(),
-                value(run.imu.time(turn.samples.start), 1.0)
+                value(run.recording.imu.time(turn.samples.start), 1.0)
             ));
         }
     }

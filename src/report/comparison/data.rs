@@ -4,8 +4,8 @@
 use serde_json::{Map, Value, json};
 
 use super::super::group::Group;
-use crate::calibration::outcome::parameter_name;
-use crate::calibration::states::ParameterVector;
+use crate::calibration::ParameterVector;
+use crate::calibration::parameter_name;
 use crate::calibration::{ChiSquare, Comparison, Side};
 use crate::imu::InstallationForm;
 

@@ -7,11 +7,11 @@ use super::document::{Document, NONE, Table, cells};
 use super::group::{Group, short_name};
 use super::number::{count, or_dash, plus_minus, sigma, three_digits, value};
 use super::terms::unit;
-use crate::calibration::further::{CONSTANTS, Constant, constant_name};
-use crate::calibration::states::ParameterVector;
+use crate::calibration::ParameterVector;
+use crate::calibration::result::TermRecord;
+use crate::calibration::{AUXILIARY, AuxiliaryKind, auxiliary_name};
 use crate::calibration::{Canonical, ChiSquare, Comparison, Nees, Side};
 use crate::imu::{InstallationForm, Sensor};
-use crate::run::record::TermRecord;
 
 /// Beyond this many σ a difference is flagged.
 const FLAGGED: f64 = 3.0;
@@ -198,8 +198,8 @@ fn auxiliary(comparison: &Comparison) -> Table {
         })
     };
     let row = |index: usize| {
-        let name = constant_name(index)?;
-        let (symbol, unit) = unit(Constant::of(index)?.block());
+        let name = auxiliary_name(index)?;
+        let (symbol, unit) = unit(AuxiliaryKind::of(index)?.error_term());
         let reference = of(&comparison.reference, &name);
         let mut row = cells![name.as_str(), shown(reference, unit), symbol];
         let mut any = reference.is_some();
@@ -215,9 +215,9 @@ fn auxiliary(comparison: &Comparison) -> Table {
         any.then_some(row)
     };
     Table::new("Auxiliary parameters", beside_reference(comparison))
-        .section((0..CONSTANTS).filter_map(row))
+        .section((0..AUXILIARY).filter_map(row))
         .note(
-            "Further error terms and errors of the table: values ± the 1σ that each calibration claims; z: \
+            "Auxiliary error terms and errors of the table: values ± the 1σ that each calibration claims; z: \
              difference to the reference in its σ, where both have it.",
         )
 }

@@ -19,7 +19,7 @@ fn mission() -> Mission {
 }
 
 /// Errors that grow with time to two hours, σ half of them.
-fn moments(covariance: bool) -> Vec<Moment> {
+fn moments(covariance: bool) -> Vec<Epoch> {
     let moment = |k: u32| {
         let part = f64::from(k) / 120.0;
         let error = NavigationError {
@@ -28,7 +28,7 @@ fn moments(covariance: bool) -> Vec<Moment> {
             position: Vector3::new(3.0, 4.0, 0.0) * NAUTICAL_MILE * part,
         };
         let variance = (error.to_vector() * 0.5).map(|sigma| sigma * sigma);
-        Moment {
+        Epoch {
             time: f64::from(k) * INTERVAL,
             error,
             covariance: covariance.then(|| ErrorMatrix::from_diagonal(&variance)),
@@ -37,7 +37,7 @@ fn moments(covariance: bool) -> Vec<Moment> {
     (0..=120).map(moment).collect()
 }
 
-fn document(moments: &[Moment]) -> Document {
+fn document(moments: &[Epoch]) -> Document {
     let navigation = Navigation {
         calibration: "monday",
         truth: "truth",

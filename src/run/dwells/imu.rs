@@ -5,7 +5,8 @@ use nalgebra::Vector3;
 use super::{Dwell, STILL_RATE};
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
-use crate::run::{Run, SIGMA_OF_MEDIAN, median};
+use crate::run::Run;
+use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
@@ -28,7 +29,7 @@ struct Windows {
 impl Run {
     /// Stretches during which the gyros say what they say at rest and the accelerometers do not change.
     pub(super) fn standstills_of_imu(&self) -> Vec<Dwell> {
-        let length = ((WINDOW / self.imu.period).round() as usize).max(1);
+        let length = ((WINDOW / self.recording.imu.period).round() as usize).max(1);
         let gyro = self.windows(Sensor::Gyro, length);
         let accel = self.windows(Sensor::Accel, length);
         let Some(rest) = self.output_at_rest(&gyro) else {
@@ -54,7 +55,7 @@ impl Run {
             let end = if k == count { k } else { k.saturating_sub(1) };
             if end >= begin + FEWEST {
                 let end = if k == count {
-                    self.imu.len()
+                    self.recording.imu.len()
                 } else {
                     end * length
                 };
@@ -70,10 +71,10 @@ impl Run {
 
     fn windows(&self, sensor: Sensor, length: usize) -> Windows {
         let samples = match sensor {
-            Sensor::Gyro => &self.imu.gyro,
-            Sensor::Accel => &self.imu.accel,
+            Sensor::Gyro => &self.recording.imu.gyro,
+            Sensor::Accel => &self.recording.imu.accel,
         };
-        let duration = length as f64 * self.imu.period;
+        let duration = length as f64 * self.recording.imu.period;
         let mean = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>() / duration;
         let means: Vec<_> = samples.chunks_exact(length).map(mean).collect();
         // Most windows are at rest or turn evenly, so the median sees noise alone; noise figures may
@@ -83,8 +84,8 @@ impl Run {
             .flat_map(|pair| <[f64; 3]>::from((pair[1] - pair[0]).abs()))
             .collect();
         let found = median(&mut changes).unwrap_or(0.0);
-        let stated = self.noise.get(sensor).random_walk / duration.sqrt();
-        let pulse = self.imu.pulse.get(sensor) / duration;
+        let stated = self.instrument.noise.get(sensor).random_walk / duration.sqrt();
+        let pulse = self.recording.imu.pulse.get(sensor) / duration;
         Windows {
             means,
             sigma: (SIGMA_OF_MEDIAN * std::f64::consts::FRAC_1_SQRT_2 * found)
@@ -96,7 +97,7 @@ impl Run {
     /// What the gyros say at rest: what most of the windows say that a bias could make. None if no
     /// window does.
     fn output_at_rest(&self, gyro: &Windows) -> Option<Vector3<f64>> {
-        let prior = &self.prior.gyro;
+        let prior = &self.instrument.prior.gyro;
         let limit = (prior.bias_sigma * BIAS_SIGMAS)
             .add_scalar(ROTATION_RATE + STILL_RATE + STILL_SIGMAS * gyro.sigma);
         let could_rest = |mean: &&Vector3<f64>| {

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::{Dwell, Position, SHORTEST, STANDING_ANGLE, STANDING_SIGMAS};
 use crate::attitude::{log, mean};
-use crate::run::{Run, TableRecord};
+use crate::recording::TableLog;
+use crate::run::Run;
 
 /// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and one that stops still rings.
@@ -19,9 +20,9 @@ const APART: f64 = 0.05;
 
 impl Run {
     /// Stretches of the log whose readings stay.
-    pub(super) fn standstills_of_table(&self, table: &TableRecord) -> Vec<Dwell> {
+    pub(super) fn standstills_of_table(&self, table: &TableLog) -> Vec<Dwell> {
         // Two readings of three components each.
-        let limit = STANDING_ANGLE.max(STANDING_SIGMAS * table.reading_sigma * 6f64.sqrt());
+        let limit = STANDING_ANGLE.max(STANDING_SIGMAS * self.table.reading_sigma * 6f64.sqrt());
         let mut dwells = Vec::new();
         let (mut first, mut before) = (0, 0);
         for next in 1..=table.time.len() {
@@ -40,8 +41,8 @@ impl Run {
         dwells
     }
 
-    fn dwell(&self, table: &TableRecord, standing: Range<usize>) -> Option<Dwell> {
-        let settled = settled(table, standing);
+    fn dwell(&self, table: &TableLog, standing: Range<usize>) -> Option<Dwell> {
+        let settled = settled(table, self.table.reading_sigma, standing);
         // At either end of the log the table is not known to move.
         let margin = |at_end: bool| if at_end { 0.0 } else { MARGIN };
         let begin = table.time.get(settled.start)? + margin(settled.start == 0);
@@ -52,10 +53,11 @@ impl Run {
         let readings = settled.start + times.partition_point(|&t| t < begin)
             ..settled.start + times.partition_point(|&t| t <= end);
         // A stamp that misses a sample's edge by rounding must not cost the sample.
-        let edge = |time: f64| (time - self.imu.start) / self.imu.period;
-        let sample = |k: f64| k.clamp(0.0, self.imu.len() as f64) as usize;
+        let imu = &self.recording.imu;
+        let edge = |time: f64| imu.edge(time);
+        let sample = |k: f64| k.clamp(0.0, imu.len() as f64) as usize;
         let samples = sample((edge(begin) - 1e-3).ceil())..sample((edge(end) + 1e-3).floor());
-        if samples.len() as f64 * self.imu.period < SHORTEST {
+        if samples.len() as f64 * imu.period < SHORTEST {
             return None;
         }
         Some(Dwell {
@@ -69,7 +71,7 @@ impl Run {
 }
 
 /// Cuts off the ends of a standstill at which the mean of the readings is not that of its middle.
-fn settled(table: &TableRecord, standing: Range<usize>) -> Range<usize> {
+fn settled(table: &TableLog, reading_sigma: f64, standing: Range<usize>) -> Range<usize> {
     let quarter = standing.len() / 4;
     let middle = standing.start + quarter..standing.end - quarter;
     let (first, last) = (table.time[standing.start], table.time[standing.end - 1]);
@@ -82,7 +84,7 @@ fn settled(table: &TableRecord, standing: Range<usize>) -> Range<usize> {
         return standing;
     }
     let stretch = stretch as usize;
-    let sigma = table.reading_sigma * (1.0 / stretch as f64 + 1.0 / middle.len() as f64).sqrt();
+    let sigma = reading_sigma * (1.0 / stretch as f64 + 1.0 / middle.len() as f64).sqrt();
     let creeps = |readings: Range<usize>| {
         mean(&table.attitude[readings])
             .is_some_and(|mean| log(&(mean * level.transpose())).norm() > CREEP_SIGMAS * sigma)

@@ -4,7 +4,12 @@ use super::*;
 fn every_embedded_scenario_makes_a_run_as_long_as_its_path() {
     for name in models::names(Room::Scenario) {
         let scenario = Scenario::load(name).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let imu = scenario.simulate(scenario.seed, 0).unwrap().run.imu;
+        let imu = scenario
+            .simulate(scenario.seed, 0)
+            .unwrap()
+            .run
+            .recording
+            .imu;
         let missing = scenario.duration().unwrap() - imu.duration();
         assert!(
             (-1e-6..imu.period).contains(&missing),
@@ -59,5 +64,5 @@ fn given_values_replace_the_draw_and_leave_the_prior() {
     assert_eq!(given.truth.gyro.bias, drawn.truth.gyro.bias);
     assert_eq!(given.truth.gyro.angles, drawn.truth.gyro.angles);
     assert_eq!(given.truth.accel, drawn.truth.accel);
-    assert_eq!(given.run.prior, drawn.run.prior);
+    assert_eq!(given.run.instrument.prior, drawn.run.instrument.prior);
 }

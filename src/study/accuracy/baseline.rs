@@ -2,8 +2,9 @@
 //! instrument and the same noise.
 
 use super::StudyError;
-use crate::calibration::states::ParameterVector;
-use crate::calibration::{in_body_frame, in_general_form, outcome::to_vector, six_position_of};
+use crate::calibration::ParameterVector;
+use crate::calibration::{Options, Problem};
+use crate::calibration::{in_body_frame, in_general_form, six_position_of, to_vector};
 use crate::imu::InstallationForm;
 use crate::models::{self, ModelError, Place};
 use crate::run::Dwell;
@@ -83,18 +84,19 @@ impl Baseline {
     ) -> Result<Vec<Option<ParameterVector>>, TableError> {
         let Simulated { run, truth, .. } = self.scenario.simulate(seed, run)?;
         let truth = to_vector(&in_general_form(&truth));
-        let dwells = run.dwells();
+        let problem = Problem::new(&run, &Options::default().installation(form));
+        let dwells: Vec<Dwell> = problem.dwells().cloned().collect();
         let parts = (0..PARTS).map(|number| Some(Self::part(number)));
         Ok(parts
             .chain([self.equal])
             .map(|part| {
                 let part = part?;
                 let shorter = |dwell: &Dwell| {
-                    let duration = dwell.samples.len() as f64 * run.imu.period;
-                    dwell.first_seconds(part * duration, &run.imu)
+                    let duration = dwell.samples.len() as f64 * run.recording.imu.period;
+                    dwell.first_seconds(part * duration, &run.recording.imu)
                 };
                 let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
-                let closed_form = six_position_of(&run, &dwells, form).ok()?;
+                let closed_form = six_position_of(&problem, &dwells).ok()?;
                 let estimate = in_general_form(&closed_form.estimate.triads);
                 Some(to_vector(&in_body_frame(&estimate, self.scenario.body_frame)) - truth)
             })

@@ -3,17 +3,19 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::{AccuracyStudy, Baseline, StudyError};
-use crate::calibration::further::{CONSTANTS, ConstantVector, constants};
-use crate::calibration::outcome::{Moment, Nis, from_vector, to_vector};
-use crate::calibration::states::{PARAMETERS, ParameterMatrix, ParameterVector};
+use crate::calibration::{AUXILIARY, AuxiliaryVector, auxiliary_vector};
+use crate::calibration::{Epoch, Nis, from_vector, to_vector};
 use crate::calibration::{
-    BlockEffect, Estimate, FormTest, Nees, Outcome, block_effects, bound, estimate,
-    in_general_form, nees,
+    ErrorTermTest, Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
+    test_error_terms,
 };
+use crate::calibration::{Options, Problem};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
+use crate::imu::BodyFrame;
 use crate::imu::{InstallationForm, PerSensor, Triad};
-use crate::run::record::BodyFrame;
+use crate::run::Aiding;
 
-/// One run. Errors are estimate less truth; everything is in the general form.
+/// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone)]
 pub struct Trial {
     /// Its number, the stream of its random numbers.
@@ -29,9 +31,9 @@ pub struct Trial {
     /// σ of the bound at each of the [`moments`].
     pub(super) bound_track: Vec<ParameterVector>,
     /// σ of the bound of constants beside the parameters, zero where they are none.
-    pub further_bound: ConstantVector,
-    /// What the blocks of states did to the filter; of the first run only.
-    pub effects: Vec<BlockEffect>,
+    pub auxiliary_bound: AuxiliaryVector,
+    /// What the error terms did to the filter; of the first run only.
+    pub effects: Vec<ErrorTermTest>,
     /// Error of the closed form for each part of its dwells; none where it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,
 }
@@ -46,9 +48,9 @@ pub struct Filtered {
     /// Covariance that it claims.
     pub(super) covariance: ParameterMatrix,
     /// Error of each constant beside the parameters that was estimated, zero for others.
-    pub further_error: ConstantVector,
+    pub auxiliary_error: AuxiliaryVector,
     /// σ that it claims of them.
-    pub further_sigma: ConstantVector,
+    pub auxiliary_sigma: AuxiliaryVector,
     /// NEES/n of the parameters and the constants beside them.
     pub nees: Option<Nees>,
     /// Number of passes.
@@ -76,24 +78,27 @@ pub(super) fn moments(duration: f64) -> impl Iterator<Item = f64> {
 impl AccuracyStudy {
     pub(super) fn trial(&self, baseline: &Baseline, run: u64) -> Result<Trial, StudyError> {
         let simulated = self.scenario.simulate(self.seed, run)?;
-        let (mut record, truth) = (simulated.run, simulated.truth);
-        if self.scenario.body_frame == BodyFrame::Accelerometer {
-            record.table = None;
-        }
-        let duration = record.imu.duration();
+        let (record, truth) = (simulated.run, simulated.truth);
+        let aiding = match self.scenario.body_frame {
+            BodyFrame::Table => Aiding::Table,
+            BodyFrame::Accelerometer => Aiding::Velocity,
+        };
+        let options = Options::default().installation(self.form).aiding(aiding);
+        let mut problem = Problem::new(&record, &options);
+        let duration = record.recording.imu.duration();
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
-        let bound = bound(&record, &attainable, &simulated.further)
+        let bound = bound(&problem, &attainable, &simulated.terms)
             .map_err(|source| StudyError::Bound { run, source })?;
-        for &block in &self.unmodelled {
-            record.switch_off(block);
+        for &term in &self.unmodelled {
+            problem.model.switch_off(term);
         }
-        let outcome = estimate(&record, self.form, &|_| {});
+        let outcome = estimate(&problem, &|_| {});
         let effects = match &outcome {
-            Ok(outcome) if run == 0 => block_effects(&record, outcome).unwrap_or_default(),
+            Ok(outcome) if run == 0 => test_error_terms(&problem, outcome).unwrap_or_default(),
             _ => Vec::new(),
         };
-        let further = constants(&simulated.geometry, &simulated.further);
+        let auxiliary = auxiliary_vector(&simulated.geometry, &simulated.terms);
         let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,
@@ -103,9 +108,9 @@ impl AccuracyStudy {
             },
             filtered: outcome
                 .ok()
-                .map(|outcome| Filtered::new(&outcome, &truth, &further, duration)),
+                .map(|outcome| Filtered::new(&outcome, &truth, &auxiliary, duration)),
             effects,
-            further_bound: bound.further.sigma(),
+            auxiliary_bound: bound.auxiliary.sigma(),
             bound: attained.sigma(),
             bound_covariance: attained.covariance,
             bound_track: track(&bound.history, form, duration)
@@ -129,25 +134,25 @@ impl Filtered {
     fn new(
         outcome: &Outcome,
         truth: &PerSensor<Triad>,
-        further: &ConstantVector,
+        auxiliary: &AuxiliaryVector,
         duration: f64,
     ) -> Self {
         let truth = to_vector(&in_general_form(truth));
         let form = outcome.estimate.form();
         let estimate = outcome.estimate.in_general_form();
         let error = estimate.vector() - truth;
-        let further_sigma = outcome.further.sigma();
-        let further_error =
-            (outcome.further.values - further).zip_map(&further_sigma, |error, sigma| {
+        let auxiliary_sigma = outcome.auxiliary.sigma();
+        let auxiliary_error =
+            (outcome.auxiliary.values - auxiliary).zip_map(&auxiliary_sigma, |error, sigma| {
                 if sigma > 0.0 { error } else { 0.0 }
             });
         Self {
             error,
             sigma: estimate.sigma(),
             covariance: estimate.covariance,
-            nees: whole_nees(outcome, &estimate, &error, &further_error),
-            further_error,
-            further_sigma,
+            nees: whole_nees(outcome, &estimate, &error, &auxiliary_error),
+            auxiliary_error,
+            auxiliary_sigma,
             passes: outcome.passes.len(),
             velocity: outcome.consistency.velocity,
             table: outcome.consistency.table,
@@ -165,29 +170,29 @@ fn whole_nees(
     outcome: &Outcome,
     estimate: &Estimate,
     error: &ParameterVector,
-    further_error: &ConstantVector,
+    auxiliary_error: &AuxiliaryVector,
 ) -> Option<Nees> {
-    const ALL: usize = PARAMETERS + CONSTANTS;
-    let further = &outcome.further;
-    let cross = outcome.estimate.to_general_form() * further.cross;
+    const ALL: usize = PARAMETERS + AUXILIARY;
+    let auxiliary = &outcome.auxiliary;
+    let cross = outcome.estimate.to_general_form() * auxiliary.cross;
     let mut covariance = SMatrix::<f64, ALL, ALL>::zeros();
     covariance
         .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
         .copy_from(&estimate.covariance);
     covariance
-        .fixed_view_mut::<CONSTANTS, CONSTANTS>(PARAMETERS, PARAMETERS)
-        .copy_from(&further.covariance);
+        .fixed_view_mut::<AUXILIARY, AUXILIARY>(PARAMETERS, PARAMETERS)
+        .copy_from(&auxiliary.covariance);
     covariance
-        .fixed_view_mut::<PARAMETERS, CONSTANTS>(0, PARAMETERS)
+        .fixed_view_mut::<PARAMETERS, AUXILIARY>(0, PARAMETERS)
         .copy_from(&cross);
     covariance
-        .fixed_view_mut::<CONSTANTS, PARAMETERS>(PARAMETERS, 0)
+        .fixed_view_mut::<AUXILIARY, PARAMETERS>(PARAMETERS, 0)
         .copy_from(&cross.transpose());
     let mut difference = SVector::<f64, ALL>::zeros();
     difference.fixed_rows_mut::<PARAMETERS>(0).copy_from(error);
     difference
-        .fixed_rows_mut::<CONSTANTS>(PARAMETERS)
-        .copy_from(further_error);
+        .fixed_rows_mut::<AUXILIARY>(PARAMETERS)
+        .copy_from(auxiliary_error);
     let all: Vec<usize> = (0..ALL).collect();
     nees(&difference, &covariance, &all)
 }
@@ -195,7 +200,7 @@ fn whole_nees(
 /// What a history says at each of the moments, in the general form. It holds no correlations, which
 /// to first order the change of form does not need.
 fn track(
-    history: &[Moment],
+    history: &[Epoch],
     form: InstallationForm,
     duration: f64,
 ) -> impl Iterator<Item = Estimate> {

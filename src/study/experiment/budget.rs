@@ -2,7 +2,7 @@
 
 use super::{ByParameter, Calibrated};
 use crate::calibration::Group;
-use crate::calibration::states::{PARAMETERS, ParameterMatrix};
+use crate::calibration::{PARAMETERS, ParameterMatrix};
 
 /// What the claimed covariance, averaged over all instruments, says of the position error at the end.
 ///

@@ -1,9 +1,10 @@
 //! The methods, and what each makes of an instrument.
 
 use super::{ExperimentError, HOUR_PATH, POSITIONS};
-use crate::calibration::outcome::to_vector;
-use crate::calibration::states::{ParameterMatrix, ParameterVector};
+use crate::calibration::to_vector;
 use crate::calibration::{Estimate, estimate, in_general_form, six_position};
+use crate::calibration::{Options, Problem};
+use crate::calibration::{ParameterMatrix, ParameterVector};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};
@@ -127,13 +128,14 @@ fn calibrated(
             rejects_form,
         }
     };
+    let problem = Problem::new(run, &Options::default().installation(form));
     match estimator {
         Estimator::ClosedForm => {
-            let closed_form = six_position(run, form).map_err(|error| error.to_string())?;
+            let closed_form = six_position(&problem).map_err(|error| error.to_string())?;
             Ok(against_truth(&closed_form.estimate, true, false))
         }
         Estimator::Filter | Estimator::LongFilter => {
-            let outcome = estimate(run, form, &|_| {}).map_err(|error| error.to_string())?;
+            let outcome = estimate(&problem, &|_| {}).map_err(|error| error.to_string())?;
             let rejects = outcome.form_test.is_some_and(|test| test.rejects());
             Ok(against_truth(&outcome.estimate, outcome.converged, rejects))
         }

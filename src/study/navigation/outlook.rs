@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 
 use super::{Mission, NavigationStudyError, Pair};
-use crate::calibration::outcome::Estimate;
+use crate::calibration::Estimate;
 use crate::imu::{PerSensor, Triad};
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
@@ -60,8 +60,8 @@ impl Mission {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::outcome::{from_vector, to_vector};
-    use crate::calibration::states::{ParameterMatrix, ParameterVector};
+    use crate::calibration::{ParameterMatrix, ParameterVector};
+    use crate::calibration::{from_vector, to_vector};
     use crate::earth::Site;
     use crate::imu::InstallationForm;
     use crate::units::{DEG_PER_H, DEGREE, PPM};

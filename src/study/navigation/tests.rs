@@ -7,8 +7,8 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::*;
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::outcome::{from_vector, to_vector};
-use crate::calibration::states::{ParameterVector, sensor_and_parameter};
+use crate::calibration::{ParameterVector, sensor_and_parameter};
+use crate::calibration::{from_vector, to_vector};
 use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
@@ -137,14 +137,23 @@ fn as_claimed(hits: usize, runs: usize, probability: f64) -> bool {
 
 #[test]
 fn predicted_sigma_holds_the_error_after_forty_hours_as_often_as_it_claims() {
-    const RUNS: usize = 400;
+    predicted_sigma_holds_the_error(60);
+}
+
+#[test]
+#[ignore = "statistical: 400 runs"]
+fn predicted_sigma_holds_the_error_after_forty_hours_over_many_runs() {
+    predicted_sigma_holds_the_error(400);
+}
+
+fn predicted_sigma_holds_the_error(runs: usize) {
     let mission = standing(2400);
     let covariance = root() * root().transpose();
     let exposure = mission.exposure(&instrument()).unwrap().pop().unwrap();
     let predicted = exposure.covariance(&covariance);
     let predicted = predicted.fixed_view::<2, 2>(6, 6).into_owned();
     let inverse = predicted.try_inverse().unwrap();
-    let errors: Vec<Vector2<f64>> = (0..RUNS as u64)
+    let errors: Vec<Vector2<f64>> = (0..runs as u64)
         .into_par_iter()
         .map(|run| {
             let moments = mission.errors(&pair(&draw(run), None)).unwrap();
@@ -156,9 +165,9 @@ fn predicted_sigma_holds_the_error_after_forty_hours_as_often_as_it_claims() {
     let east = count(&|e| e.x.powi(2) < predicted[(0, 0)]);
     let north = count(&|e| e.y.powi(2) < predicted[(1, 1)]);
     let found = [east, north, within(1.0), within(2.4477)];
-    println!("{found:?} of {RUNS}");
+    println!("{found:?} of {runs}");
     for (hits, claimed) in found.into_iter().zip([0.6827, 0.6827, 0.3935, 0.95]) {
-        assert!(as_claimed(hits, RUNS, claimed), "{hits} for {claimed}");
+        assert!(as_claimed(hits, runs, claimed), "{hits} for {claimed}");
     }
 }
 
@@ -174,7 +183,9 @@ fn errors_of_both_triads_are_the_sum_of_those_of_each() {
     assert!(apart.norm() < 1e-3 * both.error.horizontal_position());
     let sigma = [both, gyro, accel].map(|moment| moment.sigma().unwrap()[6]);
     assert!(sigma[1] > 0.0 && sigma[2] > 0.0);
-    assert_ne!(sigma[0], sigma[1].hypot(sigma[2]));
+    // The triads' errors are correlated, so their squares do not add up.
+    let independent = sigma[1].hypot(sigma[2]);
+    assert!((sigma[0] / independent - 1.0).abs() > 0.02, "{sigma:?}");
 }
 
 #[test]

@@ -4,8 +4,11 @@ use std::fs;
 
 use nalgebra::Vector3;
 use turncal::attitude;
+use turncal::calibration::result::Calibration;
+use turncal::formats::write_run;
 use turncal::imu::Output;
-use turncal::run::{CalibrationRecord, LabelledMotion, Run, write_run};
+use turncal::recording::LabelledMotion;
+use turncal::run::Run;
 use turncal::units::DEGREE;
 
 use super::made::{assert_same, made_run};
@@ -26,14 +29,14 @@ fn every_shared_run_and_truth_reads() {
             continue;
         };
         let run = read(&directory);
-        assert_eq!(run.name, name);
-        assert_eq!(run.imu.len(), samples, "{name}");
-        assert_eq!(run.table.is_some(), table, "{name}");
-        assert_eq!(run.segments.len(), segments, "{name}");
+        assert_eq!(run.recording.name, name);
+        assert_eq!(run.recording.imu.len(), samples, "{name}");
+        assert_eq!(run.recording.table.is_some(), table, "{name}");
+        assert_eq!(run.recording.segments.len(), segments, "{name}");
         let truth = directory.join("truth.json");
         if truth.exists() {
-            let truth = CalibrationRecord::read(&truth).unwrap_or_else(|error| panic!("{error}"));
-            assert_eq!(truth.unit, Some(run.unit), "{name}");
+            let truth = Calibration::read(&truth).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(truth.unit, Some(run.instrument.unit), "{name}");
         }
     }
 }
@@ -50,9 +53,9 @@ fn reread(change: impl Fn(&str) -> String, imu: impl Fn(usize, [f64; 7]) -> Stri
     let text = text.replace("imu.csv.gz", "imu.csv");
     fs::write(place.join("run.toml"), change(&text)).unwrap();
     let mut rows = "t,gx,gy,gz,ax,ay,az,temp\n".to_owned();
-    for k in 0..run.imu.len() {
-        let (g, a) = (run.imu.gyro[k], run.imu.accel[k]);
-        rows += &imu(k, [run.imu.time(k), g.x, g.y, g.z, a.x, a.y, a.z]);
+    for k in 0..run.recording.imu.len() {
+        let (g, a) = (run.recording.imu.gyro[k], run.recording.imu.accel[k]);
+        rows += &imu(k, [run.recording.imu.time(k), g.x, g.y, g.z, a.x, a.y, a.z]);
         rows += ",25.0\n";
     }
     fs::write(place.join("imu.csv"), rows).unwrap();
@@ -72,7 +75,7 @@ fn plain(_: usize, row: [f64; 7]) -> String {
 fn other_body_axes_describe_the_same_run() {
     let mut expected = made_run("made");
     // Labels name the file's axes: x is front in both.
-    expected.segments[0].motion = Some(LabelledMotion::Turns {
+    expected.recording.segments[0].motion = Some(LabelledMotion::Turns {
         axis: Vector3::y(),
         angle: 360.0 * DEGREE,
     });
@@ -112,7 +115,7 @@ fn other_body_axes_describe_the_same_run() {
                 _ => format!("{t},{gy},{},{gz},{ay},{},{az}", -gx, -ax),
             },
         );
-        expected.name.clone_from(&run.name);
+        expected.recording.name.clone_from(&run.recording.name);
         assert_same(&expected, &run);
     }
 }
@@ -134,11 +137,11 @@ fn time_stamps_may_name_any_moment_of_a_sample_and_be_rounded() {
             },
         );
         // Stamps rounded to 0.1 ms fix the period over 300 samples to better than 1 µs.
-        assert!((run.imu.period - 1.0 / 128.0).abs() < 1e-6);
+        assert!((run.recording.imu.period - 1.0 / 128.0).abs() < 1e-6);
         assert!(
-            (run.imu.start - 3.25).abs() < 1e-4,
+            (run.recording.imu.start() - 3.25).abs() < 1e-4,
             "{word}: {}",
-            run.imu.start
+            run.recording.imu.start()
         );
     }
 }
@@ -155,7 +158,7 @@ fn axis_angles_multiply_from_the_outer_axis_in() {
         },
         plain,
     );
-    let table = run.table.unwrap();
+    let table = run.recording.table.unwrap();
     for (k, c_b_n) in table.attitude.iter().enumerate() {
         // Heading is clockwise and the outer angle is not.
         let [outer, middle, inner] = [3.0 * k as f64, -20.0, 2.0 * k as f64].map(|a| a * DEGREE);
@@ -176,8 +179,13 @@ fn what_has_no_effect_yet_is_noted() {
         },
         plain,
     );
-    assert_eq!(run.notes.len(), 2);
-    for (note, word) in run.notes.iter().zip(["temperature", "time_sigma"]) {
+    assert_eq!(run.recording.notes.len(), 2);
+    for (note, word) in run
+        .recording
+        .notes
+        .iter()
+        .zip(["temperature", "time_sigma"])
+    {
         assert!(
             note.contains(word) && note.contains("no effect yet"),
             "{note}"

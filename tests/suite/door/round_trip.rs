@@ -3,11 +3,12 @@
 use std::fs;
 
 use nalgebra::Vector3;
-use turncal::imu::{InstallationForm, Nominal, Output, PerSensor};
-use turncal::run::record::{
-    Aiding, BodyFrame, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
+use turncal::calibration::result::{
+    Calibration, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
 };
-use turncal::run::{CalibrationRecord, write_run};
+use turncal::formats::write_run;
+use turncal::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor};
+use turncal::run::Aiding;
 use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
 
 use super::made::{assert_same, made_run};
@@ -25,22 +26,19 @@ fn triad_record(scale: f64) -> TriadRecord {
 fn increments_and_rates_come_back_as_they_went() {
     let directory = tempfile::tempdir().unwrap();
     let mut run = made_run("increments");
-    let truth = CalibrationRecord::new(triad_record(1.0), triad_record(1e5));
+    let truth = Calibration::new(triad_record(1.0), triad_record(1e5));
     let place = directory.path().join("increments");
     fs::create_dir(&place).unwrap();
     write_run(&place, &run, Output::Increment, Some(&truth)).unwrap();
     assert_same(&run, &read(&place));
-    assert_eq!(
-        CalibrationRecord::read(&place.join("truth.json")),
-        Ok(truth)
-    );
+    assert_eq!(Calibration::read(&place.join("truth.json")), Ok(truth));
 
-    run.name = "rates".to_owned();
-    run.unit = PerSensor {
+    run.recording.name = "rates".to_owned();
+    run.instrument.unit = PerSensor {
         gyro: "deg/h".to_owned(),
         accel: "g".to_owned(),
     };
-    run.nominal = PerSensor {
+    run.instrument.nominal = PerSensor {
         gyro: Nominal(Vector3::repeat(1.0 / DEG_PER_H)),
         accel: Nominal(Vector3::repeat(1.0 / STANDARD_GRAVITY)),
     };
@@ -73,8 +71,8 @@ fn pulses_come_back_exactly() {
     write_run(&place, &run, Output::Pulse, None).unwrap();
     let back = read(&place);
     assert_eq!(
-        (&back.imu.gyro, &back.imu.accel),
-        (&run.imu.gyro, &run.imu.accel)
+        (&back.recording.imu.gyro, &back.recording.imu.accel),
+        (&run.recording.imu.gyro, &run.recording.imu.accel)
     );
     assert_same(&run, &back);
 }
@@ -85,7 +83,9 @@ fn a_run_that_could_not_be_read_is_not_written() {
     let error = write_run(directory.path(), &made_run("x"), Output::Pulse, None).unwrap_err();
     assert!(error.to_string().contains("gyro_unit = `rad`"), "{error}");
     let mut run = made_run("x");
-    run.meta.insert("weather".to_owned(), "fine".to_owned());
+    run.recording
+        .meta
+        .insert("weather".to_owned(), "fine".to_owned());
     let error = write_run(directory.path(), &run, Output::Increment, None).unwrap_err();
     assert!(error.to_string().contains("weather"), "{error}");
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
@@ -93,7 +93,7 @@ fn a_run_that_could_not_be_read_is_not_written() {
 
 #[test]
 fn a_calibration_comes_back_as_it_went() {
-    let mut record = CalibrationRecord::new(triad_record(2e6), triad_record(-1e5));
+    let mut record = Calibration::new(triad_record(2e6), triad_record(-1e5));
     record.method = Some(Method::Ekf);
     record.installation_form = Some(InstallationForm::ThreeAngle);
     record.aiding = Some(Aiding::Velocity);
@@ -140,7 +140,7 @@ fn a_calibration_comes_back_as_it_went() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.json");
     record.write(&path, false).unwrap();
-    assert_eq!(CalibrationRecord::read(&path), Ok(record.clone()));
+    assert_eq!(Calibration::read(&path), Ok(record.clone()));
     let json: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
     assert_eq!(json["consistency"]["nis_interval"][1], 1.1);
     assert_eq!(json["installation_form"], "three-angle");

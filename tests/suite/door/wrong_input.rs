@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use turncal::run::{CalibrationRecord, Run};
+use turncal::calibration::result::Calibration;
+use turncal::run::Run;
 
 const RUN: &str = r#"format = "turncal-run/1"
 [site]
@@ -113,10 +114,14 @@ fn the_run_that_the_cases_spoil_is_good() {
     good_run(directory.path());
     let run = Run::read(&directory.path().join("run.toml")).unwrap();
     assert_eq!(
-        (run.imu.len(), run.imu.start, run.imu.period),
+        (
+            run.recording.imu.len(),
+            run.recording.imu.start(),
+            run.recording.imu.period
+        ),
         (200, 0.0, 0.01)
     );
-    assert!(run.notes.is_empty());
+    assert!(run.recording.notes.is_empty());
 }
 
 #[test]
@@ -450,7 +455,7 @@ fn each_wrong_calibration_has_its_message() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.json");
     fs::write(&path, &good).unwrap();
-    assert!(CalibrationRecord::read(&path).is_ok());
+    assert!(Calibration::read(&path).is_ok());
     for (from, to, words) in [
         ("tion/1", "tion/2", "calibration/2"),
         ("\"accel\":", "\"axel\":", "missing field `accel` & line"),
@@ -487,7 +492,7 @@ fn each_wrong_calibration_has_its_message() {
         let spoilt = good.replacen(from, to, 1);
         assert_ne!(spoilt, good, "{from}");
         fs::write(&path, spoilt).unwrap();
-        let error = CalibrationRecord::read(&path).expect_err(words);
+        let error = Calibration::read(&path).expect_err(words);
         assert_says(&error.to_string(), "calibration.json", words);
     }
 }

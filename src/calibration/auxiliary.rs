@@ -1,0 +1,145 @@
+//! Constants that are estimated beside scale factors, installation and biases: errors of the table's
+//! own geometry, then parameters of the instrument's error terms.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::error_term::ErrorTerm;
+use super::parameters::{OBSERVED_BELOW, PARAMETERS};
+use crate::imu::{TERM_PARAMETERS, Term, TermVector};
+use crate::turntable::{TABLE_GEOMETRY, table_geometry_name};
+
+/// Number of parameters of both kinds.
+pub const AUXILIARY: usize = TABLE_GEOMETRY + TERM_PARAMETERS;
+/// A vector of them: table (see [`crate::turntable::TableGeometry`]), then terms (see [`Term`]).
+pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
+/// A matrix of them.
+pub type AuxiliaryMatrix = SMatrix<f64, AUXILIARY, AUXILIARY>;
+/// Covariance of the parameters of both triads (rows) with them.
+pub type CrossMatrix = SMatrix<f64, PARAMETERS, AUXILIARY>;
+
+/// Which kind of parameter stands at an index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AuxiliaryKind {
+    /// An error of the table, by its index among them.
+    Table(usize),
+    /// A parameter of a term, by its index among those of all terms.
+    Term(Term, usize),
+}
+
+impl AuxiliaryKind {
+    /// The parameter at an index; `None` beyond the last.
+    pub fn of(index: usize) -> Option<Self> {
+        match index.checked_sub(TABLE_GEOMETRY) {
+            None => Some(Self::Table(index)),
+            Some(parameter) => Some(Self::Term(Term::of(parameter)?, parameter)),
+        }
+    }
+
+    /// The error term that it belongs to.
+    pub fn error_term(self) -> ErrorTerm {
+        match self {
+            Self::Table(0..3) => ErrorTerm::TableBase,
+            Self::Table(_) => ErrorTerm::TableAxes,
+            Self::Term(term, _) => ErrorTerm::Instrument(term),
+        }
+    }
+}
+
+/// The name of a parameter in files; `None` beyond the last.
+pub fn auxiliary_name(index: usize) -> Option<String> {
+    match AuxiliaryKind::of(index)? {
+        AuxiliaryKind::Table(k) => table_geometry_name(k),
+        AuxiliaryKind::Term(_, parameter) => Term::parameter_name(parameter),
+    }
+}
+
+/// Errors of the table and parameters of terms as one vector.
+pub fn auxiliary_vector(
+    table: &SVector<f64, TABLE_GEOMETRY>,
+    terms: &TermVector,
+) -> AuxiliaryVector {
+    let mut all = AuxiliaryVector::zeros();
+    all.fixed_rows_mut::<TABLE_GEOMETRY>(0).copy_from(table);
+    all.fixed_rows_mut::<TERM_PARAMETERS>(TABLE_GEOMETRY)
+        .copy_from(terms);
+    all
+}
+
+/// Correlation beyond which two terms are not told apart.
+const INSEPARABLE: f64 = 0.99;
+
+/// Estimates of the parameters. What is off is zero in all of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Auxiliary {
+    /// The estimates, rad for the table, SI for terms.
+    pub values: AuxiliaryVector,
+    /// Their covariance.
+    pub covariance: AuxiliaryMatrix,
+    /// Covariance of the parameters of both triads with them.
+    pub cross: CrossMatrix,
+    /// 1σ of each before the run, around zero.
+    pub prior_sigma: AuxiliaryVector,
+}
+
+impl Default for Auxiliary {
+    fn default() -> Self {
+        Self {
+            values: AuxiliaryVector::zeros(),
+            covariance: AuxiliaryMatrix::zeros(),
+            cross: CrossMatrix::zeros(),
+            prior_sigma: AuxiliaryVector::zeros(),
+        }
+    }
+}
+
+impl Auxiliary {
+    /// 1σ of each.
+    pub fn sigma(&self) -> AuxiliaryVector {
+        self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
+    }
+
+    /// Whether a term of the instrument was estimated.
+    pub fn has_terms(&self) -> bool {
+        let of_terms = self
+            .prior_sigma
+            .fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY);
+        of_terms.iter().any(|&sigma| sigma > 0.0)
+    }
+
+    /// The estimated parameters of terms.
+    pub fn terms(&self) -> TermVector {
+        self.values
+            .fixed_rows::<TERM_PARAMETERS>(TABLE_GEOMETRY)
+            .into()
+    }
+
+    /// Whether second order and asymmetry of an accelerometer are both estimated and hardly more than
+    /// their sum is seen.
+    pub fn even_terms_inseparable(&self) -> bool {
+        let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
+        let (second, asymmetry) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));
+        let sigma = self.sigma();
+        (0..3).any(|axis| {
+            let (i, j) = (second + axis, asymmetry + axis);
+            let both = sigma[i] * sigma[j];
+            both > 0.0 && (self.covariance[(i, j)] / both).abs() > INSEPARABLE
+        })
+    }
+
+    /// Index among the parameters of error terms of an auxiliary parameter that is one.
+    pub(super) fn of_terms(index: usize) -> Option<usize> {
+        index.checked_sub(TABLE_GEOMETRY)
+    }
+
+    /// Indices of those that were estimated.
+    pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..AUXILIARY).filter(|&k| self.prior_sigma[k] > 0.0)
+    }
+
+    /// Indices of those that the run did not observe.
+    pub fn unobserved(&self) -> impl Iterator<Item = usize> + '_ {
+        let sigma = self.sigma();
+        self.estimated()
+            .filter(move |&k| sigma[k] > OBSERVED_BELOW * self.prior_sigma[k])
+    }
+}

@@ -1,0 +1,36 @@
+//! Both triads with the covariance of their parameters.
+
+use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
+use crate::imu::{InstallationForm, PerSensor, Triad};
+
+/// Both triads with the covariance of their parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The estimated triads, normalised (see [`crate::imu::Nominal`]).
+    pub triads: PerSensor<Triad>,
+    /// Covariance of the parameters of both triads; rows and columns of parameters that were not
+    /// estimated are zero.
+    pub covariance: ParameterMatrix,
+}
+
+impl Estimate {
+    /// The parameters of both triads.
+    pub fn vector(&self) -> ParameterVector {
+        to_vector(&self.triads)
+    }
+
+    /// 1σ of each parameter; zero for those that were not estimated.
+    pub fn sigma(&self) -> ParameterVector {
+        self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
+    }
+
+    /// The installation form, one for both triads.
+    pub fn form(&self) -> InstallationForm {
+        self.triads.gyro.form
+    }
+
+    /// Indices of the estimated parameters.
+    pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.covariance.nrows()).filter(|&i| self.covariance[(i, i)] > 0.0)
+    }
+}

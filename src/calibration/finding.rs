@@ -1,0 +1,238 @@
+//! What a calibration engineer must know before using the figures: values here, and their words.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::innovation::Observation;
+use crate::imu::InstallationForm;
+use crate::units::DEGREE;
+
+/// A finding with its figures; [`fmt::Display`] words it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", content = "figures", rename_all = "kebab-case")]
+pub enum Finding {
+    /// What the reader of the files found and mended, or what they say without effect.
+    Recording {
+        /// In words.
+        note: String,
+    },
+    /// The iterations did not converge.
+    NotConverged {
+        /// Passes made.
+        passes: usize,
+        /// Step of the last pass of the parameter that it moved most, in its σ.
+        largest_step_sigma: f64,
+    },
+    /// Parameters that kept more than half of their prior σ.
+    NotObserved {
+        /// What did not observe them, such as `this path`.
+        by: &'static str,
+        /// Their names.
+        parameters: Vec<String>,
+    },
+    /// Combinations of parameters that were not observed though each of them was.
+    CombinationsNotObserved {
+        /// In words, such as `gyro scale z with gyro bias z`.
+        combinations: Vec<String>,
+    },
+    /// The heading was not observed.
+    HeadingNotObserved {
+        /// Its 1σ after the run, rad.
+        sigma_rad: f64,
+    },
+    /// Second order and asymmetry of the accelerometers cannot be told apart.
+    EvenTermsInseparable,
+    /// The data reject the installation form.
+    FormRejected {
+        /// The form.
+        form: InstallationForm,
+        /// Angles that the general form has more.
+        angles: usize,
+        /// By how much these lower the cost.
+        gain: f64,
+        /// What the gain stays below in 999 runs of 1000 if the form is right.
+        limit: f64,
+    },
+    /// Observations that the gate rejected.
+    Outliers {
+        /// Rejected.
+        rejected: usize,
+        /// Of so many.
+        observations: usize,
+    },
+    /// Innovations that are not as large as their covariance says.
+    Inconsistent {
+        /// Of what.
+        observation: Observation,
+        /// Normalised innovation squared.
+        nis: f64,
+    },
+    /// An error term that the data show and that is not estimated.
+    ErrorTermSignificant {
+        /// The name by which it is switched on.
+        term: &'static str,
+        /// By how much it lowers the cost.
+        gain: f64,
+        /// What the gain stays below in 9,999 runs of 10,000 if its errors are not there.
+        limit: f64,
+        /// NIS of all observations without it …
+        nis_without: f64,
+        /// … and with it.
+        nis_with: f64,
+    },
+    /// Parameters that the prior does not allow.
+    FarFromPrior {
+        /// By more than this many of its σ.
+        sigmas: f64,
+        /// Their names.
+        parameters: Vec<String>,
+    },
+    /// Labelled sections that were not used, for a part of them is lost.
+    SectionsLost {
+        /// Their labels.
+        labels: Vec<String>,
+    },
+    /// Residuals of the closed form that are larger than noise.
+    ResidualsLarge {
+        /// RMS of residuals, each over its σ.
+        ratio: f64,
+    },
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Recording { note } => f.write_str(note),
+            Self::NotConverged {
+                passes,
+                largest_step_sigma,
+            } => write!(
+                f,
+                "Not converged: the last of {passes} passes still moved a parameter by \
+                 {largest_step_sigma:.2} σ. Neither values nor σ may be used."
+            ),
+            Self::NotObserved { by, parameters } => write!(
+                f,
+                "Not observed by {by}, σ not even halved: {}.",
+                listed(parameters)
+            ),
+            Self::CombinationsNotObserved { combinations } => write!(
+                f,
+                "Not observed by this path though each parameter alone was: {}.",
+                combinations.join("; ")
+            ),
+            Self::HeadingNotObserved { sigma_rad } => write!(
+                f,
+                "The heading is not observed: its σ is {:.1}° after the run. Earth rate is too little \
+                 for the noise of the gyros, or their biases hide it; parameters are found \
+                 nevertheless.",
+                sigma_rad / DEGREE
+            ),
+            Self::EvenTermsInseparable => f.write_str(
+                "Second order and asymmetry of the accelerometers are one and the same in dwells with \
+                 an axis up or down. Add dwells between them, at 45° and the like, or leave one of \
+                 the two off.",
+            ),
+            Self::FormRejected {
+                form,
+                angles,
+                gain,
+                limit,
+            } => write!(
+                f,
+                "The data reject the {} installation form: {angles} more angles, as the general form \
+                 has them, lower the cost by {gain:.4e}, where a right form leaves less than \
+                 {limit:.1} in 999 runs of 1000. Use the general form.",
+                form.name()
+            ),
+            Self::Outliers {
+                rejected,
+                observations,
+            } => write!(
+                f,
+                "{rejected} of {observations} observations were rejected as outliers."
+            ),
+            Self::Inconsistent { observation, nis } => write!(
+                f,
+                "Innovations of {} are {:.2} times as large as their σ says (NIS {nis:.2}): noise \
+                 figures or model do not fit the data, and the σ of the parameters are as doubtful.",
+                match observation {
+                    Observation::Velocity => "velocity",
+                    Observation::Table => "table attitude",
+                },
+                nis.sqrt()
+            ),
+            Self::ErrorTermSignificant {
+                term,
+                nis_without,
+                nis_with,
+                ..
+            } => write!(
+                f,
+                "The data show errors that are not modelled. Of the error terms that are off, {term} \
+                 would explain most (NIS {nis_without:.2} → {nis_with:.2}): use --with {term}, then look \
+                 again."
+            ),
+            Self::FarFromPrior { sigmas, parameters } => write!(
+                f,
+                "More than {sigmas} σ of [imu.prior] away from it: {}. Check labels, units and prior.",
+                parameters.join(", ")
+            ),
+            Self::SectionsLost { labels } => write!(
+                f,
+                "Not used, for a part of it is lost: section {}.",
+                labels.join(", ")
+            ),
+            Self::ResidualsLarge { ratio } => write!(
+                f,
+                "Residuals of dwells and moves are {ratio:.1} times as large as noise figures and \
+                 Earth rate say: what is not modelled, such as flicker of the sensors or a hand that \
+                 is not still, is as much larger than noise, and the σ are as much too small."
+            ),
+        }
+    }
+}
+
+/// Parameters by sensor and kind, such as `gyro scale x, y; accel bias z`.
+fn listed(names: &[String]) -> String {
+    let mut text = String::new();
+    let mut last = "";
+    for name in names {
+        let (group, axis) = name.rsplit_once('.').unwrap_or((name, ""));
+        if group == last {
+            text.push_str(", ");
+        } else {
+            if !last.is_empty() {
+                text.push_str("; ");
+            }
+            text.push_str(&group.replace('.', " "));
+            text.push(' ');
+            last = group;
+        }
+        text.push_str(axis);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_are_listed_by_sensor_and_kind() {
+        let names = ["gyro.scale.x", "gyro.scale.y", "accel.bias.z"].map(str::to_owned);
+        assert_eq!(listed(&names), "gyro scale x, y; accel bias z");
+    }
+
+    #[test]
+    fn a_finding_is_a_kind_and_figures_in_json() {
+        let finding = Finding::Outliers {
+            rejected: 2,
+            observations: 9,
+        };
+        let json = serde_json::to_value(&finding).unwrap();
+        assert_eq!(json["kind"], "outliers");
+        assert_eq!(json["figures"]["rejected"], 2);
+    }
+}

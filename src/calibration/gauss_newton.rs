@@ -1,0 +1,331 @@
+//! The estimator: coarse start, with a table a pass with feedback, and Gauss–Newton iterations with the
+//! linearisation held until nothing moves.
+
+use super::auxiliary::auxiliary_name;
+use super::coarse::{CoarseStart, coarse_start};
+use super::curvature::curvature;
+use super::error::CalibrationError;
+use super::estimate::Estimate;
+use super::finding::Finding;
+use super::form::{FormTest, form_test};
+use super::innovation::{Innovation, Observation, consistency};
+use super::linearisation::{AttitudePrior, Linearisation, singular};
+use super::observability::Observability;
+use super::outcome::{Outcome, Pass};
+use super::parameters::{parameter_name, to_vector};
+use super::pass::{Gate, Mode, PassResult, pass};
+use super::problem::Problem;
+use crate::imu::Sensor;
+use crate::run::Aiding;
+
+/// Told after each pass; the command line draws it.
+pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
+
+/// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
+/// of its own linearised problem only, so a small rise means nothing.
+const COST_RISE: f64 = 0.1;
+/// After a step of more than this part of the one before, all go half as far.
+const SHRINKS: f64 = 0.8;
+/// More than this part of all observations beyond the gate are no outliers.
+const MOST_OUTLIERS: f64 = 0.05;
+/// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
+const DOUBTFUL: f64 = 0.2;
+
+/// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
+///
+/// Source: design of the passes after Maybeck, *Stochastic Models, Estimation and Control*, vol. 2,
+/// §9.7 (iterated, linearised filters): each pass with the linearisation held is a Gauss–Newton step of
+/// all data.
+///
+/// # Errors
+/// [`CalibrationError`] where the runs cannot give a calibration. Runs that give one without
+/// convergence are an [`Outcome`] with `converged = false` and a finding.
+pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
+    let start = coarse_start(problem)?;
+    let others = start.other_headings();
+    let of_start = attempt(problem, start, progress);
+    let others = others
+        .into_iter()
+        .map(|start| attempt(problem, start, progress));
+    let Attempt {
+        priors,
+        passes,
+        feedback,
+        held,
+        converged,
+    } = others.fold(of_start, better)?;
+    let triads = held.estimate.triads;
+    let estimate = Estimate {
+        covariance: held.covariance + curvature(&triads, &held.covariance),
+        triads,
+    };
+    let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
+    if !Sensor::ALL.into_iter().all(usable) {
+        return Err(singular(&estimate.triads));
+    }
+    let model = &problem.model;
+    let mut outcome = Outcome {
+        form_test: form_test(problem, &priors, &held)?,
+        observability: Observability::new(&estimate, &model.prior_sigma, &held.attitude_covariance),
+        estimate,
+        prior_sigma: model.prior_sigma,
+        prior_mean: model.prior_mean,
+        prior_attitudes: priors,
+        attitude_sigma: held.attitude_sigma,
+        auxiliary: held.auxiliary,
+        gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
+        linearised_at: held.at,
+        converged,
+        log_determinant: held.log_determinant,
+        consistency: consistency(&held.innovations),
+        history: held.history,
+        feedback_history: feedback.map(|pass| pass.history).unwrap_or_default(),
+        innovations: held.innovations,
+        aiding: model.aiding,
+        velocity_sigma: problem
+            .stretches()
+            .first()
+            .map_or(0.0, |s| s.velocity_sigma),
+        passes,
+        findings: Vec::new(),
+    };
+    outcome.findings = findings(problem, &outcome);
+    Ok(outcome)
+}
+
+/// A calibration from one start.
+struct Attempt {
+    priors: Vec<AttitudePrior>,
+    passes: Vec<Pass>,
+    feedback: Option<PassResult>,
+    held: PassResult,
+    converged: bool,
+}
+
+fn attempt(
+    problem: &Problem,
+    start: CoarseStart,
+    progress: Progress,
+) -> Result<Attempt, CalibrationError> {
+    let mut passes = Vec::new();
+    let priors = start.attitudes;
+    // What is fed back while heading is known to degrees only leads a pass astray; the coarse start
+    // without a table is good enough for the iterations to begin from.
+    let feedback = match problem.model.aiding {
+        Aiding::Table => Some(pass(problem, &priors, &start.at, Mode::Feedback)?),
+        Aiding::Velocity => None,
+    };
+    if let Some(feedback) = &feedback {
+        passes.push(summary(feedback, &start.at, true));
+        passes.iter().for_each(progress);
+    }
+    let from = feedback.as_ref().map_or(&start.at, |pass| &pass.estimate);
+    let (held, converged) = iterate(problem, &priors, from.clone(), &mut passes, progress)?;
+    Ok(Attempt {
+        priors,
+        passes,
+        feedback,
+        held,
+        converged,
+    })
+}
+
+/// The attempt that converged, and if both did, that of the lower cost.
+fn better(
+    one: Result<Attempt, CalibrationError>,
+    other: Result<Attempt, CalibrationError>,
+) -> Result<Attempt, CalibrationError> {
+    let rank = |attempt: &Attempt| (!attempt.converged, attempt.held.cost);
+    match (one, other) {
+        (Ok(one), Ok(other)) if rank(&other) < rank(&one) => Ok(other),
+        (Err(_), Ok(other)) => Ok(other),
+        (one, _) => one,
+    }
+}
+
+/// Passes from a first point on, each linearised at the estimate of the one before; and whether they
+/// converged.
+fn iterate(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    from: Linearisation,
+    passes: &mut Vec<Pass>,
+    progress: Progress,
+) -> Result<(PassResult, bool), CalibrationError> {
+    let mut at = from;
+    let mut gate = Gate::Innovations;
+    let mut before: Option<PassResult> = None;
+    let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
+    loop {
+        let result = pass(problem, priors, &at, Mode::Held(gate))?;
+        let summary = summary(&result, &at, false);
+        progress(&summary);
+        passes.push(summary);
+        let same_data = before
+            .as_ref()
+            .is_some_and(|before| same_data(before, &result));
+        let settled = summary.largest_step <= problem.options.converged_sigma
+            && (same_data || (before.is_none() && summary.rejected == 0));
+        let doubtful = beyond(&result, problem.gate()) > MOST_OUTLIERS;
+        let finished = settled && (gate == Gate::Open || !doubtful);
+        if finished || passes.len() >= problem.options.passes {
+            return Ok((result, settled));
+        }
+        // Where many observations contradict the model it is the model that is wrong, and leaving
+        // them out would only hide that.
+        if doubtful {
+            gate = Gate::Open;
+        }
+        let too_far =
+            before.filter(|before| same_data && result.cost > before.cost * (1.0 + COST_RISE));
+        // A step as large as the one before may be the way back of it.
+        if summary.largest_step > SHRINKS * last_step {
+            fraction *= 0.5;
+        }
+        last_step = summary.largest_step;
+        at = match &too_far {
+            Some(before) => before.at.towards(&at, 0.5),
+            None if fraction < 1.0 => at.towards(&result.estimate, fraction),
+            None => result.estimate.clone(),
+        };
+        before = Some(too_far.unwrap_or(result));
+    }
+}
+
+/// Whether two passes let the same observations in.
+fn same_data(a: &PassResult, b: &PassResult) -> bool {
+    let accepted = |result: &PassResult| -> Vec<bool> {
+        result.innovations.iter().map(|i| i.accepted).collect()
+    };
+    accepted(a) == accepted(b)
+}
+
+/// Part of all observations that are beyond the gate or were left out.
+fn beyond(result: &PassResult, gate: f64) -> f64 {
+    let beyond = |i: &&Innovation| !i.accepted || i.distance() > gate;
+    result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
+}
+
+fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -> Pass {
+    let sigma = result.covariance.diagonal().map(f64::sqrt);
+    let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
+    Pass {
+        feedback,
+        largest_step: step
+            .iter()
+            .zip(&sigma)
+            .filter(|&(_, &sigma)| sigma > 0.0)
+            .map(|(step, sigma)| (step / sigma).abs())
+            .max_by(f64::total_cmp)
+            .unwrap_or(0.0),
+        cost: result.cost,
+        observations: 3 * result.innovations.len(),
+        rejected: result.innovations.iter().filter(|i| !i.accepted).count(),
+    }
+}
+
+fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = problem.notes().collect();
+    if !outcome.converged {
+        let last = outcome.passes.last();
+        findings.push(Finding::NotConverged {
+            passes: outcome.passes.len(),
+            largest_step_sigma: last.map_or(f64::NAN, |pass| pass.largest_step),
+        });
+    }
+    let form = outcome.estimate.form();
+    let unobserved = outcome.unobserved();
+    let by = "this path";
+    if !unobserved.is_empty() {
+        let names = unobserved.iter().filter_map(|&i| parameter_name(form, i));
+        findings.push(Finding::NotObserved {
+            by,
+            parameters: names.collect(),
+        });
+    }
+    let combinations = outcome.observability.combinations(form, &unobserved);
+    if !combinations.is_empty() {
+        findings.push(Finding::CombinationsNotObserved { combinations });
+    }
+    if !outcome.heading_observed() {
+        findings.push(Finding::HeadingNotObserved {
+            sigma_rad: outcome.attitude_sigma.z,
+        });
+    }
+    let hidden = outcome.auxiliary.unobserved();
+    let hidden: Vec<String> = hidden.filter_map(auxiliary_name).collect();
+    if !hidden.is_empty() {
+        findings.push(Finding::NotObserved {
+            by,
+            parameters: hidden,
+        });
+    }
+    if outcome.auxiliary.even_terms_inseparable() {
+        findings.push(Finding::EvenTermsInseparable);
+    }
+    if let Some(test) = outcome.form_test.filter(FormTest::rejects) {
+        findings.push(Finding::FormRejected {
+            form,
+            angles: test.angles,
+            gain: test.gain,
+            limit: test.limit,
+        });
+    }
+    let rejected = outcome.innovations.iter().filter(|i| !i.accepted).count();
+    if rejected > 0 {
+        findings.push(Finding::Outliers {
+            rejected,
+            observations: outcome.innovations.len(),
+        });
+    }
+    for (observation, nis) in [
+        (Observation::Velocity, outcome.consistency.velocity.mean),
+        (Observation::Table, outcome.consistency.table.mean),
+    ] {
+        if (nis - 1.0).abs() > DOUBTFUL {
+            findings.push(Finding::Inconsistent { observation, nis });
+        }
+    }
+    findings
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::Options;
+    use super::super::parameters::from_vector;
+    use super::*;
+    use crate::attitude::exp;
+    use crate::imu::TermVector;
+    use crate::simulation::Scenario;
+    use crate::units::{ARCSEC, PPM};
+
+    #[test]
+    fn the_estimate_does_not_depend_on_where_a_pass_linearises() {
+        let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
+        let mut problem = Problem::new(&simulated.run, &Options::default());
+        let mut prior = problem.stretches()[0].attitude_of_table().unwrap();
+        // As tight a prior of attitude and scale as a run gives, so that it counts.
+        prior.sigma = Vector3::repeat(ARCSEC);
+        problem.model.prior_mean = to_vector(&simulated.truth);
+        problem.model.prior_sigma.fill(PPM);
+        let form = problem.model.form;
+
+        let estimate = |shift: f64| {
+            let turn = exp(Vector3::new(1.0, -2.0, 3.0) * (shift * ARCSEC));
+            let at = Linearisation {
+                triads: from_vector(form, &problem.model.prior_mean.add_scalar(shift * PPM)),
+                terms: TermVector::zeros(),
+                initial_attitudes: vec![turn * prior.mean],
+            };
+            let mode = Mode::Held(Gate::Open);
+            pass(&problem, &[prior], &at, mode).unwrap()
+        };
+        let (here, there) = (estimate(0.0), estimate(2.0));
+        let shift = to_vector(&there.estimate.triads) - to_vector(&here.estimate.triads);
+        let sigma = here.covariance.diagonal().map(f64::sqrt);
+        let largest = shift.component_div(&sigma).amax();
+        assert!(largest < 1e-3, "{largest} σ");
+    }
+}

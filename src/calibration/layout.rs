@@ -1,0 +1,179 @@
+//! The state vector of the filter: named groups, made from what a problem has on. No other file knows an
+//! index.
+//!
+//! | group | states | meaning |
+//! |---|---|---|
+//! | attitude | 3 | φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad |
+//! | velocity | 3 | δV = computed − true, East-North-Up, m/s |
+//! | position | 3 | δp = computed − true, East-North-Up, m |
+//! | parameters | up to 24 | δθ = true − estimated, see [`super::parameters`]; those that form and body frame leave free |
+//! | error terms | one for each parameter that is on | true − estimated, see [`crate::imu::Term`] |
+//! | gravity | 1 | true − stated magnitude of gravity, m/s²; where it has a σ |
+//! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
+//! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
+//! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
+//! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
+//! | table axes | one for each tilt | tilts of the table's axes across themselves, see [`crate::turntable::tilts`], rad |
+
+use std::ops::Range;
+
+use super::model::Model;
+use super::parameters::PARAMETERS;
+use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
+use crate::turntable::AXIS_TILTS;
+
+/// Attitude error φ.
+pub(super) const ATTITUDE: usize = 0;
+/// Velocity error δV.
+pub(super) const VELOCITY: usize = 3;
+/// Position error δp.
+pub(super) const POSITION: usize = 6;
+/// Number of navigation states, the only ones that move with the body.
+pub(super) const NAVIGATION: usize = 9;
+
+/// Where each group of states is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Layout {
+    /// The parameter of both triads that each state from [`NAVIGATION`] on is.
+    parameters: Vec<usize>,
+    /// The parameter of the error terms that each of the states after them is.
+    terms: Vec<usize>,
+    /// Whether gravity's error is a state.
+    gravity: bool,
+    /// Triad and axis of each bias that varies.
+    varying: Vec<(Sensor, usize)>,
+    /// Whether the table's position error is a state.
+    table: bool,
+    base: bool,
+    /// The tilt that each state is.
+    tilts: Vec<usize>,
+}
+
+impl Layout {
+    pub fn new(model: &Model) -> Self {
+        let varies = |sensor: &Sensor| model.noise.get(*sensor).gauss_markov.is_some();
+        let triads = Sensor::ALL.into_iter().filter(varies);
+        Self {
+            parameters: (0..PARAMETERS)
+                .filter(|&i| model.prior_sigma[i] > 0.0)
+                .collect(),
+            terms: (0..TERM_PARAMETERS)
+                .filter(|&k| model.term_sigma[k] > 0.0)
+                .collect(),
+            gravity: model.gravity_sigma > 0.0,
+            varying: triads
+                .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
+                .collect(),
+            table: model.position_sigma > 0.0,
+            base: model.geometry.base.amax() > 0.0,
+            tilts: (0..AXIS_TILTS)
+                .filter(|&k| model.geometry.axes[k] > 0.0)
+                .collect(),
+        }
+    }
+
+    /// Number of states.
+    pub fn size(&self) -> usize {
+        self.tilts_begin() + self.tilts.len()
+    }
+
+    /// State and index among [`PARAMETERS`] of each estimated parameter.
+    pub fn parameters(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        placed(NAVIGATION, &self.parameters)
+    }
+
+    /// State and index among [`TERM_PARAMETERS`] of each parameter of the error terms that are on.
+    pub fn terms(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        placed(self.terms_begin(), &self.terms)
+    }
+
+    /// Error of gravity, if it is a state.
+    pub fn gravity(&self) -> Option<usize> {
+        self.gravity.then(|| self.gravity_begin())
+    }
+
+    /// State, triad and index of the constant part among the triad's parameters of each varying bias.
+    pub fn varying_biases(&self) -> impl Iterator<Item = (usize, Sensor, usize)> + '_ {
+        let states = placed(self.varying_begin(), &self.varying);
+        states.map(|(state, (sensor, axis))| (state, sensor, PER_TRIAD - 3 + axis))
+    }
+
+    /// The states that drive the navigation errors: parameters, error terms, gravity, varying biases.
+    pub fn driving(&self) -> Range<usize> {
+        NAVIGATION..self.table_begin()
+    }
+
+    /// Error of the table's position, if it is a state.
+    pub fn table_position(&self) -> Option<usize> {
+        self.table.then(|| self.table_begin())
+    }
+
+    /// Attitude error at the first sample of the stretch.
+    pub fn initial_attitude(&self) -> usize {
+        self.table_begin() + 3 * usize::from(self.table)
+    }
+
+    /// Error of the table's base, if it is a state.
+    pub fn table_base(&self) -> Option<usize> {
+        self.base.then(|| self.initial_attitude() + 3)
+    }
+
+    /// State and index among [`AXIS_TILTS`] of each tilt of the table's axes.
+    pub fn table_tilts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        placed(self.tilts_begin(), &self.tilts)
+    }
+
+    /// The states that all stretches share.
+    pub fn shared(&self) -> impl Iterator<Item = usize> + use<> {
+        self.driving()
+            .chain(self.initial_attitude() + 3..self.size())
+    }
+
+    fn terms_begin(&self) -> usize {
+        NAVIGATION + self.parameters.len()
+    }
+
+    fn gravity_begin(&self) -> usize {
+        self.terms_begin() + self.terms.len()
+    }
+
+    fn varying_begin(&self) -> usize {
+        self.gravity_begin() + usize::from(self.gravity)
+    }
+
+    fn table_begin(&self) -> usize {
+        self.varying_begin() + self.varying.len()
+    }
+
+    fn tilts_begin(&self) -> usize {
+        self.initial_attitude() + 3 + 3 * usize::from(self.base)
+    }
+}
+
+fn placed<T: Copy>(begin: usize, members: &[T]) -> impl Iterator<Item = (usize, T)> + '_ {
+    (begin..).zip(members.iter().copied())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::{ErrorTerm, Options};
+    use crate::imu::Term;
+    use crate::simulation::Scenario;
+
+    #[test]
+    fn what_is_off_has_no_state() {
+        let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        let size = |options: Options| Layout::new(&Model::new(&run, &options)).size();
+        let plain = size(Options::default());
+        assert_eq!(plain, 9 + 24 + 3 + 3);
+        let with = |term| size(Options::default().with(term)) - plain;
+        assert_eq!(with(ErrorTerm::Instrument(Term::TimeOffset)), 1);
+        assert_eq!(with(ErrorTerm::Instrument(Term::SizeEffect)), 6);
+        assert_eq!(with(ErrorTerm::GaussMarkovBias), 6);
+        assert_eq!(with(ErrorTerm::TableBase), 3);
+        // Three parameters fix the body frame, and there is no table.
+        let velocity = size(Options::default().aiding(crate::run::Aiding::Velocity));
+        assert_eq!(velocity, 9 + 21 + 3);
+    }
+}

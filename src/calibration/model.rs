@@ -1,0 +1,181 @@
+//! What is estimated of a run, and what is known of it beforehand: small, and cheap to copy and change.
+
+use nalgebra::Vector3;
+
+use super::error_term::ErrorTerm;
+use super::options::Options;
+use super::parameters::{ParameterVector, parameter, to_vector};
+use crate::imu::{
+    GaussMarkov, InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, TermVector,
+    Triad,
+};
+use crate::run::{Aiding, Run};
+use crate::turntable::{AXIS_TILTS, TableGeometry};
+use crate::units::ARCSEC;
+
+/// 1σ of a table's level where nothing better is known, rad.
+pub(crate) const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
+/// 1σ of its north.
+pub(crate) const USUAL_NORTH: f64 = 60.0 * ARCSEC;
+/// 1σ of each tilt of its axes.
+pub(crate) const USUAL_TILT: f64 = 10.0 * ARCSEC;
+/// Correlation time of a varying bias where nothing better is known, s.
+const USUAL_CORRELATION: f64 = 100.0;
+/// How many times what white noise averages to in a correlation time a bias then varies by, 1σ.
+const USUAL_VARIATION: f64 = 3.0;
+
+/// What is estimated, and its uncertainty before the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// How installation angles make the installation matrix.
+    pub form: InstallationForm,
+    /// What is observed at rest.
+    pub aiding: Aiding,
+    /// Mean of the parameters of both triads.
+    pub prior_mean: ParameterVector,
+    /// 1σ of each; zero for those that the form does not have or the body frame fixes.
+    pub prior_sigma: ParameterVector,
+    /// Noise of each triad.
+    pub noise: PerSensor<Noise>,
+    /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
+    pub term_sigma: TermVector,
+    /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
+    pub gravity_sigma: f64,
+    /// 1σ per axis of the table's position error, rad; zero without a table.
+    pub position_sigma: f64,
+    /// 1σ per axis of a reading of the table, rad; zero without a table.
+    pub reading_sigma: f64,
+    /// 1σ of what the table does not read; zero where it is off.
+    pub geometry: TableGeometry,
+    /// Axes of the table whose angles are read; zero where they are not.
+    table_axes: usize,
+}
+
+impl Model {
+    /// The model of a run: what the run states, and what the options ask for beside it.
+    pub fn new(run: &Run, options: &Options) -> Self {
+        let aiding = options.aiding.unwrap_or_else(|| run.aiding());
+        let table = run.observed_table(aiding);
+        let accuracy = table.map(|_| run.table).unwrap_or_default();
+        let tilts = table.and_then(|table| table.tilts.first().copied());
+        let mut model = Self {
+            form: options.form,
+            aiding,
+            prior_mean: ParameterVector::zeros(),
+            prior_sigma: ParameterVector::zeros(),
+            noise: run.instrument.noise,
+            term_sigma: run.instrument.term_sigma,
+            gravity_sigma: run.site.gravity_sigma,
+            position_sigma: accuracy.position_sigma,
+            reading_sigma: accuracy.reading_sigma,
+            geometry: accuracy.geometry,
+            table_axes: tilts.map_or(0, |tilts| {
+                let read = |k: &usize| tilts.column(*k).norm() > 0.0;
+                1 + (0..AXIS_TILTS).filter(read).count() / 2
+            }),
+        };
+        model.set_form(run, options.form);
+        for &term in &options.terms {
+            model.switch_on(term);
+        }
+        model
+    }
+
+    /// The same parameters in another form.
+    pub(super) fn in_form(&self, run: &Run, form: InstallationForm) -> Self {
+        let mut model = self.clone();
+        model.set_form(run, form);
+        model
+    }
+
+    fn set_form(&mut self, run: &Run, form: InstallationForm) {
+        self.form = form;
+        self.prior_mean = to_vector(&run.instrument.prior_mean(form));
+        for sensor in Sensor::ALL {
+            let mut sigma = run.instrument.prior.get(sensor).sigma(form);
+            if self.aiding == Aiding::Velocity && sensor == Sensor::Accel {
+                for fixed in Triad::above_the_diagonal(form) {
+                    sigma[fixed] = 0.0;
+                }
+            }
+            self.prior_sigma
+                .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
+                .copy_from(&sigma);
+        }
+    }
+
+    /// Whether an error term is on.
+    pub fn has(&self, term: ErrorTerm) -> bool {
+        match term {
+            ErrorTerm::GaussMarkovBias => {
+                let varies = |sensor| self.noise.get(sensor).gauss_markov.is_some();
+                Sensor::ALL.into_iter().any(varies)
+            }
+            ErrorTerm::TableBase => self.geometry.base != Vector3::zeros(),
+            ErrorTerm::TableAxes => self.geometry.axes.amax() > 0.0,
+            ErrorTerm::Instrument(term) => term.parameters().any(|k| self.term_sigma[k] > 0.0),
+        }
+    }
+
+    /// Whether the run can hold an error term: those of the table need its log, and tilts the angles of
+    /// its axes.
+    pub fn can_have(&self, term: ErrorTerm) -> bool {
+        match term {
+            ErrorTerm::TableBase => self.aiding == Aiding::Table,
+            ErrorTerm::TableAxes => self.table_axes > 0,
+            ErrorTerm::GaussMarkovBias | ErrorTerm::Instrument(_) => true,
+        }
+    }
+
+    /// Switches an error term on, with its usual σ unless the run states one. Nothing changes where the
+    /// run cannot hold it.
+    pub fn switch_on(&mut self, term: ErrorTerm) {
+        if self.has(term) || !self.can_have(term) {
+            return;
+        }
+        match term {
+            ErrorTerm::GaussMarkovBias => {
+                for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
+                    noise.gauss_markov = Some(usual_variation(noise));
+                }
+            }
+            ErrorTerm::TableBase => {
+                self.geometry.base = Vector3::new(USUAL_LEVEL, USUAL_LEVEL, USUAL_NORTH);
+            }
+            ErrorTerm::TableAxes => {
+                self.geometry.axes = TableGeometry::tilts_of(self.table_axes, USUAL_TILT);
+            }
+            ErrorTerm::Instrument(term) => {
+                for parameter in term.parameters() {
+                    self.term_sigma[parameter] = term.usual_sigma();
+                }
+            }
+        }
+    }
+
+    /// Switches an error term off.
+    pub fn switch_off(&mut self, term: ErrorTerm) {
+        match term {
+            ErrorTerm::GaussMarkovBias => {
+                for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
+                    noise.gauss_markov = None;
+                }
+            }
+            ErrorTerm::TableBase => self.geometry.base = Vector3::zeros(),
+            ErrorTerm::TableAxes => self.geometry.axes.fill(0.0),
+            ErrorTerm::Instrument(term) => {
+                for parameter in term.parameters() {
+                    self.term_sigma[parameter] = 0.0;
+                }
+            }
+        }
+    }
+}
+
+/// How a bias may vary where nothing better is known than the white noise.
+pub(crate) fn usual_variation(noise: &Noise) -> GaussMarkov {
+    GaussMarkov {
+        sigma: USUAL_VARIATION * noise.random_walk / USUAL_CORRELATION.sqrt(),
+        correlation_time: USUAL_CORRELATION,
+    }
+}

@@ -1,0 +1,65 @@
+//! The parameters of both triads as one vector: gyros, then accelerometers, each in the order of
+//! [`crate::imu::TriadVector`]. Parameter errors δθ are true − estimated.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+
+/// Number of parameters of both triads.
+pub const PARAMETERS: usize = 2 * PER_TRIAD;
+
+/// A vector of the parameters of both triads.
+pub type ParameterVector = SVector<f64, PARAMETERS>;
+/// A matrix of the parameters of both triads.
+pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
+
+/// Index of a triad's parameter among the parameters of both.
+pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
+    match sensor {
+        Sensor::Gyro => of_triad,
+        Sensor::Accel => PER_TRIAD + of_triad,
+    }
+}
+
+/// The triad and the parameter of it at an index among the parameters of both.
+pub fn sensor_and_parameter(index: usize) -> (Sensor, usize) {
+    if index < PER_TRIAD {
+        (Sensor::Gyro, index)
+    } else {
+        (Sensor::Accel, index - PER_TRIAD)
+    }
+}
+
+/// The parameters of both triads as one vector.
+pub fn to_vector(triads: &PerSensor<Triad>) -> ParameterVector {
+    let mut v = ParameterVector::zeros();
+    for sensor in Sensor::ALL {
+        v.fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
+            .copy_from(&triads.get(sensor).to_vector());
+    }
+    v
+}
+
+/// Both triads from one vector of parameters.
+pub fn from_vector(form: InstallationForm, v: &ParameterVector) -> PerSensor<Triad> {
+    PerSensor::from_fn(|sensor| {
+        Triad::from_vector(
+            form,
+            &v.fixed_rows::<PER_TRIAD>(parameter(sensor, 0)).into_owned(),
+        )
+    })
+}
+
+/// The name of a parameter in files; `None` if the form does not have it.
+pub fn parameter_name(form: InstallationForm, index: usize) -> Option<String> {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    Triad::parameter_name(sensor, form, of_triad)
+}
+
+/// A run has observed a parameter if it leaves less than this part of its prior σ.
+pub const OBSERVED_BELOW: f64 = 0.5;
+
+/// The same triads in the general form.
+pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
+    PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
+}

@@ -1,0 +1,432 @@
+//! The Kalman filter: covariance in block form, measurements one scalar at a time.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::measurement::Measurement;
+use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
+use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::linearisation::Start;
+use crate::calibration::model::Model;
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
+use crate::imu::{PerSensor, Sensor, TermVector};
+use crate::navigation::{Block, State};
+
+/// What a block makes of the navigation errors by the error of one state.
+type Column = [f64; NAVIGATION];
+
+/// Mean and covariance of the errors.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct Filter {
+    pub layout: Layout,
+    x: DVector<f64>,
+    p: DMatrix<f64>,
+    /// 1σ and correlation time of each varying bias, by its state.
+    varying: Vec<(usize, f64, f64)>,
+}
+
+impl Filter {
+    /// Before the first stretch begins: `parameters` and `terms` are the means of their errors.
+    pub fn new(model: &Model, parameters: &ParameterVector, terms: &TermVector) -> Self {
+        let layout = Layout::new(model);
+        let n = layout.size();
+        let (mut x, mut p) = (DVector::zeros(n), DMatrix::zeros(n, n));
+        for (state, index) in layout.parameters() {
+            x[state] = parameters[index];
+            p[(state, state)] = model.prior_sigma[index].powi(2);
+        }
+        for (state, index) in layout.terms() {
+            x[state] = terms[index];
+            p[(state, state)] = model.term_sigma[index].powi(2);
+        }
+        if let Some(base) = layout.table_base() {
+            for axis in 0..3 {
+                p[(base + axis, base + axis)] = model.geometry.base[axis].powi(2);
+            }
+        }
+        for (state, tilt) in layout.table_tilts() {
+            p[(state, state)] = model.geometry.axes[tilt].powi(2);
+        }
+        let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
+            let variation = model.noise.get(sensor).gauss_markov?;
+            Some((state, variation.sigma, variation.correlation_time))
+        });
+        let varying = varying.collect();
+        Self {
+            layout,
+            x,
+            p,
+            varying,
+        }
+    }
+
+    /// A stretch begins: navigation errors and the table's position start anew, `anew` tells whether the
+    /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
+    /// 4th ed., §3.8) does, too, as in another recording; `gravity` is its 1σ at another site.
+    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool, gravity: Option<f64>) {
+        let initial = self.layout.initial_attitude();
+        for axis in 0..3 {
+            for (first, mean, sigma) in [
+                (ATTITUDE, start.attitude[axis], start.attitude_sigma[axis]),
+                (VELOCITY, 0.0, start.velocity_sigma),
+                (POSITION, 0.0, start.position_sigma),
+                (initial, start.attitude[axis], start.attitude_sigma[axis]),
+            ] {
+                self.redraw(first + axis, mean, sigma);
+            }
+        }
+        for axis in 0..3 {
+            // φ starts as φ₀: fully correlated.
+            let variance = start.attitude_sigma[axis].powi(2);
+            self.p[(ATTITUDE + axis, initial + axis)] = variance;
+            self.p[(initial + axis, ATTITUDE + axis)] = variance;
+        }
+        self.redraw_table(table_sigma);
+        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+            self.redraw(state, 0.0, sigma);
+        }
+        if anew {
+            for k in 0..self.varying.len() {
+                let (state, sigma, _) = self.varying[k];
+                self.redraw(state, 0.0, sigma);
+            }
+        }
+    }
+
+    /// Forgets a state: its error is drawn anew, independent of all others.
+    fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
+        self.x[state] = mean;
+        self.p.row_mut(state).fill(0.0);
+        self.p.column_mut(state).fill(0.0);
+        self.p[(state, state)] = sigma.powi(2);
+    }
+
+    /// The table has left its position: its error is drawn anew.
+    pub fn redraw_table(&mut self, sigma: f64) {
+        if let Some(table) = self.layout.table_position() {
+            (table..table + 3).for_each(|state| self.redraw(state, 0.0, sigma));
+        }
+    }
+
+    /// Carries mean and covariance over a block. Only the top rows of Φ differ from identity, so of
+    /// `Φ P Φᵀ + Q` only the rows and columns of the navigation errors change.
+    pub fn propagate(&mut self, block: &Block) {
+        let phi = self.top_rows(block);
+        let n = self.x.len();
+        let mut x = [0.0; NAVIGATION];
+        let mut rows = vec![[0.0; NAVIGATION]; n];
+        let mut corner = [[0.0; NAVIGATION]; NAVIGATION];
+        let p = self.p.as_slice();
+        for (k, column) in phi.iter().enumerate() {
+            add_scaled(&mut x, column, self.x[k]);
+        }
+        for (j, row) in rows.iter_mut().enumerate() {
+            let p = &p[n * j..n * j + phi.len()];
+            for (column, p) in phi.iter().zip(p) {
+                add_scaled(row, column, *p);
+            }
+        }
+        for (column, row) in phi.iter().zip(&rows) {
+            for (k, sum) in corner.iter_mut().enumerate() {
+                add_scaled(sum, row, column[k]);
+            }
+        }
+        self.x.as_mut_slice()[..NAVIGATION].copy_from_slice(&x);
+        for constant in NAVIGATION..n {
+            for moving in 0..NAVIGATION {
+                let covariance = rows[constant][moving];
+                self.p[(moving, constant)] = covariance;
+                self.p[(constant, moving)] = covariance;
+            }
+        }
+        for (column, sum) in corner.iter().enumerate() {
+            for row in 0..NAVIGATION {
+                self.p[(row, column)] = sum[row] + block.noise[(row, column)];
+            }
+        }
+        self.vary(block.duration);
+    }
+
+    /// The top rows of Φ, column by column: navigation errors, then the states that drive them.
+    fn top_rows(&self, block: &Block) -> Vec<Column> {
+        let PerSensor { gyro, accel } = &block.parameters;
+        let navigation = block.navigation.column_iter();
+        let of_triad = |sensor: Sensor, parameter: usize| match sensor {
+            Sensor::Gyro => gyro.column(parameter),
+            Sensor::Accel => accel.column(parameter),
+        };
+        let parameters = self.layout.parameters().map(|(_, index)| {
+            let (sensor, parameter) = sensor_and_parameter(index);
+            of_triad(sensor, parameter)
+        });
+        let terms = block.terms.iter().map(|term| term.column.column(0));
+        // Stated gravity that is too small pulls the computed velocity down too little.
+        let t = block.duration;
+        let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
+        let gravity = self.layout.gravity().map(|_| pull);
+        // A bias does the same whether it varies or stays.
+        let varying = self.layout.varying_biases();
+        let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
+        let known = navigation.chain(parameters).chain(terms);
+        let known = known.map(|column| std::array::from_fn(|row| column[row]));
+        let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
+        known.chain(gravity).chain(varying).collect()
+    }
+
+    /// Varying biases forget as time goes by, and are driven.
+    fn vary(&mut self, duration: f64) {
+        for &(state, sigma, correlation_time) in &self.varying {
+            let keep = (-duration / correlation_time).exp();
+            self.x[state] *= keep;
+            self.p.row_mut(state).scale_mut(keep);
+            self.p.column_mut(state).scale_mut(keep);
+            self.p[(state, state)] += sigma.powi(2) * (1.0 - keep * keep);
+        }
+    }
+
+    /// The innovation in units of its own σ, its components independent: `L⁻¹ (z − H x)` with
+    /// `L Lᵀ = H P Hᵀ + R`; and the logarithm of the determinant of that. `None` if it is not positive
+    /// definite.
+    pub fn whitened(&self, measurement: &Measurement) -> Option<(Vector3<f64>, f64)> {
+        let Measurement { residual, rows, .. } = measurement;
+        let mut s = Matrix3::from_diagonal_element(measurement.variance);
+        for (column, of_column) in rows.iter().enumerate() {
+            let ph = self.times_covariance(of_column);
+            for (row, of_row) in rows.iter().enumerate() {
+                s[(row, column)] += times(of_row, &ph);
+            }
+        }
+        let predicted = Vector3::from_fn(|row, _| times(&rows[row], self.x.as_slice()));
+        let l = s.cholesky()?.l();
+        let log_determinant = 2.0 * l.diagonal().map(f64::ln).sum();
+        Some((
+            l.solve_lower_triangular(&(residual - predicted))?,
+            log_determinant,
+        ))
+    }
+
+    /// Takes in a measurement, one scalar after the other, in Joseph's form, which keeps the covariance
+    /// symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li, Kirubarajan,
+    /// *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
+    pub fn update(&mut self, measurement: &Measurement) {
+        let n = self.x.len();
+        let (mut ph, mut gain, mut rest) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for (row, z) in measurement.rows.iter().zip(&measurement.residual) {
+            self.times_upper(row, &mut ph);
+            let scale = 1.0 / (times(row, &ph) + measurement.variance);
+            let innovation = z - times(row, self.x.as_slice());
+            for ((x, gain), ph) in self.x.iter_mut().zip(&mut gain).zip(&ph) {
+                *gain = ph * scale;
+                *x += *gain * innovation;
+            }
+            // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
+            let columns = self.p.as_mut_slice().chunks_exact_mut(n);
+            for (j, column) in columns.enumerate() {
+                let (column, gain, factor) = (&mut column[..=j], &gain[..=j], ph[j]);
+                for k in 0..=j {
+                    column[k] -= gain[k] * factor;
+                }
+            }
+            self.times_upper(row, &mut rest);
+            for (rest, gain) in rest.iter_mut().zip(&gain) {
+                *rest = 0.5 * (gain * measurement.variance - *rest);
+            }
+            let columns = self.p.as_mut_slice().chunks_exact_mut(n);
+            for (j, column) in columns.enumerate() {
+                add_both(&mut column[..=j], (gain[j], &rest), (rest[j], &gain));
+            }
+        }
+        for column in 0..n {
+            for row in 0..column {
+                self.p[(column, row)] = self.p[(row, column)];
+            }
+        }
+    }
+
+    /// `P hᵀ` from the upper half of P.
+    fn times_upper(&self, h: &[(usize, f64)], product: &mut [f64]) {
+        let n = self.x.len();
+        let p = self.p.as_slice();
+        product.fill(0.0);
+        for &(state, weight) in h {
+            let (above, below) = product.split_at_mut(state);
+            for (sum, p) in above.iter_mut().zip(&p[n * state..]) {
+                *sum += weight * p;
+            }
+            let of_row = p[state..].iter().step_by(n).skip(state);
+            for (sum, p) in below.iter_mut().zip(of_row) {
+                *sum += weight * p;
+            }
+        }
+    }
+
+    /// `P hᵀ`
+    fn times_covariance(&self, h: &[(usize, f64)]) -> Vec<f64> {
+        let mut product = vec![0.0; self.x.len()];
+        self.times_upper(h, &mut product);
+        product
+    }
+
+    /// The body has come to rest: errors of velocity and position become those in the computed frame,
+    /// `δV + φ × V`, of the computed state.
+    ///
+    /// A heading that is wrong turns computed velocity and position with it, and `computed − true`
+    /// takes that for something observed of the heading; in the computed frame a heading is invisible
+    /// (Barrau and Bonnabel 2017, "The invariant extended Kalman filter as a stable observer", IEEE
+    /// Trans. Automatic Control 62(4)). Without it the σ of a heading that nothing shows shrinks with
+    /// every turn.
+    pub fn come_to_rest(&mut self, computed: &State) {
+        for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
+            let turn = skew(-computed);
+            let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
+            let mut error = self.x.fixed_rows_mut::<3>(first);
+            error += x;
+            let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
+            let mut of_error = self.p.fixed_rows_mut::<3>(first);
+            of_error += rows;
+            let columns = self.p.fixed_columns::<3>(ATTITUDE) * turn.transpose();
+            let mut of_error = self.p.fixed_columns_mut::<3>(first);
+            of_error += columns;
+        }
+    }
+
+    /// Refers the navigation errors to another computed state of the same moment. What is estimated
+    /// of the truth stays as it is, and so does the covariance.
+    pub fn refer(&mut self, from: &State, to: &State) {
+        let error = self.at(ATTITUDE);
+        let estimated = from_tilt_and_heading(&error) * from.attitude;
+        self.x
+            .fixed_rows_mut::<3>(ATTITUDE)
+            .copy_from(&to_tilt_and_heading(&(estimated * to.attitude.transpose())));
+        let mut velocity = self.x.fixed_rows_mut::<3>(VELOCITY);
+        velocity += to.velocity - from.velocity;
+        let mut position = self.x.fixed_rows_mut::<3>(POSITION);
+        position += to.position - from.position;
+    }
+
+    /// Estimated errors that a pass with feedback takes out of the mean.
+    pub fn take_feedback(&mut self) -> Feedback {
+        let feedback = Feedback {
+            attitude: self.at(ATTITUDE),
+            velocity: self.at(VELOCITY),
+            position: self.at(POSITION),
+            initial_attitude: self.initial_attitude(),
+            parameters: self.parameters(),
+            terms: self.terms(),
+        };
+        let constants = self.layout.parameters().chain(self.layout.terms());
+        let initial = self.layout.initial_attitude();
+        let taken = (0..NAVIGATION)
+            .chain(constants.map(|(state, _)| state))
+            .chain(initial..initial + 3);
+        for state in taken.collect::<Vec<_>>() {
+            self.x[state] = 0.0;
+        }
+        feedback
+    }
+
+    fn at(&self, first: usize) -> Vector3<f64> {
+        self.x.fixed_rows::<3>(first).into_owned()
+    }
+
+    /// Mean of the parameter errors δθ.
+    pub fn parameters(&self) -> ParameterVector {
+        let mut all = ParameterVector::zeros();
+        for (state, index) in self.layout.parameters() {
+            all[index] = self.x[state];
+        }
+        all
+    }
+
+    /// Covariance of the parameter errors; zero where fixed.
+    pub fn parameter_covariance(&self) -> ParameterMatrix {
+        let mut all = ParameterMatrix::zeros();
+        for (row, i) in self.layout.parameters() {
+            for (column, j) in self.layout.parameters() {
+                all[(i, j)] = self.p[(row, column)];
+            }
+        }
+        all
+    }
+
+    /// 1σ of the parameter errors.
+    pub fn parameter_sigma(&self) -> ParameterVector {
+        let mut all = ParameterVector::zeros();
+        for (state, index) in self.layout.parameters() {
+            all[index] = self.p[(state, state)].max(0.0).sqrt();
+        }
+        all
+    }
+
+    /// Mean of the errors of the error terms' parameters; zero where off.
+    pub fn terms(&self) -> TermVector {
+        let mut all = TermVector::zeros();
+        for (state, index) in self.layout.terms() {
+            all[index] = self.x[state];
+        }
+        all
+    }
+
+    /// Mean of a state's error.
+    pub fn mean(&self, state: usize) -> f64 {
+        self.x[state]
+    }
+
+    /// Covariance of two states' errors.
+    pub fn covariance(&self, one: usize, other: usize) -> f64 {
+        self.p[(one, other)]
+    }
+
+    /// Mean and 1σ of the error of gravity, true − stated; zero where it is no state.
+    pub fn gravity(&self) -> (f64, f64) {
+        let of = |state: usize| (self.x[state], self.p[(state, state)].max(0.0).sqrt());
+        self.layout.gravity().map_or((0.0, 0.0), of)
+    }
+
+    /// 1σ of the initial attitude error φ₀ of this stretch, East, North and Up.
+    pub fn initial_attitude_sigma(&self) -> Vector3<f64> {
+        let first = self.layout.initial_attitude();
+        Vector3::from_fn(|axis, _| self.p[(first + axis, first + axis)].max(0.0).sqrt())
+    }
+
+    /// Mean of the initial attitude error φ₀ of this stretch.
+    pub fn initial_attitude(&self) -> Vector3<f64> {
+        self.at(self.layout.initial_attitude())
+    }
+}
+
+/// What a pass with feedback takes out of the mean.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::calibration) struct Feedback {
+    pub attitude: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+    pub position: Vector3<f64>,
+    pub initial_attitude: Vector3<f64>,
+    pub parameters: ParameterVector,
+    pub terms: TermVector,
+}
+
+#[inline]
+fn add_scaled(sum: &mut Column, column: &Column, factor: f64) {
+    for k in 0..NAVIGATION {
+        sum[k] += column[k] * factor;
+    }
+}
+
+/// `column += a x + b y`, each as long as the column at least.
+#[inline]
+fn add_both(column: &mut [f64], (a, x): (f64, &[f64]), (b, y): (f64, &[f64])) {
+    let (x, y) = (&x[..column.len()], &y[..column.len()]);
+    for k in 0..column.len() {
+        column[k] += a * x[k] + b * y[k];
+    }
+}
+
+/// `h v`
+fn times(h: &[(usize, f64)], v: &[f64]) -> f64 {
+    h.iter().map(|&(state, weight)| weight * v[state]).sum()
+}
+
+const _: () = assert!(NAVIGATION == crate::navigation::NAVIGATION);
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,226 @@
+use nalgebra::{SMatrix, SVector};
+
+use super::*;
+use crate::calibration::parameters::PARAMETERS;
+use crate::calibration::{Options, parameter};
+use crate::imu::PARAMETERS as PER_TRIAD;
+use crate::navigation::{BlockMatrix, ParameterBlock};
+use crate::simulation::Scenario;
+use approx::assert_relative_eq;
+
+const STATES: usize = NAVIGATION + PARAMETERS + 6;
+
+type StateMatrix = SMatrix<f64, STATES, STATES>;
+
+fn filter() -> Filter {
+    let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+    let mut model = Model::new(&run, &Options::default());
+    model.prior_sigma.fill(7e-3);
+    let parameters = ParameterVector::from_element(1e-4);
+    let mut filter = Filter::new(&model, &parameters, &TermVector::zeros());
+    let start = Start {
+        attitude: Vector3::new(1e-5, 2e-5, 3e-5),
+        attitude_sigma: Vector3::repeat(3e-4),
+        velocity_sigma: 1e-3,
+        position_sigma: 1.0,
+    };
+    filter.begin(&start, 5e-6, true, None);
+    assert_eq!(filter.layout.size(), STATES);
+    filter
+}
+
+/// A block with nothing special about it.
+fn block(seed: f64) -> Block {
+    let wave = |row: usize, column: usize| {
+        ((seed + 1.0) * (1.0 + 1.7 * row as f64 + 0.9 * (column * column) as f64)).sin()
+    };
+    let noise = BlockMatrix::from_fn(|r, c| 1e-4 * wave(r, c));
+    Block {
+        state: State::at_rest(Matrix3::identity()),
+        duration: 0.1,
+        navigation: BlockMatrix::identity() + BlockMatrix::from_fn(|r, c| 0.1 * wave(r, c)),
+        parameters: PerSensor {
+            gyro: ParameterBlock::from_fn(wave),
+            accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
+        },
+        terms: Vec::new(),
+        noise: noise * noise.transpose(),
+    }
+}
+
+/// Φ as a whole, whatever states are on.
+fn dense_transition(filter: &Filter, block: &Block) -> DMatrix<f64> {
+    let n = filter.x.len();
+    let mut phi = DMatrix::identity(n, n);
+    phi.view_mut((0, 0), (NAVIGATION, NAVIGATION))
+        .copy_from(&block.navigation);
+    for sensor in Sensor::ALL {
+        phi.view_mut(
+            (0, NAVIGATION + parameter(sensor, 0)),
+            (NAVIGATION, PER_TRIAD),
+        )
+        .copy_from(block.parameters.get(sensor));
+    }
+    for (state, sensor, constant) in filter.layout.varying_biases() {
+        let column = NAVIGATION + parameter(sensor, constant);
+        let of_bias = phi.view((0, column), (NAVIGATION, 1)).into_owned();
+        phi.view_mut((0, state), (NAVIGATION, 1))
+            .copy_from(&of_bias);
+        phi[(state, state)] = (-block.duration / CORRELATION_TIME).exp();
+    }
+    phi
+}
+
+const CORRELATION_TIME: f64 = 3.0;
+
+fn measurement(first: usize, minus: Option<usize>, z: Vector3<f64>, variance: f64) -> Measurement {
+    let row = |axis: usize| {
+        let minus = minus.map(|minus| (minus + axis, -1.0));
+        std::iter::once((first + axis, 1.0)).chain(minus).collect()
+    };
+    Measurement {
+        residual: z,
+        rows: [0, 1, 2].map(row),
+        variance,
+    }
+}
+
+fn of_velocity(z: Vector3<f64>, variance: f64) -> Measurement {
+    measurement(VELOCITY, None, z, variance)
+}
+
+fn of_table(filter: &Filter, z: Vector3<f64>, variance: f64) -> Measurement {
+    measurement(ATTITUDE, filter.layout.table_position(), z, variance)
+}
+
+#[test]
+fn block_propagation_equals_the_dense_product() {
+    let mut filter = filter();
+    for k in 0..5 {
+        let block = block(f64::from(k));
+        let phi = dense_transition(&filter, &block);
+        let mut p = &phi * &filter.p * phi.transpose();
+        let mut corner = p.view_mut((0, 0), (NAVIGATION, NAVIGATION));
+        corner += block.noise;
+        let x = phi * &filter.x;
+        filter.propagate(&block);
+        assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
+        assert_relative_eq!(filter.x, x, max_relative = 1e-12);
+        let measurement = of_table(&filter, Vector3::new(1e-5, 0.0, 2e-5), 1e-11);
+        filter.update(&measurement);
+    }
+}
+
+#[test]
+fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
+    let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+    // Not small beside the other variances, or their tolerance would hide it.
+    let sigma = 2e-4f64;
+    let mut model = Model::new(&run, &Options::default());
+    model.prior_sigma.fill(1e-4);
+    for noise in [&mut model.noise.gyro, &mut model.noise.accel] {
+        noise.gauss_markov = Some(crate::imu::GaussMarkov {
+            sigma,
+            correlation_time: CORRELATION_TIME,
+        });
+    }
+    let mean = ParameterVector::from_element(1e-4);
+    let mut filter = Filter::new(&model, &mean, &TermVector::zeros());
+    let start = Start {
+        attitude: Vector3::zeros(),
+        attitude_sigma: Vector3::repeat(3e-4),
+        velocity_sigma: 1e-3,
+        position_sigma: 1.0,
+    };
+    filter.begin(&start, 5e-6, true, None);
+    let varying: Vec<usize> = filter.layout.varying_biases().map(|(s, ..)| s).collect();
+    assert_eq!(varying.len(), 6);
+    for k in 0..5 {
+        let block = block(f64::from(k));
+        let phi = dense_transition(&filter, &block);
+        let mut p = &phi * &filter.p * phi.transpose();
+        let mut corner = p.view_mut((0, 0), (NAVIGATION, NAVIGATION));
+        corner += block.noise;
+        for &state in &varying {
+            p[(state, state)] += sigma.powi(2) * (1.0 - phi[(state, state)].powi(2));
+        }
+        let x = phi * &filter.x;
+        filter.propagate(&block);
+        assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
+        assert_relative_eq!(filter.x, x, max_relative = 1e-12);
+        filter.update(&of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11));
+    }
+    // Without observations of it a stationary process stays as uncertain as it was.
+    assert!(filter.p[(varying[0], varying[0])] <= sigma.powi(2));
+}
+
+#[test]
+fn scalar_updates_equal_the_dense_one_with_the_full_gain() {
+    let mut filter = filter();
+    filter.propagate(&block(0.3));
+    let z = Vector3::new(1e-3, -2e-3, 5e-4);
+    let table = of_table(&filter, z, 1e-9);
+    for measurement in [of_velocity(z, 1e-9), table] {
+        let mut h = SMatrix::<f64, 3, STATES>::zeros();
+        for (axis, row) in measurement.rows.iter().enumerate() {
+            row.iter()
+                .for_each(|&(state, weight)| h[(axis, state)] = weight);
+        }
+        let before = StateMatrix::from_iterator(filter.p.iter().copied());
+        let s = h * before * h.transpose() + Matrix3::identity() * measurement.variance;
+        let gain = before * h.transpose() * s.try_inverse().unwrap();
+        let mean = SVector::<f64, STATES>::from_iterator(filter.x.iter().copied());
+        let innovation = z - h * mean;
+        let x = mean + gain * innovation;
+        let p = (StateMatrix::identity() - gain * h) * before;
+        let (whitened, log_determinant) = filter.whitened(&measurement).unwrap();
+        assert_relative_eq!(log_determinant, s.determinant().ln(), max_relative = 1e-9);
+        assert_relative_eq!(
+            whitened.norm_squared(),
+            innovation.dot(&(s.try_inverse().unwrap() * innovation)),
+            max_relative = 1e-9
+        );
+        filter.update(&measurement);
+        let after = StateMatrix::from_iterator(filter.p.iter().copied());
+        let mean = SVector::<f64, STATES>::from_iterator(filter.x.iter().copied());
+        assert_relative_eq!(mean, x, max_relative = 1e-6, epsilon = 1e-12);
+        assert_relative_eq!(after, p, max_relative = 1e-6, epsilon = 1e-13);
+    }
+}
+
+/// A tenth of a second of turning: attitude drives velocity, velocity position, and the
+/// parameters of both triads come in from every side.
+fn turning(seed: f64) -> Block {
+    let mut block = block(seed);
+    let wave = block.navigation;
+    block.navigation = BlockMatrix::identity();
+    for (row, column) in [(3, 0), (6, 3)] {
+        block
+            .navigation
+            .fixed_view_mut::<3, 3>(row, column)
+            .copy_from(&wave.fixed_view::<3, 3>(row, column));
+    }
+    block.noise *= 1e-8;
+    block
+}
+
+#[test]
+fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
+    let mut filter = filter();
+    for k in 0..4000 {
+        filter.propagate(&turning(f64::from(k) * 0.37));
+        filter.update(&of_velocity(Vector3::zeros(), 1e-12));
+        let table = of_table(&filter, Vector3::zeros(), 1e-12);
+        filter.update(&table);
+        if k % 50 == 0 {
+            filter.redraw_table(5e-6);
+        }
+    }
+    let sigma = filter.parameter_sigma();
+    assert!(sigma.amax() < 1e-7 && sigma.amin() > 0.0, "{sigma}");
+    let scale = filter.p.map_diagonal(|v| 1.0 / v.sqrt());
+    let correlation = StateMatrix::from_fn(|i, j| filter.p[(i, j)] * scale[i] * scale[j]);
+    assert!((correlation - correlation.transpose()).amax() < 1e-9);
+    let smallest = correlation.symmetric_eigenvalues().min();
+    assert!(smallest > 0.0, "smallest eigenvalue {smallest}");
+}

@@ -1,0 +1,64 @@
+//! Measurements: `z = H x + v`, three components at once, `v` white with the same variance R on each.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::attitude::log;
+use crate::calibration::layout::{ATTITUDE, Layout, POSITION, VELOCITY};
+use crate::navigation::State;
+use crate::turntable::Tilts;
+
+/// A residual with its measurement model.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct Measurement {
+    /// z, computed − observed, East-North-Up.
+    pub residual: Vector3<f64>,
+    /// H, row by row: state and coefficient of what is not zero.
+    pub rows: [Vec<(usize, f64)>; 3],
+    /// R, per axis.
+    pub variance: f64,
+}
+
+impl Measurement {
+    /// Zero velocity: `z = δV`.
+    pub fn velocity(computed: &State, variance: f64) -> Self {
+        Self::of(VELOCITY, computed.velocity, variance)
+    }
+
+    /// The site's position: `z = δp`.
+    pub fn position(computed: &State, variance: f64) -> Self {
+        Self::of(POSITION, computed.position, variance)
+    }
+
+    /// The table's reading: `z = φ − τ − ε − Σ t_k α_k`, with the tilts α of its axes and the directions
+    /// t in which each turns the table.
+    pub fn table(
+        layout: &Layout,
+        computed: &State,
+        reading: &Matrix3<f64>,
+        tilts: Option<&Tilts>,
+        variance: f64,
+    ) -> Self {
+        let residual = -log(&(computed.attitude * reading.transpose()));
+        let mut measurement = Self::of(ATTITUDE, residual, variance);
+        for (axis, row) in measurement.rows.iter_mut().enumerate() {
+            let errors = layout
+                .table_position()
+                .into_iter()
+                .chain(layout.table_base());
+            row.extend(errors.map(|first| (first + axis, -1.0)));
+            if let Some(tilts) = tilts {
+                let of_tilts = layout.table_tilts();
+                row.extend(of_tilts.map(|(state, k)| (state, -tilts[(axis, k)])));
+            }
+        }
+        measurement
+    }
+
+    fn of(first: usize, residual: Vector3<f64>, variance: f64) -> Self {
+        Self {
+            residual,
+            rows: [0, 1, 2].map(|axis| vec![(first + axis, 1.0)]),
+            variance,
+        }
+    }
+}

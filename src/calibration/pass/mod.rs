@@ -1,0 +1,73 @@
+//! One pass of the filter over all stretches: with feedback as it goes, or linearised at a given point.
+
+mod filter;
+mod initial_attitude;
+mod measurement;
+mod mode;
+mod result;
+mod stretch;
+
+use super::auxiliary::auxiliary_vector;
+use super::error::CalibrationError;
+use super::linearisation::{AttitudePrior, Linearisation};
+use super::parameters::{ParameterVector, to_vector};
+use super::problem::{Problem, Stretch};
+use crate::imu::TermVector;
+pub(super) use filter::Filter;
+use initial_attitude::InitialAttitude;
+pub(super) use mode::{Gate, Mode};
+pub use result::Epoch;
+pub(super) use result::PassResult;
+use result::Sums;
+use stretch::OneStretch;
+
+/// A pass over all stretches of a problem, `priors` what is known of the initial attitude of each.
+pub(super) fn pass(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    at: &Linearisation,
+    mode: Mode,
+) -> Result<PassResult, CalibrationError> {
+    let model = &problem.model;
+    // The prior keeps its own mean, wherever the pass linearises; a pass with feedback begins at the
+    // point it is given and finds its way from there.
+    let (parameters, terms) = match mode {
+        Mode::Feedback => (ParameterVector::zeros(), TermVector::zeros()),
+        Mode::Held(_) => (model.prior_mean - to_vector(&at.triads), -at.terms),
+    };
+    let mut sums = Sums {
+        at: at.clone(),
+        filter: Filter::new(model, &parameters, &terms),
+        innovations: Vec::new(),
+        history: Vec::new(),
+        cost: 0.0,
+        log_determinant: 0.0,
+    };
+    let mut before = None;
+    let mut attitudes = Vec::new();
+    for (number, (stretch, prior)) in problem.stretches().iter().zip(priors).enumerate() {
+        let known = match mode {
+            // The given point is where it begins.
+            Mode::Feedback => AttitudePrior {
+                mean: at.initial_attitudes[number],
+                ..*prior
+            },
+            Mode::Held(_) => *prior,
+        };
+        let start = stretch.start(&known, &at.initial_attitudes[number]);
+        let anew = before.is_none_or(|b: &Stretch| b.recording != stretch.recording);
+        let moved = before.is_none_or(|b: &Stretch| b.run.site != stretch.run.site);
+        before = Some(stretch);
+        let gravity = moved.then_some(stretch.run.site.gravity_sigma);
+        let table = model.position_sigma;
+        sums.filter.begin(&start, table, anew, gravity);
+        let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
+        one.run()?;
+        sums = one.sums;
+        if number + 1 < problem.stretches().len() {
+            attitudes.push(InitialAttitude::of(&sums.filter, mode));
+        }
+    }
+    let prior_sigma = auxiliary_vector(&model.geometry.vector(), &model.term_sigma);
+    Ok(sums.result(prior_sigma, &attitudes))
+}

@@ -1,0 +1,117 @@
+//! From a problem to a calibration, by either method, with all that can be said of it.
+
+use super::closed_form::{ClosedForm, six_position};
+use super::error::CalibrationError;
+use super::error_term_test::{ErrorTermTest, test_error_terms};
+use super::estimate::Estimate;
+use super::finding::Finding;
+use super::gauss_newton::{Progress, estimate};
+use super::outcome::Outcome;
+use super::problem::Problem;
+use super::quality::Quality;
+use super::result::{Calibration, Method};
+
+/// What a method makes of a problem.
+#[derive(Debug, Clone)]
+pub enum Solution {
+    /// The filter.
+    Filter(Box<Outcome>),
+    /// The closed form.
+    ClosedForm(Box<ClosedForm>),
+}
+
+/// What a solution does to the data, and what they say of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    /// What each error term costs and explains; empty for the closed form.
+    pub error_terms: Vec<ErrorTermTest>,
+    /// What is left of gravity and turns.
+    pub quality: Quality,
+}
+
+impl Problem<'_> {
+    /// Solves it by a method.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] where the runs cannot give a calibration by this method.
+    pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
+        Ok(match method {
+            Method::Ekf => Solution::Filter(Box::new(estimate(self, progress)?)),
+            Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),
+        })
+    }
+}
+
+impl Solution {
+    /// The filter's outcome.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        match self {
+            Self::Filter(outcome) => Some(outcome),
+            Self::ClosedForm(_) => None,
+        }
+    }
+
+    /// The closed form.
+    pub fn closed_form(&self) -> Option<&ClosedForm> {
+        match self {
+            Self::Filter(_) => None,
+            Self::ClosedForm(closed_form) => Some(closed_form),
+        }
+    }
+
+    /// Both triads with their covariance.
+    pub fn estimate(&self) -> &Estimate {
+        match self {
+            Self::Filter(outcome) => &outcome.estimate,
+            Self::ClosedForm(closed_form) => &closed_form.estimate,
+        }
+    }
+
+    /// Whether it may be used: a closed form always, the filter where it converged.
+    pub fn converged(&self) -> bool {
+        self.outcome().is_none_or(|outcome| outcome.converged)
+    }
+
+    /// Tests error terms and judges what is left of gravity and turns.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] where the problem is not the one of the solution.
+    pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
+        match self {
+            Self::Filter(outcome) => {
+                let (error_terms, quality) = rayon::join(
+                    || test_error_terms(problem, outcome),
+                    || outcome.quality(problem),
+                );
+                Ok(Assessment {
+                    error_terms: error_terms?,
+                    quality: quality?,
+                })
+            }
+            Self::ClosedForm(closed_form) => Ok(Assessment {
+                error_terms: Vec::new(),
+                quality: closed_form.quality(problem)?,
+            }),
+        }
+    }
+
+    /// What must be known before using the figures.
+    pub fn findings(&self, assessment: &Assessment) -> Vec<Finding> {
+        let mut findings = match self {
+            Self::Filter(outcome) => outcome.findings.clone(),
+            Self::ClosedForm(closed_form) => closed_form.findings.clone(),
+        };
+        findings.extend(ErrorTermTest::most_significant(&assessment.error_terms));
+        findings
+    }
+
+    /// The calibration, in the file's quantity.
+    pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
+        match self {
+            Self::Filter(outcome) => {
+                outcome.record(problem, &assessment.error_terms, &assessment.quality)
+            }
+            Self::ClosedForm(closed_form) => closed_form.record(problem, &assessment.quality),
+        }
+    }
+}

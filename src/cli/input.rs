@@ -1,0 +1,65 @@
+//! What arguments must be, said in the field's words.
+
+use std::path::{Path, PathBuf};
+
+use turncal::study::navigation::INTERVAL;
+
+const HOUR: f64 = 3600.0;
+
+/// The path of a run.toml; whoever names its directory is told the file.
+pub fn run_file(text: &str) -> Result<PathBuf, String> {
+    let path = Path::new(text);
+    let inside = path.join("run.toml");
+    if inside.is_file() {
+        return Err(format!("this is a directory; give {}", inside.display()));
+    }
+    let log = [".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".log"];
+    if path.is_file() && log.iter().any(|end| text.ends_with(end)) {
+        return Err(format!(
+            "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"
+        ));
+    }
+    Ok(path.into())
+}
+
+/// A number between two others.
+pub fn number(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    between(text, low, high).ok_or_else(|| format!("expected a number from {low} to {high}"))
+}
+
+fn between(text: &str, low: f64, high: f64) -> Option<f64> {
+    let value: f64 = text.trim().parse().ok()?;
+    (low..=high).contains(&value).then_some(value)
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    between(text, f64::MIN_POSITIVE, f64::MAX)
+        .ok_or_else(|| "expected a number above zero".to_owned())
+}
+
+/// Degrees, north positive.
+pub fn latitude(text: &str) -> Result<f64, String> {
+    number(text, -90.0, 90.0)
+}
+
+/// Hours of a navigation.
+pub fn hours(text: &str) -> Result<f64, String> {
+    between(text, INTERVAL / HOUR, 1000.0)
+        .ok_or_else(|| "expected a number of hours, from a minute (0.0167) to 1000".to_owned())
+}
+
+/// Seed of all random numbers.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
+}
+
+/// How many runs, instruments or samples a study has: a scatter needs two.
+pub fn at_least_two(text: &str) -> Result<u64, String> {
+    const MOST: u64 = 1_000_000;
+    match text.parse() {
+        Ok(count @ 2..=MOST) => Ok(count),
+        _ => Err(format!("expected a whole number from 2 to {MOST}")),
+    }
+}

@@ -1,0 +1,44 @@
+//! What happens when the command is interrupted.
+
+/// Makes Ctrl-C, a request to end and a lost terminal end the command without leaving anything
+/// unfinished behind; shells report them as status 130, 143 and 129.
+#[cfg(unix)]
+pub fn leave_nothing_behind() {
+    use std::process;
+    use std::thread;
+
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    use signal_hook::low_level::emulate_default_handler;
+    use turncal::formats::abandon_unfinished;
+
+    // Without this thread the signals do what they do by default; the next run clears up.
+    let _ = thread::Builder::new().name("signals".into()).spawn(|| {
+        let heeded = [SIGINT, SIGTERM, SIGHUP]
+            .into_iter()
+            .filter(|&signal| !is_ignored(signal));
+        let Ok(mut signals) = Signals::new(heeded) else {
+            return;
+        };
+        if let Some(signal) = signals.forever().next() {
+            abandon_unfinished();
+            // Ended by the signal itself, so that a shell's loop over many runs ends, too.
+            let _ = emulate_default_handler(signal);
+            process::exit(128 + signal);
+        }
+    });
+}
+
+/// Whether the process was begun with a signal ignored, as `nohup` does; that stays so. Where the
+/// system does not tell, none is.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+/// Elsewhere the next run clears up.
+#[cfg(not(unix))]
+pub fn leave_nothing_behind() {}

@@ -1,0 +1,170 @@
+//! The clock of a log: stamps in any unit, counters, or none.
+
+use super::csv_file::CsvFile;
+use super::error::FileError;
+use super::fields::Fields;
+use crate::recording::nanoseconds;
+
+/// What the numbers of a time column are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum TimeUnit {
+    /// This many of them are a second.
+    PerSecond(f64),
+    /// Samples are counted.
+    Count,
+}
+
+impl TimeUnit {
+    /// The words for it in `run.toml`.
+    pub const WORDS: [(&'static str, Self); 5] = [
+        ("s", Self::PerSecond(1.0)),
+        ("ms", Self::PerSecond(1e3)),
+        ("us", Self::PerSecond(1e6)),
+        ("ns", Self::PerSecond(1e9)),
+        ("count", Self::Count),
+    ];
+}
+
+/// What `run.toml` says of a log's time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clock<'a> {
+    /// None where rows just follow one another.
+    pub column: Option<&'a str>,
+    pub unit: TimeUnit,
+    /// s
+    pub period: Option<f64>,
+}
+
+impl<'a> Clock<'a> {
+    /// Reads `time_unit` and `sample_period_s` of a log's table, and `time` of its columns.
+    pub fn of_fields(fields: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, FileError> {
+        let unit = match fields.get("time_unit") {
+            Some(field) => field.choice(&TimeUnit::WORDS)?,
+            None => TimeUnit::PerSecond(1.0),
+        };
+        let period = fields.get("sample_period_s");
+        if unit == TimeUnit::Count && period.is_none() {
+            return Err(fields.missing("sample_period_s", "what a count lasts"));
+        }
+        Ok(Self {
+            column: columns.get("time").map(|field| field.text()).transpose()?,
+            unit,
+            period: period.map(|field| field.positive()).transpose()?,
+        })
+    }
+
+    /// Begins to read a file.
+    pub fn start(&self, csv: &mut CsvFile) -> Result<Stamps, FileError> {
+        Ok(Stamps {
+            column: self.column.map(|name| csv.column(name)).transpose()?,
+            unit: self.unit,
+            period: self.period.unwrap_or(1.0),
+            number: None,
+            unwrapped: 0.0,
+            of_rows: Vec::new(),
+        })
+    }
+}
+
+/// A row's stamp against that of the row before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stamp {
+    Later,
+    Same,
+}
+
+/// The stamps of a file so far.
+pub(super) struct Stamps {
+    column: Option<usize>,
+    unit: TimeUnit,
+    /// s a count
+    period: f64,
+    /// The number in the row before.
+    number: Option<f64>,
+    /// What wraps of a counter add up to.
+    unwrapped: f64,
+    /// Time in s and line of each row taken.
+    pub of_rows: Vec<(f64, u64)>,
+}
+
+impl Stamps {
+    /// Looks at the stamp of the row, which must not be before that of the row before; a later one is
+    /// taken.
+    pub fn look(&mut self, csv: &CsvFile) -> Result<Stamp, FileError> {
+        let Some(column) = self.column else {
+            let time = self.of_rows.len() as f64 * self.period;
+            self.of_rows.push((time, csv.line()));
+            return Ok(Stamp::Later);
+        };
+        let number = csv.number(column)?;
+        if self.unit == TimeUnit::Count && number.fract() != 0.0 {
+            return Err(csv.not(column, "a whole number of samples"));
+        }
+        let step = number - self.number.unwrap_or(f64::NEG_INFINITY);
+        if step == 0.0 {
+            return Ok(Stamp::Same);
+        }
+        if step < 0.0 {
+            let wrap = match self.unit {
+                TimeUnit::Count => wrap(step),
+                TimeUnit::PerSecond(_) => None,
+            };
+            let Some(wrap) = wrap else {
+                let of = |number: f64| match self.unit {
+                    TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
+                    TimeUnit::Count => format!("count {number}"),
+                };
+                return Err(csv.error_here(
+                    format_args!(
+                        "time going back from {} to {}",
+                        of(number - step),
+                        of(number)
+                    ),
+                    "times that increase",
+                    "Put the rows in order, or split the file where the clock was set.",
+                ));
+            };
+            self.unwrapped += wrap;
+        }
+        self.number = Some(number);
+        let time = match self.unit {
+            TimeUnit::PerSecond(many) => number / many,
+            TimeUnit::Count => (number + self.unwrapped) * self.period,
+        };
+        self.of_rows.push((time, csv.line()));
+        Ok(Stamp::Later)
+    }
+
+    /// The error of a row that has the stamp of the row before, but other values.
+    pub fn same(csv: &CsvFile) -> FileError {
+        csv.error_here(
+            "the time of the row before again, a duplicate with other values",
+            "a later time",
+            "Remove the wrong one of both rows, or print times with more digits.",
+        )
+    }
+}
+
+/// The size of a counter that wrapped: the smallest that makes the step forward a small one.
+fn wrap(step: f64) -> Option<f64> {
+    let sizes = [8, 16, 24, 32].map(|bits| 2f64.powi(bits));
+    sizes
+        .into_iter()
+        .find(|size| (0.0..=0.25 * size).contains(&(size + step)) && step + size > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_counter_wraps_at_the_smallest_size_that_makes_a_small_step() {
+        assert_eq!(wrap(-255.0), Some(256.0));
+        assert_eq!(wrap(-250.0), Some(256.0));
+        assert_eq!(wrap(-65535.0), Some(65536.0));
+        assert_eq!(wrap(-65530.0), Some(65536.0));
+        assert_eq!(wrap(3.0 - 4_294_967_295.0), Some(4_294_967_296.0));
+        assert_eq!(wrap(-256.0), None, "the same count");
+        assert_eq!(wrap(-50.0), None, "rows out of order");
+    }
+}

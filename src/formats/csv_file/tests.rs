@@ -1,0 +1,106 @@
+use std::fs;
+
+use super::*;
+
+fn rows(name: &str, content: &[u8]) -> Result<Vec<(u64, Vec<f64>)>, FileError> {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join(name);
+    fs::write(&path, content).unwrap();
+    let mut csv = CsvFile::open(&path)?;
+    let columns = ["t", "gx", "ax"].map(|name| csv.column(name));
+    let columns: Vec<usize> = columns.into_iter().collect::<Result<_, _>>()?;
+    let mut rows = Vec::new();
+    while csv.advance()? {
+        let numbers: Result<_, _> = columns.iter().map(|&column| csv.number(column)).collect();
+        rows.push((csv.line(), numbers?));
+    }
+    Ok(rows)
+}
+
+#[test]
+fn the_same_rows_are_read_however_a_program_wrote_them() {
+    let expected = [vec![0.0, -1.5, 9.8], vec![0.01, 2.5e-3, -9.8]];
+    for (name, content, lines) in [
+        ("a.csv", "t,gx,ax\n0,-1.5,9.8\n0.01,2.5e-3,-9.8\n", [2, 3]),
+        ("a.TXT", "t;gx;ax\r\n0;-1,5;9,8\r\n0,01;2,5e-3;-9,8", [2, 3]),
+        (
+            "a.tsv",
+            "t\tgx\tax\n0\t-1,5\t9,8\n\n0.01\t2.5e-3\t-9.8\n\n",
+            [2, 4],
+        ),
+        (
+            "a.dat",
+            "  t  gx   ax\n  0  -1.5 \t 9.8 \n 0.01   2.5e-3 -9.8\n",
+            [2, 3],
+        ),
+        (
+            "a.log",
+            "\u{feff}\"t\", \"gx\", \"ax\"\n0, -1.5, 9.8\n0.01, 2.5e-3, -9.8\n,,\n",
+            [2, 3],
+        ),
+        (
+            "a.csv",
+            "// of a device\n# day 1\nt,gx,ax,\n% on\n0,-1.5,9.8,\n#\n0.01,2.5e-3,-9.8,\n",
+            [5, 7],
+        ),
+        ("a.csv", "t,gx,ax\n0,-1.5,9.8,\n0.01,2.5e-3,-9.8,\n", [2, 3]),
+        (
+            "a.csv",
+            "t,gx,ax\ns,deg/s,m/s^2\n\n0,-1.5,9.8\n0.01,2.5e-3,-9.8\n",
+            [4, 5],
+        ),
+        ("a.csv", "#t,gx,ax\n0,-1.5,9.8\n0.01,2.5e-3,-9.8\n", [2, 3]),
+        (
+            "a.csv",
+            "t,\tgx,\tax\n0,\t-1.5,\t9.8\n0.01,\t2.5e-3,\t-9.8\n",
+            [2, 3],
+        ),
+    ] {
+        let rows = rows(name, content.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+        let numbers: Vec<_> = rows.iter().map(|(_, row)| row.clone()).collect();
+        assert_eq!(numbers, expected, "{content}");
+        let found: Vec<_> = rows.iter().map(|(line, _)| *line).collect();
+        assert_eq!(found, lines, "{content}");
+    }
+}
+
+#[test]
+fn columns_without_names_are_numbered() {
+    let directory = tempfile::tempdir().unwrap();
+    for content in [
+        "0 -1,5 9,8\n1 2 3\n",
+        "0,-1.5,9.8\n1,2,3\n",
+        "0\t-1.5\t9.8\n1\t2\t3\n",
+    ] {
+        let path = directory.path().join("a.txt");
+        fs::write(&path, content).unwrap();
+        let mut csv = CsvFile::open(&path).unwrap();
+        assert_eq!(csv.header(), ["1", "2", "3"]);
+        let column = csv.column("2").unwrap();
+        assert!(csv.advance().unwrap());
+        assert_eq!((csv.line(), csv.number(column).unwrap()), (1, -1.5));
+    }
+}
+
+#[test]
+fn an_error_names_its_line_behind_comments_and_empty_lines() {
+    let short = "# a\n\nt,gx,ax\n0,1,2\n\n# b\n1,2\n";
+    let error = rows("a.csv", short.as_bytes()).unwrap_err().to_string();
+    assert!(
+        error.contains("line 7: found 2 fields, expected 3"),
+        "{error}"
+    );
+    let word = "t,gx,ax\n0,1,2\n\n% b\n1,x,3\n";
+    let error = rows("a.csv", word.as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("line 5, column `gx`: found `x`"), "{error}");
+}
+
+#[test]
+fn files_without_a_row_are_empty_or_have_none() {
+    for content in ["", "\n\n", "# only a remark\n", "\u{feff}"] {
+        let error = rows("a.csv", content.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("an empty file"), "{error}");
+    }
+    assert!(rows("a.csv", b"t,gx,ax\n").unwrap().is_empty());
+    assert!(rows("a.csv", b"t,gx,ax\ns,deg,m\n").unwrap().is_empty());
+}

@@ -1,0 +1,190 @@
+//! Which columns hold what.
+
+use nalgebra::Vector3;
+
+use super::name::Name;
+use super::units::offset;
+use crate::formats::Sheet;
+use crate::imu::{PerSensor, Sensor};
+use crate::statistics::median;
+
+/// Columns by their place in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Columns {
+    pub names: Vec<String>,
+    pub time: Option<usize>,
+    pub triads: PerSensor<Option<[usize; 3]>>,
+    /// Others that might be meant.
+    pub others: PerSensor<Vec<[usize; 3]>>,
+    /// Whether the triads were told by their numbers, for their names say nothing.
+    pub by_size: bool,
+    pub temperature: Option<usize>,
+    /// Four columns of norm one.
+    pub quaternion: Option<[usize; 4]>,
+}
+
+/// Part of the rows that must be numbers.
+const NUMBERS: f64 = 0.9;
+/// Part of the steps of a time that go forward.
+const FORWARD: f64 = 0.9;
+
+impl Columns {
+    pub fn find(sheet: &Sheet) -> Self {
+        let names: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
+        let time = time(sheet, &names);
+        let temperature =
+            (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
+        let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
+        let by_size = Sensor::ALL
+            .iter()
+            .all(|&sensor| found.get(sensor).is_empty());
+        if by_size {
+            found = by_numbers(sheet, time, temperature);
+        }
+        let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
+        Self {
+            names: sheet.names.clone(),
+            time,
+            triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
+            others: PerSensor::from_fn(|sensor| {
+                found.get(sensor).iter().skip(1).copied().collect()
+            }),
+            by_size,
+            temperature,
+            quaternion: quaternion(sheet, time),
+        }
+    }
+
+    /// The rows in which both triads and the time are numbers.
+    pub fn samples(&self, sheet: &Sheet) -> Option<PerSensor<Vec<Vector3<f64>>>> {
+        let triads = PerSensor {
+            gyro: self.triads.gyro?,
+            accel: self.triads.accel?,
+        };
+        let at = |columns: &[usize; 3], row: usize| {
+            Vector3::from(columns.map(|k| sheet.columns[k][row]))
+        };
+        let mut samples = PerSensor::from_fn(|_| Vec::new());
+        for row in 0..sheet.columns[triads.gyro[0]].len() {
+            let both = PerSensor::from_fn(|sensor| at(triads.get(sensor), row));
+            if (both.gyro + both.accel)
+                .iter()
+                .all(|value| value.is_finite())
+            {
+                Sensor::ALL
+                    .iter()
+                    .for_each(|&sensor| samples.get_mut(sensor).push(*both.get(sensor)));
+            }
+        }
+        (samples.gyro.len() > 1).then_some(samples)
+    }
+}
+
+fn is_numeric(sheet: &Sheet, column: usize) -> bool {
+    let values = &sheet.columns[column];
+    let numbers = values.iter().filter(|value| value.is_finite()).count();
+    numbers as f64 >= NUMBERS * values.len() as f64
+}
+
+fn goes_forward(sheet: &Sheet, column: usize) -> bool {
+    let values = &sheet.columns[column];
+    let forward = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
+    forward as f64 >= FORWARD * (values.len() as f64 - 1.0)
+}
+
+/// The column most like a time by its name, else the first that goes forward.
+fn time(sheet: &Sheet, names: &[Name]) -> Option<usize> {
+    let forward = (0..names.len()).filter(|&k| goes_forward(sheet, k));
+    let best = forward.max_by_key(|&k| (names[k].is_time(), names.len() - k))?;
+    // The angle of an integrating sensor goes forward, too.
+    let named_otherwise = names[best].is_time() == 0 && names[best].sensor().is_some();
+    (!named_otherwise).then_some(best)
+}
+
+/// Complete triads of a sensor, in order of their columns.
+fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
+    let of_sensor = |k: &usize| names[*k].sensor() == Some(sensor) && is_numeric(sheet, *k);
+    let candidates: Vec<usize> = (0..names.len()).filter(of_sensor).collect();
+    let mut triads = Vec::new();
+    for &first in &candidates {
+        let axes = match names[first].axis {
+            Some('x') => ['x', 'y', 'z'],
+            Some('0') => ['0', '1', '2'],
+            Some('1') if !candidates.iter().any(|&k| names[k].axis == Some('0')) => ['1', '2', '3'],
+            _ => continue,
+        };
+        let of = |axis| {
+            let same =
+                |k: &&usize| names[**k].stem == names[first].stem && names[**k].axis == Some(axis);
+            candidates.iter().find(same).copied()
+        };
+        if let [Some(x), Some(y), Some(z)] = axes.map(of) {
+            triads.push([x, y, z]);
+        }
+    }
+    triads
+}
+
+/// Triads side by side: gravity keeps the magnitude of one of them, the other is a gyro's.
+fn by_numbers(
+    sheet: &Sheet,
+    time: Option<usize>,
+    temperature: Option<usize>,
+) -> PerSensor<Vec<[usize; 3]>> {
+    let free: Vec<usize> = (0..sheet.names.len())
+        .filter(|&k| Some(k) != time && Some(k) != temperature && is_numeric(sheet, k))
+        .collect();
+    let mut triads: Vec<(f64, [usize; 3])> = free
+        .chunks_exact(3)
+        .map(|columns| [columns[0], columns[1], columns[2]])
+        .map(|triad| (unevenness(sheet, &triad), triad))
+        .collect();
+    triads.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut triads = triads.into_iter().map(|(_, triad)| triad);
+    let accel = triads.next();
+    let mut gyro: Vec<[usize; 3]> = triads.collect();
+    // Of several, the gyro is usually beside the accelerometer.
+    gyro.sort_by_key(|triad| accel.map_or(0, |accel| triad[0].abs_diff(accel[0])));
+    PerSensor {
+        accel: accel.filter(|_| !gyro.is_empty()).into_iter().collect(),
+        gyro,
+    }
+}
+
+/// Median departure of a triad's magnitude from its median, relative.
+fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
+    let rows = 0..sheet.columns[triad[0]].len();
+    let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
+    let samples: Vec<Vector3<f64>> = rows
+        .map(at)
+        .filter(|sample| sample.iter().all(|value| value.is_finite()))
+        .collect();
+    let zero = offset(&samples).unwrap_or(0.0);
+    let mut sizes: Vec<f64> = samples
+        .iter()
+        .map(|sample| sample.add_scalar(-zero).norm())
+        .collect();
+    let middle = median(&mut sizes).unwrap_or(0.0);
+    let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
+    let off = median(&mut off).unwrap_or(0.0);
+    if middle > 0.0 {
+        off / middle
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// Four columns side by side whose squares add up to one in every row.
+fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
+    let rows = sheet.columns.first()?.len();
+    let places = 0..sheet.names.len().saturating_sub(3);
+    places.map(|k| [k, k + 1, k + 2, k + 3]).find(|four| {
+        let norm = |row: usize| {
+            four.iter()
+                .map(|&k| sheet.columns[k][row].powi(2))
+                .sum::<f64>()
+        };
+        !four.iter().any(|&k| Some(k) == time)
+            && (0..rows).all(|row| (norm(row) - 1.0).abs() < 1e-3)
+    })
+}

@@ -1,0 +1,182 @@
+//! What raw samples of unknown unit show of the motion: where they rest, how large gravity is, and by gravity's
+//! direction how far the gyros turn.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::turns;
+use crate::imu::PerSensor;
+use crate::statistics::{SIGMA_OF_MEDIAN, median};
+use crate::units::DEGREE;
+
+/// Length of the windows whose means are compared, s.
+const WINDOW: f64 = 0.25;
+/// Windows at rest differ by less than this many σ of their noise …
+const SIGMAS: f64 = 6.0;
+/// … and this part of gravity or of the fastest turn.
+const PART: f64 = 1e-3;
+/// Samples on either side of a cut …
+const BESIDE: usize = 8;
+/// … between which gravity's direction changes by this much at once, rad …
+const CUT: f64 = 30.0 * DEGREE;
+/// … though it stays within this on each side.
+const STEADY: f64 = 5.0 * DEGREE;
+/// Samples that are added up to tell pulses, whose fractions are carried, from readings.
+const SUM: usize = 16;
+
+/// What the samples show.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Motion {
+    /// The longest stretch at rest.
+    pub longest_rest: Range<usize>,
+    /// Specific force at rest, the file's quantity a row.
+    pub gravity: f64,
+    /// Gyros at rest.
+    pub rest: Vector3<f64>,
+    /// Angle in rad of one unit of the gyros in one row, where turns show it; negative where the triads have
+    /// opposite signs.
+    pub angle: Option<f64>,
+    /// Places where gravity's direction jumps: sections laid end to end.
+    pub cuts: usize,
+    /// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
+    pub sum_variance: Option<f64>,
+}
+
+pub(super) fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
+    samples.iter().sum::<Vector3<f64>>() / samples.len().max(1) as f64
+}
+
+pub(super) fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
+    samples.chunks_exact(length).map(mean).collect()
+}
+
+/// Median of each axis.
+fn level<'a>(vectors: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| {
+        let mut values: Vec<f64> = vectors.clone().map(|v| v[axis]).collect();
+        median(&mut values).unwrap_or(0.0)
+    })
+}
+
+/// 1σ of the noise of means of windows, from how they differ from one to the next.
+fn noise(means: &[Vector3<f64>]) -> f64 {
+    let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut changes: Vec<f64> = differences
+        .flat_map(|d| <[f64; 3]>::from(d.abs()))
+        .collect();
+    SIGMA_OF_MEDIAN * std::f64::consts::FRAC_1_SQRT_2 * median(&mut changes).unwrap_or(0.0)
+}
+
+impl Motion {
+    pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, period: f64) -> Self {
+        let length = ((WINDOW / period).round() as usize).clamp(1, samples.gyro.len().div_ceil(8));
+        let gyro = means(&samples.gyro, length);
+        let accel = means(&samples.accel, length);
+        let mut sizes: Vec<f64> = accel.iter().map(|f| f.norm()).collect();
+        let usual = median(&mut sizes).unwrap_or(0.0);
+        let force = SIGMAS * noise(&accel) + PART * usual;
+        let steady = |k: usize| {
+            let near =
+                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() < force);
+            near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
+        };
+        let standing: Vec<usize> = (0..accel.len()).filter(|&k| steady(k)).collect();
+        let rest = level(standing.iter().map(|&k| &gyro[k]));
+        let fastest = gyro
+            .iter()
+            .map(|rate| (rate - rest).norm())
+            .fold(0.0, f64::max);
+        let rate = SIGMAS * noise(&gyro) + PART * fastest;
+        let at_rest: Vec<bool> = (0..gyro.len())
+            .map(|k| steady(k) && (gyro[k] - rest).norm() <= rate)
+            .collect();
+        let mut sizes: Vec<f64> = (0..accel.len())
+            .filter(|&k| at_rest[k])
+            .map(|k| accel[k].norm())
+            .collect();
+        let stretches = stretches(&at_rest);
+        let longest = stretches
+            .iter()
+            .max_by_key(|stretch| stretch.len())
+            .cloned()
+            .unwrap_or(0..0);
+        // At its ends a rest is already or still a motion.
+        let settled: Vec<Range<usize>> = stretches
+            .iter()
+            .filter(|stretch| stretch.len() > 3)
+            .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
+            .collect();
+        let cuts = cuts(&samples.accel);
+        Self {
+            longest_rest: longest.start * length..longest.end * length,
+            gravity: median(&mut sizes).unwrap_or(usual),
+            rest,
+            angle: (cuts == 0)
+                .then(|| turns::angle(samples, &settled, rest, usual, period))
+                .flatten(),
+            cuts,
+            sum_variance: sum_variance(samples, &settled),
+        }
+    }
+}
+
+/// Runs of windows at rest.
+fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    let mut begin = 0;
+    for stretch in at_rest.chunk_by(|a, b| a == b) {
+        if stretch.first() == Some(&true) {
+            found.push(begin..begin + stretch.len());
+        }
+        begin += stretch.len();
+    }
+    found
+}
+
+fn cuts(accel: &[Vector3<f64>]) -> usize {
+    let (mut cuts, mut next) = (0, 2 * BESIDE);
+    while next + 2 * BESIDE <= accel.len() {
+        let part = |from: usize| mean(&accel[from..from + BESIDE]);
+        let (before, after) = (part(next - BESIDE), part(next));
+        let cut = before.angle(&after) > CUT
+            && part(next - 2 * BESIDE).angle(&before) < STEADY
+            && after.angle(&part(next + BESIDE)) < STEADY;
+        cuts += usize::from(cut);
+        next += if cut { 2 * BESIDE } else { 1 };
+    }
+    cuts
+}
+
+fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
+    let mut least: Option<f64> = None;
+    for triad in [&samples.gyro, &samples.accel] {
+        for axis in 0..3 {
+            let (mut of_sums, mut of_one, mut count) = (0.0, 0.0, 0.0);
+            for stretch in settled {
+                let values: Vec<f64> = triad[stretch.clone()]
+                    .iter()
+                    .map(|sample| sample[axis])
+                    .collect();
+                // Differences of neighbours are free of what wanders.
+                let sums: Vec<f64> = values
+                    .chunks_exact(SUM)
+                    .map(|part| part.iter().sum())
+                    .collect();
+                of_sums += sums
+                    .windows(2)
+                    .map(|pair| (pair[1] - pair[0]).powi(2))
+                    .sum::<f64>();
+                count += sums.len().saturating_sub(1) as f64;
+                let middle = values.iter().sum::<f64>() / values.len().max(1) as f64;
+                let spread = values.iter().map(|v| (v - middle).powi(2)).sum::<f64>();
+                of_one += spread / values.len().max(1) as f64 * sums.len().saturating_sub(1) as f64;
+            }
+            if count > 0.0 && of_one > 0.0 {
+                let ratio = of_sums / (2.0 * SUM as f64 * of_one);
+                least = Some(least.map_or(ratio, |least| least.min(ratio)));
+            }
+        }
+    }
+    least
+}

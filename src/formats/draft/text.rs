@@ -1,0 +1,345 @@
+//! The draft as TOML.
+
+use std::fmt::Write;
+
+use super::Draft;
+use super::units::short;
+use crate::imu::{Output, Sensor};
+use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ};
+
+/// Knowledge before calibration that is usual in a class of instruments, 1σ.
+struct Class {
+    name: &'static str,
+    /// White noise of the gyros below which an instrument is of this class, rad/√s.
+    random_walk: f64,
+    scale_ppm: f64,
+    installation: f64,
+    /// rad/s.
+    gyro_bias: f64,
+    /// m/s².
+    accel_bias: f64,
+}
+
+const CLASSES: [Class; 3] = [
+    Class {
+        name: "a navigation-grade",
+        random_walk: 0.01 * DEG_PER_SQRT_H,
+        scale_ppm: 7_000.0,
+        installation: 600.0 * ARCSEC,
+        gyro_bias: 0.03 * DEGREE,
+        accel_bias: 0.05,
+    },
+    Class {
+        name: "a tactical-grade",
+        random_walk: 0.1 * DEG_PER_SQRT_H,
+        scale_ppm: 10_000.0,
+        installation: 3_600.0 * ARCSEC,
+        gyro_bias: 0.2 * DEGREE,
+        accel_bias: 0.2,
+    },
+    Class {
+        name: "a MEMS",
+        random_walk: f64::INFINITY,
+        scale_ppm: 50_000.0,
+        installation: 7_200.0 * ARCSEC,
+        gyro_bias: 2.0 * DEGREE,
+        accel_bias: 1.0,
+    },
+];
+
+impl Draft {
+    /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
+    /// can be read; the others are guesses, each with its reason.
+    pub fn to_toml(&self, file: &str) -> String {
+        let mut text = "# A draft made from the log alone. Complete each TODO and check the rest; `turncal check` \
+                        then says what the run holds.\n\
+                        format = \"turncal-run/1\"\n\n\
+                        # the place of the instrument\n\
+                        [site]\n\
+                        # latitude_deg =  # TODO: north positive; to 0.1° it is good enough\n\
+                        # height_m =      # TODO: above the ellipsoid\n\
+                        # gravity_m_s2 =  # if it was measured; else normal gravity is taken\n"
+            .to_owned();
+        // Writing to a string cannot fail.
+        let _ = write!(text, "\n[imu]\nfile = {}\n", quoted(file));
+        self.rows(&mut text);
+        self.noise_table(&mut text);
+        for sensor in Sensor::ALL {
+            self.prior(&mut text, sensor);
+        }
+        self.table(&mut text);
+        text
+    }
+
+    fn rows(&self, text: &mut String) {
+        let found = &self.quantities;
+        let output = match found.output {
+            Output::Pulse => "pulse",
+            Output::Increment => "increment",
+            Output::Rate => "rate",
+        };
+        line(text, "output", &quoted(output), &found.output_why);
+        for sensor in Sensor::ALL {
+            let (key, unit) = (format!("{}_unit", sensor.name()), found.units.get(sensor));
+            match unit.word {
+                Some(word) => line(text, &key, &quoted(word), &unit.why),
+                None => todo(
+                    text,
+                    &key,
+                    &format!("{}; the data sheet or the logger says", unit.why),
+                ),
+            }
+        }
+        if found.opposed {
+            text.push_str(
+                "# Gravity turns against the gyros: one triad has the opposite sign. Reverse its columns or give it a \
+                 negative scale.\n",
+            );
+        }
+        let clock = &self.clock;
+        if clock.unit != "s" {
+            line(text, "time_unit", &quoted(clock.unit), &clock.why);
+        }
+        match clock.period {
+            Some(period) => {
+                let rate = short(period.recip());
+                let _ = writeln!(
+                    text,
+                    "# sample_period_s = {}  # {rate} Hz, found from the times when this is left out",
+                    seven(period)
+                );
+            }
+            None => todo(
+                text,
+                "sample_period_s",
+                "s from row to row, which a counter does not tell",
+            ),
+        }
+        line(
+            text,
+            "time_stamp",
+            "\"end\"",
+            "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"",
+        );
+        if self.cuts > 0 {
+            let why = format!(
+                "gravity changes its direction at once in {}: sections laid end to end; if not, true",
+                places(self.cuts)
+            );
+            line(text, "continuous", "false", &why);
+        } else {
+            line(text, "continuous", "true", &self.gaps());
+        }
+        line(
+            text,
+            "body_axes",
+            "\"rfu\"",
+            "guessed: x right, y front, z up; else \"frd\" or \"flu\"",
+        );
+        self.columns(text);
+    }
+
+    fn gaps(&self) -> String {
+        match (self.clock.gaps, self.clock.repeated) {
+            (0, 0) => "no gap in time".to_owned(),
+            (0, repeated) => format!(
+                "no gap in time, but it stays or goes back in {}",
+                places(repeated)
+            ),
+            (gaps, _) => format!("but rows are missing in {}", places(gaps)),
+        }
+    }
+
+    fn columns(&self, text: &mut String) {
+        let columns = &self.columns;
+        let named = |triad: &[usize; 3]| {
+            let names = triad.map(|k| quoted(&columns.names[k]));
+            format!("[{}]", names.join(", "))
+        };
+        for sensor in Sensor::ALL {
+            for other in columns.others.get(sensor) {
+                let _ = writeln!(text, "# {} could be {}, too", sensor.name(), named(other));
+            }
+        }
+        if columns.by_size && columns.triads.gyro.is_some() {
+            text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
+        }
+        let mut fields = Vec::new();
+        match columns.time {
+            Some(time) => fields.push(format!("time = {}", quoted(&columns.names[time]))),
+            None => text.push_str(
+                "# TODO: no column goes forward like a time: name it, or give sample_period_s.\n",
+            ),
+        }
+        let mut missing = Vec::new();
+        for sensor in Sensor::ALL {
+            match columns.triads.get(sensor) {
+                Some(triad) => fields.push(format!("{} = {}", sensor.name(), named(triad))),
+                None => missing.push(sensor.name()),
+            }
+        }
+        if let Some(temperature) = columns.temperature {
+            fields.push(format!(
+                "temperature = {}",
+                quoted(&columns.names[temperature])
+            ));
+        }
+        let names: Vec<String> = columns.names.iter().map(|name| quoted(name)).collect();
+        for sensor in missing {
+            let _ = writeln!(
+                text,
+                "# TODO: {sensor} = three of {}; no names or numbers showed them",
+                names.join(", ")
+            );
+        }
+        let _ = writeln!(text, "columns = {{ {} }}", fields.join(", "));
+    }
+
+    fn noise_table(&self, text: &mut String) {
+        text.push_str(
+            "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
+        );
+        let random_walk =
+            |sensor| Some(self.noise.get(sensor).as_ref()? / self.quantities.scale(sensor)?.abs());
+        for (sensor, key, unit) in [
+            (
+                Sensor::Gyro,
+                "angle_random_walk_deg_per_sqrt_h",
+                DEG_PER_SQRT_H,
+            ),
+            (
+                Sensor::Accel,
+                "velocity_random_walk_ug_per_sqrt_hz",
+                MICRO_G_PER_SQRT_HZ,
+            ),
+        ] {
+            match random_walk(sensor) {
+                Some(walk) => {
+                    let _ = writeln!(text, "{key} = {}", short(walk / unit));
+                }
+                None => todo(text, key, "the data sheet's figure"),
+            }
+        }
+    }
+
+    fn class(&self) -> &'static Class {
+        let walk = || Some(self.noise.gyro? / self.quantities.scale(Sensor::Gyro)?.abs());
+        let [navigation, tactical, mems] = &CLASSES;
+        match walk() {
+            Some(walk) if walk < navigation.random_walk => navigation,
+            Some(walk) if walk < tactical.random_walk => tactical,
+            _ => mems,
+        }
+    }
+
+    fn prior(&self, text: &mut String, sensor: Sensor) {
+        let (class, unit) = (self.class(), self.quantities.units.get(sensor));
+        let _ = writeln!(
+            text,
+            "\n# usual of {} instrument: check them against the data sheet; N = scale * installation * u + bias\n\
+             [imu.prior.{}]",
+            class.name,
+            sensor.name()
+        );
+        let is_count = unit.word.is_none_or(|word| word == "count");
+        let scale = self.quantities.scale(sensor);
+        match (&unit.scale, is_count) {
+            (Some(scale), _) => line(
+                text,
+                "scale",
+                &format!("{:?}", seven(scale.value)),
+                &scale.why,
+            ),
+            (None, true) => todo(
+                text,
+                "scale",
+                match sensor {
+                    Sensor::Gyro => {
+                        "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, \
+                         32.8, 16.4"
+                    }
+                    Sensor::Accel => {
+                        "counts for one m/s² by the data sheet: those for one g over 9.80665"
+                    }
+                },
+            ),
+            (None, false) => {}
+        }
+        let _ = writeln!(text, "scale_sigma_ppm = {:?}", class.scale_ppm);
+        let _ = writeln!(
+            text,
+            "installation_sigma_arcsec = {:?}",
+            class.installation / ARCSEC
+        );
+        let offset = *self.offset.get(sensor);
+        let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
+        if offset != 0.0 {
+            line(
+                text,
+                "bias",
+                &format!("{:?}", offset * per_second),
+                "what an unsigned register says at zero",
+            );
+        }
+        let usual = match sensor {
+            Sensor::Gyro => class.gyro_bias,
+            Sensor::Accel => class.accel_bias,
+        };
+        let rest = self.rest.filter(|_| sensor == Sensor::Gyro).unwrap_or(0.0) * per_second;
+        match scale {
+            Some(scale) => {
+                let sigma = (usual * scale.abs()).max(2.0 * rest);
+                line(
+                    text,
+                    "bias_sigma",
+                    &format!("{:?}", short(sigma)),
+                    "in the file's unit, per second",
+                );
+            }
+            None => todo(text, "bias_sigma", "in the file's unit, per second"),
+        }
+    }
+
+    fn table(&self, text: &mut String) {
+        if let Some(four) = self.columns.quaternion {
+            let names = four.map(|k| quoted(&self.columns.names[k]));
+            let _ = writeln!(
+                text,
+                "\n# {} are a quaternion. If it is a turntable's, body right-front-up to East-North-Up in the order w, \
+                 x, y, z, give it as [turntable] from the same file; what the instrument itself makes of its attitude \
+                 is none.",
+                names.join(", ")
+            );
+        } else {
+            text.push_str(
+                "\n# With a turntable's log: [turntable] with file, columns, position_sigma_arcsec and \
+                 reading_sigma_arcsec.\n",
+            );
+        }
+    }
+}
+
+fn line(text: &mut String, key: &str, value: &str, why: &str) {
+    let _ = writeln!(text, "{key} = {value}  # {why}");
+}
+
+fn todo(text: &mut String, key: &str, why: &str) {
+    let _ = writeln!(text, "# {key} =  # TODO: {why}");
+}
+
+fn places(count: usize) -> String {
+    if count == 1 {
+        "one place".to_owned()
+    } else {
+        format!("{count} places")
+    }
+}
+
+/// A number to seven digits.
+fn seven(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

@@ -1,0 +1,333 @@
+//! What a row holds, and in which units.
+
+use nalgebra::Vector3;
+
+use super::columns::Columns;
+use super::motion::Motion;
+use super::name::{self, Name};
+use super::time::Clock;
+use crate::formats::Sheet;
+use crate::imu::{Output, PerSensor, Sensor};
+use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
+
+/// Gravity at rest tells units that differ by more than this factor: raw sensors are off by tenths.
+const GRAVITY_FACTOR: f64 = 1.25;
+/// So do turns.
+const TURN_FACTOR: f64 = 1.3;
+/// A measured scale this near to one of a data sheet is that.
+const NEAR: f64 = 0.03;
+/// Sums of pulses vary less than sums of readings by more than this factor.
+const PULSE_SUMS: f64 = 0.5;
+/// Counts for a degree a second that data sheets state.
+const DATA_SHEET: [f64; 16] = [
+    131.0, 65.5, 32.8, 16.4, 131.072, 65.536, 32.768, 16.384, 262.144, 14.375, 114.29, 57.14,
+    28.57, 14.29, 50.0, 20.0,
+];
+
+/// Counts for one of `run.toml`'s units, with the reason.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scale {
+    /// The file's quantity per second for one rad/s or m/s².
+    pub value: f64,
+    pub why: String,
+}
+
+/// What is known of the unit of a triad.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Unit {
+    /// The word for `run.toml`, if it is known.
+    pub word: Option<&'static str>,
+    pub why: String,
+    /// For counts, where something shows it.
+    pub scale: Option<Scale>,
+}
+
+/// What rows hold.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Quantities {
+    pub output: Output,
+    pub output_why: String,
+    pub units: PerSensor<Unit>,
+    /// Whether gyros and accelerometers turn opposite ways.
+    pub opposed: bool,
+}
+
+impl Quantities {
+    pub fn find(
+        sheet: &Sheet,
+        columns: &Columns,
+        clock: &Clock,
+        triads: Option<&PerSensor<Vec<Vector3<f64>>>>,
+        motion: Option<&Motion>,
+    ) -> Self {
+        let mut found = Self {
+            output: Output::Rate,
+            output_why: "as most logs have it".to_owned(),
+            units: PerSensor::default(),
+            opposed: false,
+        };
+        let (Some(triads), Some(motion)) = (triads, motion) else {
+            return found;
+        };
+        let named = PerSensor::from_fn(|sensor| {
+            let first = columns.triads.get(sensor).map(|triad| triad[0])?;
+            Name::of(&sheet.names[first])
+                .unit
+                .or_else(|| name::unit(&sheet.units[first]))
+        });
+        let whole = PerSensor::from_fn(|sensor| {
+            triads
+                .get(sensor)
+                .iter()
+                .all(|sample| sample.iter().all(|value| value.fract() == 0.0))
+        });
+        found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
+        let angle = motion.angle.map(f64::abs);
+        let period = clock.period;
+        found.accelerometers(
+            named.accel,
+            whole.accel,
+            motion.gravity,
+            period,
+            motion.sum_variance,
+        );
+        found.gyros(named.gyro, whole.gyro, angle, period);
+        found
+    }
+
+    /// Rows to rates.
+    pub fn per_second(&self, period: f64) -> f64 {
+        match self.output {
+            Output::Rate => 1.0,
+            Output::Pulse | Output::Increment => period.recip(),
+        }
+    }
+
+    /// The file's quantity per second for one rad/s or m/s², if it is known.
+    pub fn scale(&self, sensor: Sensor) -> Option<f64> {
+        let unit = self.units.get(sensor);
+        unit.scale
+            .as_ref()
+            .map(|scale| scale.value)
+            .or_else(|| crate::formats::unit_scale(sensor, unit.word?))
+    }
+
+    fn accelerometers(
+        &mut self,
+        named: Option<&'static str>,
+        whole: bool,
+        gravity: f64,
+        period: Option<f64>,
+        sum_variance: Option<f64>,
+    ) {
+        let size = format!("{} at rest", short(gravity));
+        let seconds = period.unwrap_or(f64::NAN);
+        let known = [
+            ("m/s^2", Output::Rate, STANDARD_GRAVITY),
+            ("g", Output::Rate, 1.0),
+            ("m/s", Output::Increment, STANDARD_GRAVITY * seconds),
+            ("g*s", Output::Increment, seconds),
+        ];
+        let fits = |expected: f64| {
+            let factor = gravity / expected;
+            factor < GRAVITY_FACTOR && factor > GRAVITY_FACTOR.recip()
+        };
+        let by_name = known.iter().find(|(unit, ..)| Some(*unit) == named);
+        let by_size: Vec<_> = known
+            .iter()
+            .filter(|&&(.., expected)| fits(expected))
+            .collect();
+        let mut unit = Unit::default();
+        match (by_name, by_size.first()) {
+            (Some(&(word, output, expected)), _) => {
+                self.output = output;
+                unit.word = Some(word);
+                unit.why = format!("as the file says; {size}");
+                if !fits(expected) {
+                    unit.why += &format!(", but gravity should be {}", short(expected));
+                }
+            }
+            (None, Some(&&(word, output, _))) if !whole && named.is_none() => {
+                self.output = output;
+                unit.word = Some(word);
+                unit.why = size;
+                for (other, ..) in &by_size[1..] {
+                    unit.why += &format!("; it may as well be {other}");
+                }
+            }
+            _ => {
+                let pulses = whole && sum_variance.is_some_and(|ratio| ratio < PULSE_SUMS);
+                self.output = if pulses { Output::Pulse } else { Output::Rate };
+                unit.word = Some("count");
+                unit.why = match (whole, named) {
+                    (true, _) => "whole numbers".to_owned(),
+                    (false, Some(named)) => {
+                        format!("{named} has no word of its own here: a count with a scale")
+                    }
+                    (false, None) => format!("no known unit makes {size}"),
+                };
+                let per_g = gravity * self.per_second(seconds);
+                unit.scale = per_g.is_finite().then(|| accel_scale(named, per_g));
+            }
+        }
+        self.units.accel = unit;
+        self.output_why = match self.output {
+            Output::Pulse => "whole numbers whose sums vary less than they would if fractions were not carried over".to_owned(),
+            Output::Increment => format!("gravity times {} s a row", short(seconds)),
+            Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
+        };
+    }
+
+    fn gyros(
+        &mut self,
+        named: Option<&'static str>,
+        whole: bool,
+        angle: Option<f64>,
+        period: Option<f64>,
+    ) {
+        let seconds = period.unwrap_or(f64::NAN);
+        // Angle in one row of a unit of it.
+        let known: &[(&'static str, f64)] = match self.output {
+            Output::Rate => &[("rad/s", 1.0), ("deg/s", DEGREE), ("deg/h", DEG_PER_H)],
+            Output::Increment => &[("rad", 1.0), ("deg", DEGREE), ("arcsec", ARCSEC)],
+            Output::Pulse => &[],
+        };
+        let row = if self.output == Output::Rate {
+            seconds
+        } else {
+            1.0
+        };
+        let turns = |unit: f64| angle.map(|angle| angle / (unit * row));
+        let fits =
+            |unit: f64| turns(unit).is_some_and(|f| f < TURN_FACTOR && f > TURN_FACTOR.recip());
+        let by_name = known.iter().find(|(word, _)| Some(*word) == named);
+        let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
+        // Counts per second for one rad/s: rows add up to the angle.
+        let measured = angle
+            .map(|angle| row / angle)
+            .filter(|scale| scale.is_finite());
+        let mut unit = Unit::default();
+        match (by_name, by_turn) {
+            (Some(&(word, value)), _) => {
+                unit.word = Some(word);
+                unit.why = "as the file says".to_owned();
+                match turns(value) {
+                    Some(factor) if !fits(value) => {
+                        unit.why += &format!(", but gravity turns {} times as far", short(factor));
+                    }
+                    Some(_) => unit.why += ", and as gravity turns",
+                    None => {}
+                }
+            }
+            (None, Some(&(word, _))) if !whole => {
+                unit.word = Some(word);
+                unit.why = "gravity turns as far".to_owned();
+            }
+            _ if whole || self.output == Output::Pulse || angle.is_some() || named.is_some() => {
+                unit.word = Some("count");
+                unit.why = match (whole, named) {
+                    (true, _) => "whole numbers".to_owned(),
+                    (false, Some(named)) => {
+                        format!("{named} has no word of its own here: a count with a scale")
+                    }
+                    (false, None) => "no known unit fits the turns of gravity".to_owned(),
+                };
+                unit.scale = match named {
+                    Some("mdps") => Some(Scale {
+                        value: 1e3 / DEGREE,
+                        why: "mdps, as the file says".to_owned(),
+                    }),
+                    _ => measured.map(|value| gyro_scale(value, self.output)),
+                };
+            }
+            _ => unit.why = "nothing turns, so nothing shows it".to_owned(),
+        }
+        self.units.gyro = unit;
+    }
+}
+
+/// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.
+pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
+    let values = || samples.iter().flat_map(|sample| sample.iter().copied());
+    if values().any(|value| value.fract() != 0.0) {
+        return None;
+    }
+    let (low, high) = values().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| {
+        (low.min(v), high.max(v))
+    });
+    let half = [
+        2048.0,
+        8192.0,
+        32_768.0,
+        524_288.0,
+        8_388_608.0,
+        2_147_483_648.0,
+    ]
+    .into_iter()
+    .find(|&half| low >= 0.0 && low < half && high > half && high < 2.0 * half)?;
+    let mean = values().sum::<f64>() / (3 * samples.len()) as f64;
+    ((mean / half - 1.0).abs() < 0.5).then_some(half)
+}
+
+/// Takes the zero of registers from their samples, and says what it is.
+pub(super) fn centre(triads: &mut PerSensor<Vec<Vector3<f64>>>) -> PerSensor<f64> {
+    PerSensor::from_fn(|sensor| {
+        let samples = triads.get_mut(sensor);
+        let zero = offset(samples).unwrap_or(0.0);
+        samples
+            .iter_mut()
+            .for_each(|sample| sample.add_scalar_mut(-zero));
+        zero
+    })
+}
+
+fn accel_scale(named: Option<&str>, per_g: f64) -> Scale {
+    if named == Some("mg") {
+        return Scale {
+            value: 1e3 / STANDARD_GRAVITY,
+            why: "mg, as the file says".to_owned(),
+        };
+    }
+    let power = 2f64.powf(per_g.log2().round());
+    if (per_g / power - 1.0).abs() < NEAR {
+        return Scale {
+            value: power / STANDARD_GRAVITY,
+            why: format!("{power} counts for one g; {} at rest", short(per_g)),
+        };
+    }
+    Scale {
+        value: short(per_g / STANDARD_GRAVITY),
+        why: "from gravity at rest; the data sheet knows better".to_owned(),
+    }
+}
+
+fn gyro_scale(measured: f64, output: Output) -> Scale {
+    let per_degree = measured * DEGREE;
+    let sheet = DATA_SHEET
+        .into_iter()
+        .filter(|_| output == Output::Rate)
+        .min_by(|a, b| {
+            (a / per_degree - 1.0)
+                .abs()
+                .total_cmp(&(b / per_degree - 1.0).abs())
+        })
+        .filter(|sheet| (sheet / per_degree - 1.0).abs() < NEAR);
+    match sheet {
+        Some(sheet) => Scale {
+            value: sheet / DEGREE,
+            why: format!(
+                "{sheet} counts for 1 deg/s; {} by the turns of gravity",
+                short(per_degree)
+            ),
+        },
+        None => Scale {
+            value: short(measured),
+            why: "from the turns of gravity; the data sheet knows better".to_owned(),
+        },
+    }
+}
+
+/// A number to four digits.
+pub(super) fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

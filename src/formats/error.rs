@@ -1,0 +1,114 @@
+//! The one error of this room: where, what was found, what was expected, what to do.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Why a file could not be read or written, in one sentence or a few.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}{place}: {message}", file.display())]
+pub struct FileError {
+    /// The file at fault.
+    pub file: PathBuf,
+    /// Where in the file.
+    pub place: Place,
+    /// What was found, what was expected, what to do.
+    pub message: String,
+}
+
+/// A place in a file; lines and columns count from one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    File,
+    /// A line.
+    Line(u64),
+    /// A line and a character of it.
+    Character {
+        /// Line.
+        line: u64,
+        /// Character in the line.
+        column: u64,
+    },
+    /// A line and a named column of a CSV file.
+    Column {
+        /// Line.
+        line: u64,
+        /// Name in the header.
+        column: String,
+    },
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => Ok(()),
+            Self::Line(line) => write!(f, ", line {line}"),
+            Self::Character { line, column } => write!(f, ", line {line}, column {column}"),
+            Self::Column { line, column } => write!(f, ", line {line}, column `{column}`"),
+        }
+    }
+}
+
+impl FileError {
+    /// An error at a place: `found …, expected …. What to do.`
+    pub(super) fn new(
+        file: &Path,
+        place: Place,
+        found: impl fmt::Display,
+        expected: impl fmt::Display,
+        advice: impl fmt::Display,
+    ) -> Self {
+        Self {
+            file: file.to_owned(),
+            place,
+            message: format!("found {found}, expected {expected}. {advice}"),
+        }
+    }
+
+    /// The system refused to do something with a file.
+    pub(super) fn io(file: &Path, doing: &str, error: &std::io::Error, advice: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            place: Place::File,
+            message: format!("cannot {doing}: {error}. {advice}"),
+        }
+    }
+}
+
+/// The candidate most like a misspelt name, if one is like it at all.
+pub(super) fn nearest<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    candidates
+        .into_iter()
+        .map(|candidate| {
+            let lower = candidate.to_lowercase();
+            (
+                strsim::normalized_damerau_levenshtein(&name, &lower),
+                candidate,
+            )
+        })
+        .filter(|&(likeness, _)| likeness >= 0.5)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// `Did you mean … ?`, or else the advice given.
+pub(super) fn suggestion<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+    otherwise: &str,
+) -> String {
+    nearest(name, candidates).map_or_else(
+        || otherwise.to_owned(),
+        |candidate| format!("Did you mean `{candidate}`?"),
+    )
+}
+
+/// Names in backquotes, separated by commas.
+pub(super) fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let quoted: Vec<String> = names.into_iter().map(|name| format!("`{name}`")).collect();
+    quoted.join(", ")
+}

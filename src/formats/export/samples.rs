@@ -1,0 +1,41 @@
+//! Calibrated samples as a CSV file.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::calibration::Correction;
+use crate::formats::{FileError, write_rows, write_whole_with};
+use crate::recording::nanoseconds;
+use crate::run::Run;
+
+/// Begin and end of a sample, angular rate and specific force along right, front and up.
+pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,\
+                          accel_y_m_s2,accel_z_m_s2";
+
+/// Writes a row a sample, [`HEADER`] first. A row holds means over its sample, so it is itself a record
+/// of `output = "rate"` in `rad/s` and `m/s^2`.
+pub fn sample_rows(file: &mut dyn Write, correction: &Correction, run: &Run) -> io::Result<()> {
+    writeln!(file, "{HEADER}")?;
+    for sample in correction.samples(run) {
+        let [start, end] = [sample.start, sample.end].map(nanoseconds);
+        write!(file, "{start},{end}")?;
+        for value in sample.rate.iter().chain(&sample.force) {
+            write!(file, ",{value:e}")?;
+        }
+        writeln!(file)?;
+    }
+    Ok(())
+}
+
+/// The same into a file, whole or not at all, compressed if its name ends in `.gz`; an existing file is
+/// replaced only with `force`.
+pub fn write_samples(
+    path: &Path,
+    correction: &Correction,
+    run: &Run,
+    force: bool,
+) -> Result<(), FileError> {
+    write_whole_with(path, force, |file| {
+        write_rows(path, file, &|rows| sample_rows(rows, correction, run))
+    })
+}

@@ -1,0 +1,213 @@
+//! The instrument's samples.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+
+use super::axes::BodyAxes;
+use super::clock::{Clock, Stamp, Stamps};
+use super::csv_file::CsvFile;
+use super::error::FileError;
+use super::uniform::Uniform;
+use crate::imu::{Nominal, Output, PerSensor, Sensor};
+use crate::recording::faults::{Repaired, Rows};
+use crate::recording::{ColumnFacts, ImuSamples, LogFacts, TemperatureFacts, stretches_between};
+
+/// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
+const FEWEST_SAMPLES: usize = 100;
+
+/// Which moment of a sample its time stamp names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TimeStamp {
+    Start,
+    Middle,
+    End,
+}
+
+impl TimeStamp {
+    /// The words for it in `run.toml`.
+    pub const WORDS: [(&'static str, Self); 3] = [
+        ("end", Self::End),
+        ("start", Self::Start),
+        ("middle", Self::Middle),
+    ];
+
+    /// From the begin of a sample to its stamp, in samples.
+    pub fn lag(self) -> f64 {
+        match self {
+            Self::Start => 0.0,
+            Self::Middle => 0.5,
+            Self::End => 1.0,
+        }
+    }
+}
+
+/// What `run.toml` says of the file.
+pub(super) struct ImuLog<'a> {
+    pub file: PathBuf,
+    pub clock: Clock<'a>,
+    pub triads: PerSensor<[&'a str; 3]>,
+    pub temperature: Option<&'a str>,
+    pub output: Output,
+    pub axes: BodyAxes,
+    pub stamp: TimeStamp,
+    pub continuous: bool,
+    /// Along right-front-up.
+    pub nominal: PerSensor<Nominal>,
+    /// Largest magnitude of a row's value.
+    pub full_scale: PerSensor<Option<f64>>,
+}
+
+/// What the file holds.
+struct Content {
+    stamps: Vec<(f64, u64)>,
+    /// Gyro x, y, z and accelerometer x, y, z as they stand.
+    columns: [Vec<f64>; 6],
+    /// Rows before each duplicate, and its line.
+    duplicates: Vec<(usize, u64)>,
+    temperature: Option<TemperatureFacts>,
+}
+
+impl ImuLog<'_> {
+    /// Reads the samples, finds what is wrong with them, and bridges it.
+    pub fn read(&self) -> Result<ImuSamples, FileError> {
+        let Content {
+            stamps,
+            columns,
+            duplicates,
+            temperature,
+        } = self.content()?;
+        let clock = Uniform::new(&self.file, &stamps, self.clock.period)?;
+        let period = clock.period;
+        let seconds = match self.output {
+            Output::Pulse | Output::Increment => 1.0,
+            Output::Rate => period,
+        };
+        let body_axes = std::array::from_fn(|column| self.axes.body_axis(column % 3));
+        let sensor = |column: usize| Sensor::ALL[column / 3];
+        let names = [self.triads.gyro, self.triads.accel].concat();
+        let unit = |k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]];
+        let units = std::array::from_fn(unit);
+        let facts = std::array::from_fn(|k| ColumnFacts::of(names[k], &columns[k], units[k]));
+        let rows = Rows {
+            columns,
+            facts: &facts,
+            full_scale: std::array::from_fn(|k| *self.full_scale.get(sensor(k))),
+            body_axes,
+            units,
+            lines: stamps.iter().map(|&(_, line)| line).collect(),
+            numbers: clock.numbers,
+            period,
+            duplicates,
+        };
+        let count = stamps.len() + rows.duplicates.len();
+        let Repaired {
+            columns,
+            faults,
+            bridges,
+        } = rows.repair();
+
+        let samples = PerSensor::from_fn(|sensor| {
+            let nominal = self.nominal.get(sensor).0;
+            let [x, y, z] = std::array::from_fn(|axis| &columns[3 * sensor as usize + axis]);
+            let rows = x.iter().zip(y).zip(z);
+            let sample = |((&x, &y), &z)| {
+                let row = self.axes.vector(Vector3::new(x, y, z));
+                (row * seconds).component_div(&nominal)
+            };
+            rows.map(sample).collect::<Vec<_>>()
+        });
+        let pulse = PerSensor::from_fn(|sensor| match self.output {
+            Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
+            Output::Increment | Output::Rate => 0.0,
+        });
+        let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
+        for (k, facts) in facts.into_iter().enumerate() {
+            of_axes.get_mut(sensor(k))[body_axes[k]] = facts;
+        }
+        Ok(ImuSamples {
+            stretches: stretches_between(
+                samples.gyro.len(),
+                clock.first - self.stamp.lag() * period,
+                period,
+                &faults,
+            ),
+            period,
+            continuous: self.continuous,
+            gyro: samples.gyro,
+            accel: samples.accel,
+            pulse,
+            faults,
+            bridges,
+            log: Some(LogFacts {
+                rows: count,
+                jitter_rms: clock.jitter_rms,
+                jitter_max: clock.jitter_max,
+                columns: of_axes,
+                temperature,
+            }),
+        })
+    }
+
+    fn content(&self) -> Result<Content, FileError> {
+        let mut csv = CsvFile::open(&self.file)?;
+        let mut stamps = self.clock.start(&mut csv)?;
+        let mut places = [0; 6];
+        let names = [self.triads.gyro, self.triads.accel];
+        for (place, name) in places.iter_mut().zip(names.as_flattened()) {
+            *place = csv.column(name)?;
+        }
+        let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
+
+        let mut columns = [const { Vec::new() }; 6];
+        let mut duplicates = Vec::new();
+        let mut temperatures = Vec::new();
+        let mut before = [f64::NAN; 6];
+        while csv.advance()? {
+            let mut row = [0.0; 6];
+            for (value, &place) in row.iter_mut().zip(&places) {
+                *value = self.value(&csv, place)?;
+            }
+            match stamps.look(&csv)? {
+                Stamp::Same if row == before => {
+                    duplicates.push((stamps.of_rows.len(), csv.line()));
+                    continue;
+                }
+                Stamp::Same => return Err(Stamps::same(&csv)),
+                Stamp::Later => before = row,
+            }
+            for (column, value) in columns.iter_mut().zip(row) {
+                column.push(value);
+            }
+            if let Some(place) = temperature {
+                temperatures.push(csv.number(place)?);
+            }
+        }
+        let stamps = stamps.of_rows;
+        if stamps.len() < FEWEST_SAMPLES {
+            return Err(csv.error(
+                format_args!("{} samples", stamps.len()),
+                format_args!("at least {FEWEST_SAMPLES}"),
+                "Record a run with dwells and turns.",
+            ));
+        }
+        Ok(Content {
+            stamps,
+            columns,
+            duplicates,
+            temperature: TemperatureFacts::of(&temperatures),
+        })
+    }
+
+    /// A number of a row as it stands.
+    fn value(&self, csv: &CsvFile, column: usize) -> Result<f64, FileError> {
+        let value = csv.number(column)?;
+        if self.output == Output::Pulse && value.fract() != 0.0 {
+            return Err(csv.not(
+                column,
+                "a whole number of pulses, or output = \"increment\" in run.toml",
+            ));
+        }
+        Ok(value)
+    }
+}

@@ -1,0 +1,285 @@
+//! The instrument as `run.toml` describes it: its record, noise, unit, nominal scale and prior.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::axes::BodyAxes;
+use super::clock::Clock;
+use super::error::FileError;
+use super::fields::{Field, Fields};
+use super::imu_log::{ImuLog, TimeStamp};
+use super::noise_keys::NoiseKeys;
+use super::quantity::{OUTPUTS, units};
+use crate::imu::{
+    GaussMarkov, Instrument, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term, TermVector,
+};
+use crate::units::{ARCSEC, PPM};
+
+/// What `[imu]` and the tables below it say.
+pub(super) struct InstrumentFields<'a> {
+    pub log: ImuLog<'a>,
+    pub known: Instrument,
+}
+
+impl<'a> InstrumentFields<'a> {
+    /// Reads the fields; remarks on those without effect go to `notes`.
+    pub fn of_fields(
+        top: &Fields<'a>,
+        directory: &Path,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, FileError> {
+        let fields = top.need_table(
+            "imu",
+            &[
+                "file",
+                "output",
+                "gyro_unit",
+                "accel_unit",
+                "gyro_full_scale",
+                "accel_full_scale",
+                "time_unit",
+                "sample_period_s",
+                "time_stamp",
+                "continuous",
+                "body_axes",
+                "columns",
+                "noise",
+                "prior",
+                "terms",
+            ],
+            "the instrument and its record",
+        )?;
+        let output = fields
+            .need("output", "what a row holds: pulse, increment or rate")?
+            .choice(&OUTPUTS)?;
+        let axes = match fields.get("body_axes") {
+            Some(field) => field.choice(&BodyAxes::WORDS)?,
+            None => BodyAxes::Rfu,
+        };
+        let columns = fields.need_table(
+            "columns",
+            &["time", "gyro", "accel", "temperature"],
+            "the names of the columns",
+        )?;
+        let temperature = match columns.get("temperature") {
+            Some(field) => {
+                notes.push("The temperature column is read but has no effect yet.".to_owned());
+                Some(field.text()?)
+            }
+            None => None,
+        };
+
+        let clock = Clock::of_fields(&fields, &columns)?;
+        let follow = clock.period.is_some() && top.get("turntable").is_none();
+        if clock.column.is_none() && !follow {
+            return Err(columns.missing(
+                "time",
+                "the name of a column; rows may follow one another without it if sample_period_s is \
+                 given and there is no [turntable]",
+            ));
+        }
+        let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
+
+        let priors = fields.need_table(
+            "prior",
+            &["gyro", "accel"],
+            "what is known of the instrument before calibration",
+        )?;
+        let gyro = triad(&fields, &priors, Sensor::Gyro, output, axes)?;
+        let accel = triad(&fields, &priors, Sensor::Accel, output, axes)?;
+        Ok(Self {
+            log: ImuLog {
+                file: directory.join(fields.need("file", "a file name")?.text()?),
+                clock,
+                triads: PerSensor {
+                    gyro: columns
+                        .need("gyro", "the names of three columns")?
+                        .three_texts()?,
+                    accel: columns
+                        .need("accel", "the names of three columns")?
+                        .three_texts()?,
+                },
+                temperature,
+                output,
+                axes,
+                stamp: fields
+                    .need("time_stamp", "which moment of a sample its time names")?
+                    .choice(&TimeStamp::WORDS)?,
+                continuous: match fields.get("continuous") {
+                    Some(field) => field.flag()?,
+                    None => true,
+                },
+                nominal: PerSensor {
+                    gyro: gyro.nominal,
+                    accel: accel.nominal,
+                },
+                full_scale: PerSensor {
+                    gyro: full_scale("gyro_full_scale")?,
+                    accel: full_scale("accel_full_scale")?,
+                },
+            },
+            known: Instrument {
+                nominal: PerSensor {
+                    gyro: gyro.nominal,
+                    accel: accel.nominal,
+                },
+                unit: PerSensor {
+                    gyro: gyro.unit,
+                    accel: accel.unit,
+                },
+                prior: PerSensor {
+                    gyro: gyro.prior,
+                    accel: accel.prior,
+                },
+                noise: noise(&fields, notes)?,
+                term_sigma: term_sigma(&fields)?,
+            },
+        })
+    }
+}
+
+/// 1σ of the parameters of the terms that `[imu.terms]` switches on.
+fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
+    let mut sigma = TermVector::zeros();
+    let names = Term::ALL.map(Term::name);
+    let Some(terms) = imu.table("terms", &names)? else {
+        return Ok(sigma);
+    };
+    for term in Term::ALL {
+        let meaning = "1σ of each of its parameters";
+        if let Some(fields) = terms.table(term.name(), &["sigma"])? {
+            let given = fields.need("sigma", meaning)?.positive()?;
+            for parameter in term.parameters() {
+                sigma[parameter] = given * term.unit().1;
+            }
+        }
+    }
+    Ok(sigma)
+}
+
+fn noise(imu: &Fields, notes: &mut Vec<String>) -> Result<PerSensor<Noise>, FileError> {
+    let keys = Sensor::ALL.map(NoiseKeys::of);
+    let known = keys.map(|keys| {
+        let (walk, sigma) = (keys.random_walk.0, keys.gauss_markov.0);
+        [walk, sigma, keys.correlation_time, keys.former]
+    });
+    let fields = imu.need_table("noise", known.as_flattened(), "the noise of the instrument")?;
+    let mut triad = |keys: NoiseKeys| {
+        let ((walk, walk_unit), (sigma, sigma_unit)) = (keys.random_walk, keys.gauss_markov);
+        let former = fields
+            .get(keys.former)
+            .filter(|_| fields.get(sigma).is_none());
+        if former.is_some() {
+            notes.push(format!(
+                "imu.noise.{} is read as the 1σ of a Gauss–Markov bias, not as the floor of the Allan \
+                 deviation that data sheets call instability; write {sigma}.",
+                keys.former
+            ));
+        }
+        let time = keys.correlation_time;
+        let gauss_markov = match (fields.get(sigma).or(former), fields.get(time)) {
+            (None, None) => None,
+            (Some(sigma), Some(time)) => Some(GaussMarkov {
+                sigma: sigma.positive()? * sigma_unit,
+                correlation_time: time.positive()?,
+            }),
+            (Some(_), None) => return Err(fields.missing(time, "its correlation time")),
+            (None, Some(_)) => {
+                return Err(fields.missing(sigma, "the 1σ of the Gauss–Markov bias"));
+            }
+        };
+        Ok(Noise {
+            random_walk: fields.need(walk, "a random walk")?.not_negative()? * walk_unit,
+            gauss_markov,
+        })
+    };
+    let [gyro, accel] = keys;
+    Ok(PerSensor {
+        gyro: triad(gyro)?,
+        accel: triad(accel)?,
+    })
+}
+
+/// Unit, nominal scale and prior of a triad, along right-front-up.
+struct TriadKnowledge {
+    unit: String,
+    nominal: Nominal,
+    prior: Prior,
+}
+
+fn triad(
+    imu: &Fields,
+    priors: &Fields,
+    sensor: Sensor,
+    output: Output,
+    axes: BodyAxes,
+) -> Result<TriadKnowledge, FileError> {
+    let unit = imu.need(&format!("{}_unit", sensor.name()), "the unit of a row")?;
+    let unit_scale = unit.choice(units(sensor, output))?;
+    let fields = priors.need_table(
+        sensor.name(),
+        &[
+            "scale",
+            "scale_sigma_ppm",
+            "installation_sigma_arcsec",
+            "bias",
+            "bias_sigma",
+        ],
+        "what is known of this triad before calibration; no σ is invented",
+    )?;
+    let nominal = match (fields.get("scale"), unit_scale) {
+        (Some(field), unit_scale) => {
+            let scale = field.triple()?;
+            check_scale(&field, scale, unit_scale)?;
+            scale
+        }
+        (None, Some(unit_scale)) => Vector3::repeat(unit_scale),
+        (None, None) => {
+            return Err(fields.missing(
+                "scale",
+                "counts per second for one rad/s or m/s², for a count has no size of its own",
+            ));
+        }
+    };
+    let sigma = |name| -> Result<Vector3<f64>, FileError> {
+        let field = fields.need(name, "the 1σ before calibration; none is invented")?;
+        field.positive_triple()
+    };
+    let bias = match fields.get("bias") {
+        Some(field) => field.triple()?,
+        None => Vector3::zeros(),
+    };
+    Ok(TriadKnowledge {
+        unit: unit.text()?.to_owned(),
+        nominal: Nominal(axes.each(nominal)),
+        prior: Prior {
+            scale_sigma: axes.each(sigma("scale_sigma_ppm")?) * PPM,
+            installation_sigma: axes.each(sigma("installation_sigma_arcsec")?) * ARCSEC,
+            bias: axes.vector(bias.component_div(&nominal)),
+            bias_sigma: axes.each(sigma("bias_sigma")?.component_div(&nominal.abs())),
+        },
+    })
+}
+
+/// A scale factor is never zero, and where the unit gives it, never far from that.
+fn check_scale(
+    field: &Field,
+    scale: Vector3<f64>,
+    unit_scale: Option<f64>,
+) -> Result<(), FileError> {
+    if scale.iter().any(|&s| s == 0.0) {
+        return Err(field.error("no zeros", "Give the data sheet's scale factor."));
+    }
+    if let Some(unit_scale) = unit_scale
+        && scale
+            .iter()
+            .any(|s| !(0.5..=2.0).contains(&(s.abs() / unit_scale)))
+    {
+        return Err(field.error(
+            format_args!("about {unit_scale}, which this unit says for one rad/s or m/s²"),
+            "Correct the scale or the unit, or leave the scale out.",
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,33 @@
+//! Files: runs in, calibrations in and out, what other programs read.
+//!
+//! A [`Run`] read here is in SI, on right-front-up body axes and in normalised outputs (see
+//! [`crate::imu::Nominal`]); the files' units and axes end at this door.
+
+mod axes;
+mod calibration_file;
+mod clock;
+mod csv_file;
+pub mod draft;
+pub(crate) mod error;
+pub mod export;
+mod fields;
+mod imu_log;
+mod instrument;
+mod noise_keys;
+mod quantity;
+mod read;
+mod segments;
+mod sheet;
+mod table_log;
+mod uniform;
+mod whole;
+mod write;
+
+pub use error::{FileError, Place};
+pub use noise_keys::NoiseKeys;
+pub(crate) use quantity::unit_scale;
+pub(crate) use sheet::Sheet;
+pub(crate) use whole::write_whole_with;
+pub use whole::{WholeDirectory, abandon_unfinished, write_whole};
+pub(crate) use write::write_rows;
+pub use write::write_run;

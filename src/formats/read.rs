@@ -1,0 +1,186 @@
+//! `run.toml` and the files that it names, as one [`Run`].
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::error::FileError;
+use super::fields::{Document, Fields};
+use super::instrument::InstrumentFields;
+use super::segments;
+use super::table_log::TableLogFile;
+use crate::earth::Site;
+use crate::recording::{Recording, faults};
+use crate::run::{Run, SET_BY_HAND, Standstill};
+use crate::units::{DEGREE, MILLIGAL};
+
+/// The version of the format of `run.toml`.
+pub(super) const FORMAT: &str = "turncal-run/1";
+
+/// Fields of `[meta]`.
+pub(super) const META: [&str; 8] = [
+    "instrument",
+    "serial",
+    "operator",
+    "date",
+    "temperature_degc",
+    "laboratory",
+    "table",
+    "notes",
+];
+
+impl Run {
+    /// Reads `run.toml` and the files that it names, relative to itself.
+    ///
+    /// Everything is checked: every field is known, every number finite and possible, time uniform,
+    /// the files overlap. Samples, nominal scales and priors come back along right-front-up
+    /// whatever `body_axes` says. A bias without a prior mean has the mean zero; no σ has a default.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            FileError::io(path, "read the run", &error, "Give the path of a run.toml.")
+        })?;
+        let document = Document {
+            file: path,
+            text: &text,
+        };
+        let table = document.parse()?;
+        let top = Fields::top(
+            document,
+            &table,
+            &[
+                "format",
+                "site",
+                "meta",
+                "imu",
+                "standstill",
+                "turntable",
+                "segments",
+            ],
+        )?;
+        top.need("format", "the format of this file")?
+            .choice(&[(FORMAT, ())])?;
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let mut notes = Vec::new();
+
+        let site = site(&top)?;
+        let meta = meta(&top)?;
+        let instrument = InstrumentFields::of_fields(&top, directory, &mut notes)?;
+        let standstill = standstill(&top)?;
+        let table_log = TableLogFile::of_fields(&top, directory, &mut notes)?;
+        let (segments_file, segment_sigma) = labels(&top, directory)?.unzip();
+
+        // The small files' fields are checked before the large files are read.
+        let mut files = vec![path.to_owned(), instrument.log.file.clone()];
+        files.extend(table_log.as_ref().map(|log| log.file.clone()));
+        files.extend(segments_file.clone());
+        let imu = instrument.log.read()?;
+        notes.extend(faults::notes(&imu));
+        let accuracy = table_log.as_ref().map(|log| log.accuracy);
+        let table = table_log.map(|log| log.read(&imu)).transpose()?;
+        let segments = match segments_file {
+            Some(file) => {
+                let log = &instrument.log;
+                segments::read(&file, &imu, log.stamp.lag(), log.axes)?
+            }
+            None => Vec::new(),
+        };
+        Ok(Self {
+            recording: Recording {
+                name: name(path),
+                meta,
+                imu,
+                table,
+                segments,
+                files,
+                notes,
+            },
+            instrument: instrument.known,
+            site,
+            table: accuracy.unwrap_or_default(),
+            standstill,
+            segment_sigma: segment_sigma.unwrap_or(SET_BY_HAND),
+        })
+    }
+}
+
+/// The name of the directory of a `run.toml`, else the file's own.
+fn name(path: &Path) -> String {
+    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let named = match full.file_name() {
+        Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),
+        _ => full.file_stem(),
+    };
+    named.map_or_else(
+        || "run".to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+fn site(top: &Fields) -> Result<Site, FileError> {
+    let fields = top.need_table(
+        "site",
+        &[
+            "latitude_deg",
+            "longitude_deg",
+            "height_m",
+            "gravity_m_s2",
+            "gravity_sigma_mgal",
+        ],
+        "the place of the turntable",
+    )?;
+    let latitude = fields
+        .need("latitude_deg", "a latitude, north positive")?
+        .within(-90.0, 90.0)?
+        * DEGREE;
+    let longitude = match fields.get("longitude_deg") {
+        Some(field) => field.within(-180.0, 360.0)? * DEGREE,
+        None => 0.0,
+    };
+    // From the shore of the Dead Sea to above any laboratory.
+    let height = fields
+        .need("height_m", "a height above the ellipsoid")?
+        .within(-500.0, 9000.0)?;
+    let mut site = Site::with_normal_gravity(latitude, longitude, height);
+    if let Some(field) = fields.get("gravity_m_s2") {
+        site = site.with_gravity(field.within(9.7, 9.9)?, 0.0);
+    }
+    if let Some(field) = fields.get("gravity_sigma_mgal") {
+        site.gravity_sigma = field.not_negative()? * MILLIGAL;
+    }
+    Ok(site)
+}
+
+fn meta(top: &Fields) -> Result<BTreeMap<String, String>, FileError> {
+    match top.table("meta", &META)? {
+        Some(fields) => fields
+            .all()
+            .map(|(name, field)| Ok((name.to_owned(), field.as_written()?)))
+            .collect(),
+        None => Ok(BTreeMap::new()),
+    }
+}
+
+/// The file of labelled sections and how well they are set.
+fn labels(top: &Fields, directory: &Path) -> Result<Option<(PathBuf, f64)>, FileError> {
+    let Some(fields) = top.table("segments", &["file", "position_sigma_deg"])? else {
+        return Ok(None);
+    };
+    let file = directory.join(fields.need("file", "a file name")?.text()?);
+    let sigma = match fields.get("position_sigma_deg") {
+        Some(field) => field.positive()? * DEGREE,
+        None => SET_BY_HAND,
+    };
+    Ok(Some((file, sigma)))
+}
+
+fn standstill(top: &Fields) -> Result<Standstill, FileError> {
+    let mut standstill = Standstill::default();
+    if let Some(fields) = top.table("standstill", &["velocity_sigma_m_s", "position_sigma_m"])? {
+        if let Some(field) = fields.get("velocity_sigma_m_s") {
+            standstill.velocity_sigma = Some(field.positive()?);
+        }
+        if let Some(field) = fields.get("position_sigma_m") {
+            standstill.position_sigma = field.positive()?;
+        }
+    }
+    Ok(standstill)
+}

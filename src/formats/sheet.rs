@@ -1,0 +1,47 @@
+//! All columns of a file of rows, as they stand.
+
+use std::path::Path;
+
+use super::FileError;
+use super::csv_file::CsvFile;
+
+/// The columns of a file of which nothing is known yet.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sheet {
+    pub names: Vec<String>,
+    /// What the row below the names says of each, empty without such a row.
+    pub units: Vec<String>,
+    /// NaN where there is no number.
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl Sheet {
+    /// Reads a file that has at least this many rows.
+    pub fn read(path: &Path, fewest: usize) -> Result<Self, FileError> {
+        let mut csv = CsvFile::open(path)?;
+        let names = csv.header().to_vec();
+        let units = match csv.units() {
+            Some(units) => units.to_vec(),
+            None => vec![String::new(); names.len()],
+        };
+        let mut columns = vec![Vec::new(); names.len()];
+        while csv.advance()? {
+            for (index, column) in columns.iter_mut().enumerate() {
+                column.push(csv.number(index).unwrap_or(f64::NAN));
+            }
+        }
+        let rows = columns.first().map_or(0, Vec::len);
+        if rows < fewest {
+            return Err(csv.error(
+                format_args!("{rows} rows"),
+                format_args!("at least {fewest}"),
+                "Record a run with dwells and turns.",
+            ));
+        }
+        Ok(Self {
+            names,
+            units,
+            columns,
+        })
+    }
+}

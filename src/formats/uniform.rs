@@ -1,0 +1,215 @@
+//! The uniform clock behind stamps that are rounded, jitter and lack rows.
+
+use std::path::Path;
+
+use super::error::{FileError, Place};
+use crate::recording::nanoseconds;
+use crate::statistics::median;
+
+/// The uniform clock of increasing stamps.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Uniform {
+    /// Due time of the first sample, s.
+    pub first: f64,
+    /// s
+    pub period: f64,
+    /// The number of each row's sample; the first is 0.
+    pub numbers: Vec<usize>,
+    /// Stamps against due times, s.
+    pub jitter_rms: f64,
+    pub jitter_max: f64,
+}
+
+/// Part of a stamp's difference by which the phase of the clock follows it: little, so that jitter
+/// averages out …
+const PHASE: f64 = 0.02;
+/// … and its period, which makes the loop well damped.
+const PERIOD: f64 = 0.5 * PHASE * PHASE;
+/// A first stamp this near its due time is it, s.
+const EXACT: f64 = 1e-9;
+/// Stamps that give the first phase.
+const FIRST: usize = 50;
+
+impl Uniform {
+    /// Finds the number of each sample, and the clock that all stamps share within half a period.
+    /// There must be at least two stamps.
+    pub fn new(file: &Path, stamps: &[(f64, u64)], given: Option<f64>) -> Result<Self, FileError> {
+        let error = |line, found: String, expected: String, advice: &str| {
+            let place = Place::Line(line);
+            Err(FileError::new(file, place, found, expected, advice))
+        };
+        let first = stamps[0];
+        let found = mean_step(stamps);
+        if let Some(period) = given
+            && (found - period).abs() > 0.5 * period
+        {
+            return error(
+                first.1,
+                format!("steps of {} s from row to row", nanoseconds(found)),
+                format!("sample_period_s = {period} as in run.toml"),
+                "Correct sample_period_s or the time column.",
+            );
+        }
+        let about = given.unwrap_or(found);
+        let gap = |row: usize| {
+            let ((before, _), (time, line)) = (stamps[row - 1], stamps[row]);
+            FileError::new(
+                file,
+                Place::Line(line),
+                format_args!("a gap in time from {before} s to {time} s"),
+                "fewer rows missing than there are",
+                "Correct the clock, or split the record there.",
+            )
+        };
+
+        let mut numbers = numbers(stamps, about, given.is_some()).map_err(gap)?;
+        let (mut first, mut period) = fit(stamps, &numbers, about, given.is_some());
+        // A period that jitter and gaps falsified may have lost count once or twice.
+        if given.is_none() {
+            numbers = self::numbers(stamps, period, false).map_err(gap)?;
+            (first, period) = fit(stamps, &numbers, period, false);
+        }
+
+        // Where nothing is rounded the fit must not be.
+        if (first - stamps[0].0).abs() < EXACT {
+            first = stamps[0].0;
+        }
+        let (mut squares, mut largest) = (0.0, 0.0f64);
+        for (&(time, line), &number) in stamps.iter().zip(&numbers) {
+            let due = first + number as f64 * period;
+            let off = (time - due).abs();
+            if off > 0.5 * period {
+                let (_, found) = fit(stamps, &numbers, period, false);
+                let drift = (found - period).abs() * numbers.len() as f64;
+                if given.is_some() && drift > 0.5 * period {
+                    return error(
+                        line,
+                        format!("a row every {} s", nanoseconds(found)),
+                        format!("sample_period_s = {period} as in run.toml"),
+                        "Correct sample_period_s, or leave it out.",
+                    );
+                }
+                return error(
+                    line,
+                    format!("time {time} s at sample {}", number + 1),
+                    format!("{} s at {period} s a sample", nanoseconds(due)),
+                    "Correct sample_period_s, or resample the record to a uniform clock.",
+                );
+            }
+            squares += off * off;
+            largest = largest.max(off);
+        }
+        Ok(Self {
+            first,
+            period,
+            numbers,
+            jitter_rms: (squares / stamps.len() as f64).sqrt(),
+            jitter_max: largest,
+        })
+    }
+}
+
+/// Number of each sample by steps from row to row, with a clock that follows the stamps slowly; the row
+/// after a gap longer than all rows together if there is one.
+fn numbers(stamps: &[(f64, u64)], about: f64, given: bool) -> Result<Vec<usize>, usize> {
+    let most = 2 * stamps.len();
+    let mut numbers = Vec::with_capacity(stamps.len());
+    numbers.push(0);
+    let (mut number, mut period) = (0, about);
+    let mut due = stamps[0].0 + phase(stamps, about);
+    for (row, &(time, _)) in stamps.iter().enumerate().skip(1) {
+        let step = ((time - due) / period).round().max(1.0);
+        if number as f64 + step > most as f64 {
+            return Err(row);
+        }
+        number += step as usize;
+        numbers.push(number);
+        due += step * period;
+        let off = time - due;
+        due += PHASE * off;
+        if !given {
+            period += PERIOD * off / step;
+        }
+    }
+    Ok(numbers)
+}
+
+/// Rows over which steps are compared: more hide jitter, fewer are seldom without a gap.
+const SPAN: usize = 8;
+/// Spans without a gap are within this part of their median.
+const NO_GAP: f64 = 0.8 / SPAN as f64;
+
+/// Mean step where no row is missing. It is free of the rounding that a single printed step keeps.
+fn mean_step(stamps: &[(f64, u64)]) -> f64 {
+    let span = SPAN.min(stamps.len() - 1);
+    let steps = |stamps: &[(f64, u64)]| (stamps[span].0 - stamps[0].0) / span as f64;
+    let mut sorted: Vec<f64> = stamps.windows(span + 1).map(steps).collect();
+    let median = median(&mut sorted).unwrap_or(f64::NAN);
+    sorted.retain(|step| (step - median).abs() <= NO_GAP * median);
+    sorted.iter().sum::<f64>() / sorted.len() as f64
+}
+
+/// From the first stamp to its due time by the circular mean of the first stamps' phases, which gaps
+/// do not disturb.
+fn phase(stamps: &[(f64, u64)], period: f64) -> f64 {
+    let turn = std::f64::consts::TAU / period;
+    let (sin, cos) = stamps
+        .iter()
+        .take(FIRST)
+        .map(|&(time, _)| ((time - stamps[0].0) * turn).sin_cos())
+        .fold((0.0, 0.0), |(s, c), (sin, cos)| (s + sin, c + cos));
+    f64::atan2(sin, cos) / turn
+}
+
+/// First due time and period by least squares of stamps on sample numbers; with a given period the
+/// first alone.
+fn fit(stamps: &[(f64, u64)], numbers: &[usize], about: f64, given: bool) -> (f64, f64) {
+    let origin = stamps[0].0;
+    let count = stamps.len() as f64;
+    let mean = numbers.iter().map(|&n| n as f64).sum::<f64>() / count;
+    let off = |time: f64, number: usize| time - origin - number as f64 * about;
+    let (mut level, mut slope, mut spread) = (0.0, 0.0, 0.0);
+    for (&(time, _), &number) in stamps.iter().zip(numbers) {
+        let from_mean = number as f64 - mean;
+        level += off(time, number) / count;
+        slope += off(time, number) * from_mean;
+        spread += from_mean * from_mean;
+    }
+    let correction = if given { 0.0 } else { slope / spread };
+    (origin + level - correction * mean, about + correction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uniform(times: impl IntoIterator<Item = f64>) -> Uniform {
+        let stamps: Vec<_> = times.into_iter().zip(2..).collect();
+        Uniform::new(Path::new("imu.csv"), &stamps, None).unwrap()
+    }
+
+    /// An even spread of fractions without a pattern.
+    fn scatter(k: usize) -> f64 {
+        (k as f64 * 0.618_033_988_749_895).fract()
+    }
+
+    #[test]
+    fn stamps_rounded_to_milliseconds_keep_their_rate() {
+        let period = 1.0 / 204.8;
+        let clock = uniform((0..20_000).map(|k| (f64::from(k) * period * 1e3).round() / 1e3));
+        assert_eq!(clock.numbers, (0..20_000).collect::<Vec<_>>());
+        assert!((clock.period / period - 1.0).abs() < 1e-6);
+        assert!((clock.jitter_rms - 1e-3 / 12f64.sqrt()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn rows_are_missing_where_stamps_say_so_in_spite_of_jitter() {
+        let there = |k: &usize| !(k % 37 == 5 || (700..900).contains(k));
+        let kept: Vec<usize> = (0..5000).filter(there).collect();
+        let jitter = |k: usize| 0.9 * (scatter(k) - 0.5);
+        let clock = uniform(kept.iter().map(|&k| 7.0 + 0.01 * (k as f64 + jitter(k))));
+        assert_eq!(clock.numbers, kept);
+        assert!((clock.period - 0.01).abs() < 1e-6, "{}", clock.period);
+        assert!((clock.first - 7.0).abs() < 2e-4, "{}", clock.first);
+    }
+}

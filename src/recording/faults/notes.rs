@@ -1,0 +1,79 @@
+//! Faults in words.
+
+use std::ops::Range;
+
+use super::{Fault, FaultKind};
+use crate::recording::ImuSamples;
+
+/// A sentence for each kind of fault that a record has.
+pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
+    let note = |kind| {
+        let faults: Vec<&Fault> = imu
+            .faults
+            .iter()
+            .filter(|fault| fault.kind == kind)
+            .collect();
+        let first = faults.iter().min_by_key(|fault| fault.samples.start)?;
+        let count: usize = faults.iter().map(|fault| fault.samples.len()).sum();
+        let what = imu.what(kind, faults.iter().copied(), count);
+        let unbridged = faults.iter().filter(|fault| !fault.bridged).count();
+        let done = if kind == FaultKind::Duplicate {
+            "dropped.".to_owned()
+        } else if unbridged == 0 {
+            "bridged by interpolation, whose error is in the σ.".to_owned()
+        } else {
+            format!(
+                "{unbridged} of {} stretches cannot be bridged, and part the record there.",
+                faults.len()
+            )
+        };
+        let place = if kind == FaultKind::Missing {
+            "after"
+        } else {
+            "in"
+        };
+        let time = imu.time(first.samples.start);
+        Some(format!(
+            "{what} (first {place} line {}, {time:.2} s): {done}",
+            first.line
+        ))
+    };
+    FaultKind::ALL.into_iter().filter_map(note).collect()
+}
+
+impl ImuSamples {
+    /// Whether some of these samples are not known.
+    pub fn is_lost(&self, samples: &Range<usize>) -> bool {
+        let lost = |fault: &Fault| {
+            !fault.bridged && fault.samples.start < samples.end && samples.start < fault.samples.end
+        };
+        self.faults.iter().any(lost)
+    }
+
+    /// So many rows or samples, the columns of the latter, and what is wrong with them.
+    fn what<'a>(
+        &self,
+        kind: FaultKind,
+        faults: impl IntoIterator<Item = &'a Fault>,
+        count: usize,
+    ) -> String {
+        let are = if count == 1 { "is" } else { "are" };
+        let plural = if count == 1 { "" } else { "s" };
+        let said = match kind {
+            FaultKind::Duplicate => "there twice",
+            FaultKind::Missing | FaultKind::Saturated | FaultKind::Stuck => kind.name(),
+        };
+        let mut columns: Vec<&str> = Vec::new();
+        for (sensor, axis) in faults.into_iter().filter_map(|fault| fault.axis) {
+            let column = self.log.as_ref().map(|log| &log.columns.get(sensor)[axis]);
+            columns.extend(column.map(|column| column.name.as_str()));
+        }
+        columns.dedup();
+        if columns.is_empty() {
+            format!("{count} row{plural} {are} {said}")
+        } else {
+            let columns = columns.join("`, `");
+            format!("{count} sample{plural} of `{columns}` {are} {said}")
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! From the rows of a file to the samples of a uniform clock.
+
+use std::ops::Range;
+
+use super::interpolation::fill;
+use super::{Bridge, Fault, FaultKind, Found, find};
+use crate::imu::Sensor;
+use crate::recording::ColumnFacts;
+use crate::units::DEGREE;
+
+/// Nothing is known of an axis over a longer time, s.
+const LONGEST: f64 = 2.0;
+/// A hole is short against one that is this many times as long.
+const SHORT: usize = 8;
+/// An attitude that may be wrong by more is beyond a linear filter, rad.
+const WORST_ANGLE: f64 = 0.2 * DEGREE;
+
+/// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
+/// file.
+pub(crate) struct Rows<'a> {
+    pub columns: [Vec<f64>; 6],
+    pub facts: &'a [ColumnFacts; 6],
+    /// In the file's quantity.
+    pub full_scale: [Option<f64>; 6],
+    /// The body axis of each column.
+    pub body_axes: [usize; 6],
+    /// Rad and m/s for one of the file's quantity.
+    pub units: [f64; 6],
+    /// Line of each row.
+    pub lines: Vec<u64>,
+    /// Sample of each row, increasing from zero.
+    pub numbers: Vec<usize>,
+    /// s
+    pub period: f64,
+    /// Rows before each duplicate, and its line.
+    pub duplicates: Vec<(usize, u64)>,
+}
+
+/// The samples, and what was done to have them all.
+pub(crate) struct Repaired {
+    /// As in [`Rows`], a value for each sample.
+    pub columns: [Vec<f64>; 6],
+    pub faults: Vec<Fault>,
+    pub bridges: Vec<Bridge>,
+}
+
+fn sensor(column: usize) -> Sensor {
+    Sensor::ALL[column / 3]
+}
+
+impl Rows<'_> {
+    /// Looks for faults and bridges them.
+    pub fn repair(self) -> Repaired {
+        let found = find(&self.columns, self.facts, &self.full_scale);
+        let mut faults = self.missing();
+        faults.extend(self.duplicates.iter().map(|&(row, line)| Fault {
+            kind: FaultKind::Duplicate,
+            axis: None,
+            samples: self.samples(&(row - 1..row)),
+            line,
+            bridged: true,
+        }));
+        faults.extend(found.iter().map(|Found { kind, column, rows }| Fault {
+            kind: *kind,
+            axis: Some((sensor(*column), self.body_axes[*column])),
+            samples: self.samples(rows),
+            line: self.lines[rows.start],
+            bridged: true,
+        }));
+        faults.sort_by_key(|fault| {
+            let axis = fault.axis.map(|(sensor, axis)| (sensor as usize, axis));
+            (fault.kind as usize, axis, fault.samples.start)
+        });
+
+        let mut bridges = Vec::new();
+        let (numbers, period) = (&self.numbers, self.period);
+        let columns = self.columns.into_iter().enumerate().map(|(k, rows)| {
+            let (sensor, axis) = (sensor(k), self.body_axes[k]);
+            let mut samples = placed(rows, numbers);
+            let concerned = |fault: &Fault| {
+                fault.kind != FaultKind::Duplicate
+                    && fault.axis.is_none_or(|of| of == (sensor, axis))
+            };
+            if !faults.iter().any(concerned) {
+                return samples;
+            }
+            let mut sound = vec![true; samples.len()];
+            for fault in faults.iter().filter(|fault| concerned(fault)) {
+                sound[fault.samples.clone()].fill(false);
+            }
+            let longest = (LONGEST / period) as usize;
+            let mut holes = holes(&sound);
+            holes.sort_by_key(Range::len);
+            let mut filled = 0;
+            for (number, hole) in holes.iter().enumerate() {
+                // Beside a long hole short ones, once filled, are as good as sound.
+                while filled < number && SHORT * holes[filled].len() <= hole.len() {
+                    sound[holes[filled].clone()].fill(true);
+                    filled += 1;
+                }
+                let variance = fill(&mut samples, &sound, hole, longest);
+                let variance = variance.map(|variance| variance * self.units[k].powi(2));
+                let linear =
+                    |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
+                match variance.filter(linear) {
+                    Some(variance) => bridges.push(Bridge {
+                        sensor,
+                        axis,
+                        samples: hole.clone(),
+                        variance,
+                    }),
+                    None => {
+                        let within = |fault: &&mut Fault| {
+                            concerned(fault)
+                                && fault.samples.start < hole.end
+                                && hole.start < fault.samples.end
+                        };
+                        faults
+                            .iter_mut()
+                            .filter(within)
+                            .for_each(|fault| fault.bridged = false);
+                    }
+                }
+            }
+            samples
+        });
+        let columns: Vec<_> = columns.collect();
+        bridges.sort_by_key(|b| (b.sensor as usize, b.axis, b.samples.start));
+        Repaired {
+            columns: columns.try_into().unwrap_or_default(),
+            faults,
+            bridges,
+        }
+    }
+
+    /// The samples of rows that follow one another.
+    fn samples(&self, rows: &Range<usize>) -> Range<usize> {
+        self.numbers[rows.start]..self.numbers[rows.end - 1] + 1
+    }
+
+    fn missing(&self) -> Vec<Fault> {
+        let pairs = self.numbers.windows(2).zip(&self.lines);
+        pairs
+            .filter(|(pair, _)| pair[1] > pair[0] + 1)
+            .map(|(pair, &line)| Fault {
+                kind: FaultKind::Missing,
+                axis: None,
+                samples: pair[0] + 1..pair[1],
+                line,
+                bridged: true,
+            })
+            .collect()
+    }
+}
+
+/// Values of rows at their samples; between them anything.
+fn placed(rows: Vec<f64>, numbers: &[usize]) -> Vec<f64> {
+    let count = numbers.last().map_or(0, |last| last + 1);
+    if count == rows.len() {
+        return rows;
+    }
+    let mut samples = vec![0.0; count];
+    for (value, &number) in rows.into_iter().zip(numbers) {
+        samples[number] = value;
+    }
+    samples
+}
+
+/// Stretches of samples that are not sound.
+fn holes(sound: &[bool]) -> Vec<Range<usize>> {
+    let mut holes: Vec<Range<usize>> = Vec::new();
+    for k in (0..sound.len()).filter(|&k| !sound[k]) {
+        match holes.last_mut() {
+            Some(last) if last.end == k => last.end += 1,
+            _ => holes.push(k..k + 1),
+        }
+    }
+    holes
+}

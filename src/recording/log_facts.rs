@@ -1,0 +1,128 @@
+//! What a log looks like, before anything is made of it.
+
+use crate::imu::PerSensor;
+
+/// The instrument's file in figures, in its own units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogFacts {
+    /// Rows in the file.
+    pub rows: usize,
+    /// RMS of stamps against the uniform clock, s.
+    pub jitter_rms: f64,
+    /// The largest of these differences, s.
+    pub jitter_max: f64,
+    /// The columns that hold each triad's body axes right, front, up, as they stand in the file.
+    pub columns: PerSensor<[ColumnFacts; 3]>,
+    /// The temperature column, if there is one.
+    pub temperature: Option<TemperatureFacts>,
+}
+
+/// One column of samples.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ColumnFacts {
+    /// Its name in the file.
+    pub name: String,
+    /// The smallest value …
+    pub smallest: f64,
+    /// … and how many rows have it.
+    pub at_smallest: usize,
+    /// The largest value …
+    pub largest: f64,
+    /// … and how many rows have it.
+    pub at_largest: usize,
+    /// The step of the grid on which all values lie, if they do.
+    pub step: Option<f64>,
+    /// What one of its unit in a row is, rad or m/s by the nominal scale.
+    pub unit: f64,
+}
+
+/// A column of temperatures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemperatureFacts {
+    /// The smallest value.
+    pub smallest: f64,
+    /// The mean.
+    pub mean: f64,
+    /// The largest value.
+    pub largest: f64,
+}
+
+impl ColumnFacts {
+    /// Of a column that is not empty.
+    pub(crate) fn of(name: &str, values: &[f64], unit: f64) -> Self {
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let ends = values
+            .iter()
+            .fold(ends, |(low, high), &v| (low.min(v), high.max(v)));
+        let count = |end: f64| values.iter().filter(|&&value| value == end).count();
+        Self {
+            name: name.to_owned(),
+            smallest: ends.0,
+            at_smallest: count(ends.0),
+            largest: ends.1,
+            at_largest: count(ends.1),
+            step: grid_step(values),
+            unit,
+        }
+    }
+}
+
+impl TemperatureFacts {
+    /// Of a column; none if it is empty.
+    pub(crate) fn of(values: &[f64]) -> Option<Self> {
+        (!values.is_empty()).then(|| Self {
+            smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
+            mean: values.iter().sum::<f64>() / values.len() as f64,
+            largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        })
+    }
+}
+
+/// Values are on a grid if no difference between two in a row is further than this from a multiple of
+/// its step.
+const OFF_GRID: f64 = 0.05;
+/// A range of more steps is that of a floating-point number, not of a register.
+const MOST_STEPS: f64 = 4_294_967_296.0;
+
+fn grid_step(values: &[f64]) -> Option<f64> {
+    if values.iter().all(|value| value.fract() == 0.0) {
+        return Some(1.0);
+    }
+    let differences = || {
+        let pairs = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        pairs.filter(|&difference| difference > 0.0)
+    };
+    let mut step = differences().reduce(f64::min)?;
+    let mut most = 1.0;
+    for difference in differences() {
+        let steps = (difference / step).round();
+        if steps > MOST_STEPS || (difference / step - steps).abs() > OFF_GRID {
+            return None;
+        }
+        // Values are printed rounded; a long difference tells the step better.
+        if steps > most {
+            (step, most) = (difference / steps, steps);
+        }
+    }
+    Some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_is_seen_through_rounded_digits() {
+        let rounded = |value: f64| (value * 1e9).round() / 1e9;
+        let value = |k: i32| rounded(f64::from(k * k % 201 - 100) / 16.384);
+        let values: Vec<f64> = (0..1000).map(value).collect();
+        let step = ColumnFacts::of("gx", &values, 1.0).step.unwrap();
+        assert!((step * 16.384 - 1.0).abs() < 1e-6, "{step}");
+    }
+
+    #[test]
+    fn a_number_of_all_digits_is_on_no_grid() {
+        let values: Vec<f64> = (0..1000).map(|k| f64::from(k).sin()).collect();
+        assert_eq!(ColumnFacts::of("gx", &values, 1.0).step, None);
+    }
+}

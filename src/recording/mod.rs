@@ -1,0 +1,84 @@
+//! What was recorded: samples of the instrument, readings of the table, labelled sections, and what
+//! their reader found. Data only; what is known of the instrument, the site and the table beforehand is
+//! in [`crate::run`], what is to be estimated in [`crate::calibration`].
+
+pub(crate) mod faults;
+mod log_facts;
+mod samples;
+mod segment;
+
+pub use faults::{Bridge, Fault, FaultKind};
+pub use log_facts::{ColumnFacts, LogFacts, TemperatureFacts};
+pub(crate) use samples::stretches_between;
+pub use samples::{ImuSamples, SampleError, Stretch};
+pub use segment::{LabelledMotion, Segment};
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::turntable::Tilts;
+
+/// One recording of one instrument.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// A short name for titles and file names.
+    pub name: String,
+    /// Instrument, serial, operator and the like, carried into calibration and report.
+    pub meta: BTreeMap<String, String>,
+    /// The instrument's samples.
+    pub imu: ImuSamples,
+    /// The turntable's readings, if there are any.
+    pub table: Option<TableLog>,
+    /// Labelled sections, if there are any.
+    pub segments: Vec<Segment>,
+    /// The files that it was read from; none if it was made.
+    pub files: Vec<PathBuf>,
+    /// What is wrong with the files and was mended, and what they say without effect, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Recording {
+    /// A recording of samples that follow one another without a gap: time in s at which the first
+    /// begins, length of each in s, integrals of the normalised output (see [`crate::imu::Nominal`]) over
+    /// each, rad and m/s along right-front-up.
+    ///
+    /// # Errors
+    /// [`SampleError`] if the triads differ in length, or a number is not finite, or the period not
+    /// positive.
+    pub fn from_samples(
+        name: &str,
+        start: f64,
+        period: f64,
+        gyro: Vec<Vector3<f64>>,
+        accel: Vec<Vector3<f64>>,
+    ) -> Result<Self, SampleError> {
+        Ok(Self {
+            name: name.to_owned(),
+            meta: BTreeMap::new(),
+            imu: ImuSamples::new(start, period, gyro, accel)?,
+            table: None,
+            segments: Vec::new(),
+            files: Vec::new(),
+            notes: Vec::new(),
+        })
+    }
+}
+
+/// What the turntable reads of the attitude of its mounting face, which is the body frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableLog {
+    /// Time of each reading, s.
+    pub time: Vec<f64>,
+    /// Reading `C_b_n`, body to East-North-Up.
+    pub attitude: Vec<Matrix3<f64>>,
+    /// How the attitude turns with tilts of the axes at each reading; empty where it does not tell the
+    /// axes apart.
+    pub tilts: Vec<Tilts>,
+}
+
+/// A time rounded to 1 ns, so that it prints short.
+pub(crate) fn nanoseconds(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
+}

@@ -1,0 +1,204 @@
+//! The instrument's samples.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::{Bridge, Fault, LogFacts};
+use crate::imu::PerSensor;
+
+/// The samples of both triads, at one period, in one stretch or several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImuSamples {
+    /// Length of every sample, s.
+    pub period: f64,
+    /// Stretches in which each sample begins where the one before ended, in order; at least one. Between
+    /// two there is at least one sample, and what lies there is lost.
+    pub stretches: Vec<Stretch>,
+    /// Whether samples follow one another in time as far as is known; if not, they are sections laid
+    /// end to end, and only a labelled section or a dwell is of one piece.
+    pub continuous: bool,
+    /// Integrals of the normalised gyro output over each sample, rad.
+    pub gyro: Vec<Vector3<f64>>,
+    /// Integrals of the normalised accelerometer output over each sample, m/s.
+    pub accel: Vec<Vector3<f64>>,
+    /// One pulse, rad and m/s, where samples are whole pulses; zero otherwise.
+    pub pulse: PerSensor<f64>,
+    /// What was wrong with the file's samples, in order of kind, axis and time.
+    pub faults: Vec<Fault>,
+    /// Interpolated samples, in order of triad, axis and time; those of one axis do not overlap.
+    pub bridges: Vec<Bridge>,
+    /// The file that the samples are from; none if they were made.
+    pub log: Option<LogFacts>,
+}
+
+/// Samples without a break.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// The samples.
+    pub samples: Range<usize>,
+    /// Time at which the first of them begins, s.
+    pub start: f64,
+}
+
+/// Why arrays are no samples.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SampleError {
+    /// Triads of different length.
+    #[error(
+        "{gyro} samples of the gyros and {accel} of the accelerometers; give one of each for every period"
+    )]
+    Lengths {
+        /// Samples of the gyros.
+        gyro: usize,
+        /// Samples of the accelerometers.
+        accel: usize,
+    },
+    /// No samples.
+    #[error("no samples; give integrals of the output over each period")]
+    Empty,
+    /// A number that is not finite.
+    #[error("sample {sample} is not finite; leave it out or split the recording there")]
+    NotFinite {
+        /// The first such sample.
+        sample: usize,
+    },
+    /// A period that is none.
+    #[error("a period of {period} s; give the length of a sample in s, above zero")]
+    Period {
+        /// The period, s.
+        period: f64,
+    },
+}
+
+impl ImuSamples {
+    /// Samples that follow one another without a gap, the first from `start` on, s.
+    ///
+    /// # Errors
+    /// [`SampleError`], as for [`super::Recording::from_samples`].
+    pub fn new(
+        start: f64,
+        period: f64,
+        gyro: Vec<Vector3<f64>>,
+        accel: Vec<Vector3<f64>>,
+    ) -> Result<Self, SampleError> {
+        if gyro.len() != accel.len() {
+            return Err(SampleError::Lengths {
+                gyro: gyro.len(),
+                accel: accel.len(),
+            });
+        }
+        if gyro.is_empty() {
+            return Err(SampleError::Empty);
+        }
+        if !(period > 0.0 && period.is_finite() && start.is_finite()) {
+            return Err(SampleError::Period { period });
+        }
+        let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
+        if let Some(sample) = (0..gyro.len()).find(|&k| !(finite(&gyro[k]) && finite(&accel[k]))) {
+            return Err(SampleError::NotFinite { sample });
+        }
+        Ok(Self::made(start, period, gyro, accel))
+    }
+
+    /// The same of samples that are made, and so are what they should be.
+    pub(crate) fn made(
+        start: f64,
+        period: f64,
+        gyro: Vec<Vector3<f64>>,
+        accel: Vec<Vector3<f64>>,
+    ) -> Self {
+        Self {
+            period,
+            stretches: vec![Stretch {
+                samples: 0..gyro.len(),
+                start,
+            }],
+            continuous: true,
+            gyro,
+            accel,
+            pulse: PerSensor::default(),
+            faults: Vec::new(),
+            bridges: Vec::new(),
+            log: None,
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.gyro.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.gyro.is_empty()
+    }
+
+    /// Time in s at which the first sample begins.
+    pub fn start(&self) -> f64 {
+        self.time(0)
+    }
+
+    /// Time in s at which the last sample ends.
+    pub fn end(&self) -> f64 {
+        self.time(self.len())
+    }
+
+    /// Time in s at which sample `k` begins, or the last of its stretch ended.
+    pub fn time(&self, k: usize) -> f64 {
+        let begun = self.stretches.partition_point(|s| s.samples.start <= k);
+        self.stretches
+            .get(begun.saturating_sub(1))
+            .map_or(0.0, |s| {
+                s.start + (k - s.samples.start) as f64 * self.period
+            })
+    }
+
+    /// The sample edge nearest below a time, as a real number of samples from the first one.
+    pub fn edge(&self, time: f64) -> f64 {
+        let begun = self.stretches.partition_point(|s| s.start <= time);
+        let stretch = self.stretches.get(begun.saturating_sub(1));
+        stretch.map_or(0.0, |s| {
+            s.samples.start as f64 + (time - s.start) / self.period
+        })
+    }
+
+    /// Whether these samples follow one another without a break.
+    pub fn unbroken(&self, samples: &Range<usize>) -> bool {
+        let of_one = |stretch: &Stretch| {
+            stretch.samples.start <= samples.start && samples.end <= stretch.samples.end
+        };
+        self.continuous && self.stretches.iter().any(of_one)
+    }
+
+    /// Time that the samples last, s.
+    pub fn duration(&self) -> f64 {
+        self.len() as f64 * self.period
+    }
+}
+
+/// The stretches of this many samples of a uniform clock between faults that no interpolation bridges.
+pub(crate) fn stretches_between(
+    count: usize,
+    start: f64,
+    period: f64,
+    faults: &[Fault],
+) -> Vec<Stretch> {
+    let unbridged = faults.iter().filter(|fault| !fault.bridged);
+    let mut lost: Vec<Range<usize>> = unbridged.map(|fault| fault.samples.clone()).collect();
+    lost.sort_by_key(|samples| samples.start);
+    lost.push(count..count);
+    let mut stretches = Vec::new();
+    let mut begin = 0;
+    for lost in lost {
+        if lost.start > begin {
+            stretches.push(Stretch {
+                samples: begin..lost.start,
+                start: start + begin as f64 * period,
+            });
+        }
+        begin = begin.max(lost.end);
+    }
+    stretches
+}
