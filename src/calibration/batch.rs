@@ -19,13 +19,12 @@ use super::error::CalibrationError;
 use super::error_term::ErrorTerm;
 use super::estimate::Estimate;
 use super::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
-use super::linearisation::singular;
+use super::linearisation::{Start, singular};
 use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::{
     ParameterMatrix, ParameterVector, from_vector, sensor_and_parameter, to_vector,
 };
-use super::pass::Start;
 use super::problem::{Problem, Stretch};
 use super::schedule::AtRest;
 use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};

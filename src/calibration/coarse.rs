@@ -13,17 +13,10 @@ use nalgebra::Vector3;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::linearisation::{AttitudePrior, Linearisation, singular};
-use super::parameters::{from_vector, to_vector};
 use super::problem::Problem;
 use crate::attitude::exp;
-use crate::imu::{PerSensor, TermVector, Triad};
-use equations::Equations;
+use crate::imu::TermVector;
 use turns::Turned;
-
-/// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
-const STEPS: usize = 6;
-/// A step below this (1 ppm, 0.2″, and as much of rad/s or m/s²) is no step.
-const SMALL: f64 = 1e-6;
 
 /// Where the filter begins.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,23 +123,4 @@ fn enough(problem: &Problem) -> Result<(), CalibrationError> {
         found @ (0 | 1) => Err(CalibrationError::TooFewDwells { found, needed: 2 }),
         _ => Ok(()),
     }
-}
-
-/// Steps from a first point on, each by equations made there, until they are small.
-fn gauss_newton(
-    from: PerSensor<Triad>,
-    equations: impl Fn(&PerSensor<Triad>) -> Result<Equations, CalibrationError>,
-) -> Result<PerSensor<Triad>, CalibrationError> {
-    let mut triads = from;
-    for _ in 0..STEPS {
-        let step = equations(&triads)?.solve();
-        if !step.iter().all(|v| v.is_finite()) {
-            return Err(singular(&from));
-        }
-        triads = from_vector(triads.gyro.form, &(to_vector(&triads) + step));
-        if step.amax() < SMALL {
-            break;
-        }
-    }
-    Ok(triads)
 }

@@ -101,3 +101,16 @@ impl AttitudePrior {
         HEADING_SIGMAS * heading_sigma > HIDDEN
     }
 }
+
+/// Uncertainty at the first sample of a stretch, 1σ, and the mean of its attitude error.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    /// Mean of φ₀, rad.
+    pub attitude: Vector3<f64>,
+    /// East, North and Up, rad.
+    pub attitude_sigma: Vector3<f64>,
+    /// m/s
+    pub velocity_sigma: f64,
+    /// m
+    pub position_sigma: f64,
+}

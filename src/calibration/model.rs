@@ -39,6 +39,8 @@ pub struct Model {
     pub noise: PerSensor<Noise>,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
+    /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
+    pub gravity_sigma: f64,
     /// 1σ per axis of the table's position error, rad; zero without a table.
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
@@ -63,6 +65,7 @@ impl Model {
             prior_sigma: ParameterVector::zeros(),
             noise: run.instrument.noise,
             term_sigma: run.instrument.term_sigma,
+            gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
             geometry: accuracy.geometry,

@@ -1,6 +1,7 @@
 //! An error measured by its covariance, correlations included.
 
-use nalgebra::{DMatrix, DVector, Dyn, SMatrix, SVector, SymmetricEigen};
+use faer::{Mat, Side};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::innovation::mean_square_interval;
 
@@ -41,7 +42,9 @@ pub fn nees<const N: usize>(
 pub(super) struct Directions {
     indices: Vec<usize>,
     sigma: DVector<f64>,
-    eigen: SymmetricEigen<f64, Dyn>,
+    eigenvalues: DVector<f64>,
+    /// Column by column.
+    eigenvectors: DMatrix<f64>,
 }
 
 impl Directions {
@@ -53,26 +56,29 @@ impl Directions {
     ) -> Option<Self> {
         let n = indices.len();
         let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
-        let correlation = DMatrix::from_fn(n, n, |i, j| {
+        let correlation = Mat::from_fn(n, n, |i, j| {
             let (a, b) = (indices[i], indices[j]);
             0.5 * (covariance[(a, b)] + covariance[(b, a)]) / (sigma[i] * sigma[j])
         });
-        if n == 0 || !correlation.iter().all(|r| r.is_finite()) {
+        let finite = |j: usize| (0..n).all(|i| correlation[(i, j)].is_finite());
+        if n == 0 || !(0..n).all(finite) {
             return None;
         }
-        let eigen = SymmetricEigen::try_new(correlation, f64::EPSILON, 1000 * n)?;
-        (eigen.eigenvalues.min() > -NO_DIRECTION).then(|| Self {
+        let eigen = correlation.self_adjoint_eigen(Side::Lower).ok()?;
+        let eigenvalues = DVector::from_fn(n, |k, _| eigen.S().column_vector()[k]);
+        (eigenvalues.min() > -NO_DIRECTION).then(|| Self {
             indices: indices.to_vec(),
             sigma,
-            eigen,
+            eigenvalues,
+            eigenvectors: DMatrix::from_fn(n, n, |i, k| eigen.U()[(i, k)]),
         })
     }
 
     /// Squares of a vector's components along the directions, each in units of its σ.
     fn squares<const N: usize>(&self, v: &SVector<f64, N>) -> Vec<f64> {
         let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
-        let along = self.eigen.eigenvectors.tr_mul(&z);
-        let squares = along.iter().zip(&self.eigen.eigenvalues);
+        let along = self.eigenvectors.tr_mul(&z);
+        let squares = along.iter().zip(&self.eigenvalues);
         squares
             .filter(|(_, variance)| **variance > NO_DIRECTION)
             .map(|(x, variance)| x * x / variance)
@@ -81,13 +87,12 @@ impl Directions {
 
     /// The inverse of the covariance; `None` where it has no inverse.
     pub(super) fn information(&self) -> Option<DMatrix<f64>> {
-        let eigen = &self.eigen;
-        if eigen.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
+        if self.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
             return None;
         }
-        let inverse = DMatrix::from_diagonal(&eigen.eigenvalues.map(f64::recip));
+        let inverse = DMatrix::from_diagonal(&self.eigenvalues.map(f64::recip));
         let scale = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
-        let whitened = &scale * &eigen.eigenvectors;
+        let whitened = &scale * &self.eigenvectors;
         Some(&whitened * inverse * whitened.transpose())
     }
 }

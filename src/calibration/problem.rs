@@ -6,10 +6,9 @@ use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::finding::Finding;
-use super::linearisation::AttitudePrior;
+use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
-use super::pass::Start;
 use super::schedule::{Step, first_reading, steps};
 use super::standstill::velocity_sigma;
 use crate::attitude::to_tilt_and_heading;
@@ -71,15 +70,18 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with another run of the instrument. What is known of the instrument beforehand stays that
-    /// of the first.
+    /// The same with another run of the instrument. What is known of the instrument and of a table
+    /// beforehand stays that of the first; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         let mut others = self.others.clone();
         others.push(run);
+        let mut model = self.model.clone();
+        model.gravity_sigma = model.gravity_sigma.max(run.site.gravity_sigma);
         all.extend(stretches(run, others.len(), &self.model));
         Self {
             others,
+            model,
             stretches: all.into(),
             ..self.clone()
         }

@@ -61,6 +61,9 @@ pub struct Calibration {
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
+    /// Gravity at the site.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<GravityRecord>,
     /// Number of passes over the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
@@ -73,7 +76,7 @@ pub struct Calibration {
     /// What it leaves of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<QualityRecord>,
-    /// What blocks of states beside the triads' parameters did, or would do.
+    /// What error terms did, or would do.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
@@ -110,6 +113,15 @@ pub struct TermRecord {
     /// 1σ; none for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
+}
+
+/// Gravity at the site of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GravityRecord {
+    /// Its magnitude.
+    pub m_s2: f64,
+    /// 1σ, which the scale factors of all three accelerometers share.
+    pub sigma_m_s2: f64,
 }
 
 /// How a calibration was found.
@@ -169,7 +181,7 @@ pub struct QualityRecord {
 /// Departures from gravity and from known turns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MeasuresRecord {
-    /// Size of specific force at rest less gravity.
+    /// Magnitude of specific force at rest minus gravity.
     pub gravity_m_s2: SpreadRecord,
     /// Angle between up as gyros carry it over a turn and as accelerometers see it after.
     pub direction_rad: SpreadRecord,
@@ -188,7 +200,7 @@ pub struct SpreadRecord {
     pub largest: f64,
 }
 
-/// A block of states against the same run without it.
+/// An error term against the same run without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
     /// Its name, such as `accel-second-order`.
@@ -198,7 +210,7 @@ pub struct BlockRecord {
     /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; none where there is
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
-    /// By how much the merit, −2 ln of likelihood and prior, falls with the block.
+    /// By how much the cost, −2 ln of likelihood and prior, falls with it.
     pub merit_gain: f64,
     /// What that stays below in 9999 runs of 10000 where the block's errors are not there.
     pub merit_gain_limit: f64,
@@ -303,6 +315,7 @@ impl Calibration {
             parameters: Vec::new(),
             covariance: Vec::new(),
             terms: BTreeMap::new(),
+            gravity: None,
             passes: None,
             converged: None,
             consistency: None,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::error::{FileError, Place};
 use crate::recording::nanoseconds;
+use crate::statistics::median;
 
 /// The uniform clock of increasing stamps.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,8 +144,7 @@ fn mean_step(stamps: &[(f64, u64)]) -> f64 {
     let span = SPAN.min(stamps.len() - 1);
     let steps = |stamps: &[(f64, u64)]| (stamps[span].0 - stamps[0].0) / span as f64;
     let mut sorted: Vec<f64> = stamps.windows(span + 1).map(steps).collect();
-    let middle = sorted.len() / 2;
-    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let median = median(&mut sorted).unwrap_or(f64::NAN);
     sorted.retain(|step| (step - median).abs() <= NO_GAP * median);
     sorted.iter().sum::<f64>() / sorted.len() as f64
 }

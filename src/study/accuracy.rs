@@ -37,7 +37,7 @@ pub struct AccuracyStudy {
     pub scenario: Scenario,
     /// The filter's installation form; the truth has that of the scenario.
     pub form: InstallationForm,
-    /// Blocks of states whose errors are there and that the filter does not have.
+    /// Error terms that are there and that the filter does not have.
     pub unmodelled: Vec<ErrorTerm>,
     /// Number of runs.
     pub runs: u64,
@@ -85,7 +85,7 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each block of constants beside the parameters that was estimated.
     pub further: Vec<FurtherAccuracy>,
-    /// What each block of states did to the filter in the first run: see [`crate::calibration::test_error_terms`].
+    /// What each error term did to the filter in the first run: see [`crate::calibration::test_error_terms`].
     pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,

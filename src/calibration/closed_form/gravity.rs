@@ -4,7 +4,7 @@ use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
 use super::super::finding::Finding;
 use super::super::problem::Problem;
-use super::{ClosedForm, Reference, remarks};
+use super::result::{ClosedForm, Reference, remarks};
 use crate::imu::PerSensor;
 
 /// Weighted residuals above this times what noise makes are worth a warning.

@@ -11,7 +11,8 @@ use super::super::error::CalibrationError;
 use super::super::finding::Finding;
 use super::super::model::Model;
 use super::super::problem::Problem;
-use super::{ClosedForm, Position, Reference, across, both_triads, remarks};
+use super::least_squares::{Position, across, both_triads};
+use super::result::{ClosedForm, Reference, remarks};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::LabelledMotion;
@@ -133,7 +134,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    use super::super::six_position_triad;
+    use super::super::least_squares::six_position_triad;
     use super::*;
     use crate::attitude::exp;
     use crate::calibration::mean_square_interval;

@@ -4,13 +4,22 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{DMatrix, Vector3};
 
+use super::super::error::CalibrationError;
+use super::super::linearisation::singular;
 use super::super::model::Model;
-use super::super::parameters::{ParameterMatrix, ParameterVector, parameter, to_vector};
+use super::super::parameters::{
+    ParameterMatrix, ParameterVector, from_vector, parameter, to_vector,
+};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::Block;
 
 /// An instrument without noise is still not better than this, rad or m/s: an equation needs a σ.
 const ROUNDING: f64 = 1e-9;
+
+/// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
+const STEPS: usize = 6;
+/// A step below this (1 ppm, 0.2″, and as much of rad/s or m/s²) is no step.
+const SMALL: f64 = 1e-6;
 
 /// Linear equations for the step δθ of the estimated parameters, each row divided by its σ.
 pub(super) struct Equations {
@@ -115,4 +124,23 @@ impl Equations {
         }
         step
     }
+}
+
+/// Steps from a first point on, each by equations made there, until they are small.
+pub(super) fn gauss_newton(
+    from: PerSensor<Triad>,
+    equations: impl Fn(&PerSensor<Triad>) -> Result<Equations, CalibrationError>,
+) -> Result<PerSensor<Triad>, CalibrationError> {
+    let mut triads = from;
+    for _ in 0..STEPS {
+        let step = equations(&triads)?.solve();
+        if !step.iter().all(|v| v.is_finite()) {
+            return Err(singular(&from));
+        }
+        triads = from_vector(triads.gyro.form, &(to_vector(&triads) + step));
+        if step.amax() < SMALL {
+            break;
+        }
+    }
+    Ok(triads)
 }

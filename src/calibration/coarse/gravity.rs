@@ -6,8 +6,7 @@ use super::super::error::CalibrationError;
 use super::super::linearisation::singular;
 use super::super::parameters::from_vector;
 use super::super::problem::Problem;
-use super::equations::Equations;
-use super::gauss_newton;
+use super::equations::{Equations, gauss_newton};
 use crate::imu::{PARAMETERS, PerSensor, Sensor, Triad};
 
 /// The accelerometers that sense `|f| = g` in every dwell, whichever way up; the prior ties down what

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::measurement::Measurement;
 use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::{PerSensor, Sensor, TermVector};
@@ -21,19 +22,6 @@ pub(in crate::calibration) struct Filter {
     p: DMatrix<f64>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-}
-
-/// Uncertainty at the first sample of a stretch, 1σ, and the mean of its attitude error.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::calibration) struct Start {
-    /// Mean of φ₀, rad.
-    pub attitude: Vector3<f64>,
-    /// East, North and Up, rad.
-    pub attitude_sigma: Vector3<f64>,
-    /// m/s
-    pub velocity_sigma: f64,
-    /// m
-    pub position_sigma: f64,
 }
 
 impl Filter {
@@ -73,8 +61,8 @@ impl Filter {
 
     /// A stretch begins: navigation errors and the table's position start anew, `anew` tells whether the
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, as in another recording.
-    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool) {
+    /// 4th ed., §3.8) does, too, as in another recording; `gravity` is its 1σ at another site.
+    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude();
         for axis in 0..3 {
             for (first, mean, sigma) in [
@@ -93,6 +81,9 @@ impl Filter {
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
         self.redraw_table(table_sigma);
+        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+            self.redraw(state, 0.0, sigma);
+        }
         if anew {
             for k in 0..self.varying.len() {
                 let (state, sigma, _) = self.varying[k];
@@ -168,15 +159,17 @@ impl Filter {
             of_triad(sensor, parameter)
         });
         let terms = block.terms.iter().map(|term| term.column.column(0));
+        // Stated gravity that is too small pulls the computed velocity down too little.
+        let t = block.duration;
+        let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
+        let gravity = self.layout.gravity().map(|_| pull);
         // A bias does the same whether it varies or stays.
         let varying = self.layout.varying_biases();
         let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        navigation
-            .chain(parameters)
-            .chain(terms)
-            .chain(varying)
-            .map(|column| std::array::from_fn(|row| column[row]))
-            .collect()
+        let known = navigation.chain(parameters).chain(terms);
+        let known = known.map(|column| std::array::from_fn(|row| column[row]));
+        let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
+        known.chain(gravity).chain(varying).collect()
     }
 
     /// Varying biases forget as time goes by, and are driven.
@@ -381,6 +374,12 @@ impl Filter {
     /// Covariance of two states' errors.
     pub fn covariance(&self, one: usize, other: usize) -> f64 {
         self.p[(one, other)]
+    }
+
+    /// Mean and 1σ of the error of gravity, true − stated; zero where it is no state.
+    pub fn gravity(&self) -> (f64, f64) {
+        let of = |state: usize| (self.x[state], self.p[(state, state)].max(0.0).sqrt());
+        self.layout.gravity().map_or((0.0, 0.0), of)
     }
 
     /// 1σ of the initial attitude error φ₀ of this stretch, East, North and Up.

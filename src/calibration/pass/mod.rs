@@ -19,7 +19,7 @@ use super::schedule::{AtRest, Step};
 use crate::attitude::{exp, from_tilt_and_heading};
 use crate::imu::{PerSensor, TermVector};
 use crate::navigation::{Navigator, State, TermValues};
-pub(super) use filter::{Filter, Start};
+pub(super) use filter::Filter;
 use measurement::Measurement;
 
 /// How a pass treats its estimates and its gate.
@@ -63,6 +63,8 @@ pub(super) struct PassResult {
     pub covariance: ParameterMatrix,
     /// Parameters of error terms and table.
     pub auxiliary: Auxiliary,
+    /// Mean and 1σ of the error of gravity, true − stated, m/s².
+    pub gravity: (f64, f64),
     /// Of the initial attitude of the last stretch.
     pub attitude_covariance: AttitudeCovariance,
     /// 1σ of the initial attitude of the last stretch, East, North and Up.
@@ -118,10 +120,12 @@ pub(super) fn pass(
             Mode::Held(_) => *prior,
         };
         let start = stretch.start(&known, &at.initial_attitudes[number]);
-        let anew = before != Some(stretch.recording);
-        before = Some(stretch.recording);
+        let anew = before.is_none_or(|b: &Stretch| b.recording != stretch.recording);
+        let moved = before.is_none_or(|b: &Stretch| b.run.site != stretch.run.site);
+        before = Some(stretch);
+        let gravity = moved.then_some(stretch.run.site.gravity_sigma);
         let table = model.position_sigma;
-        sums.filter.begin(&start, table, anew);
+        sums.filter.begin(&start, table, anew, gravity);
         let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
         one.run()?;
         sums = one.sums;
@@ -431,6 +435,7 @@ impl Sums {
             estimate,
             covariance: filter.parameter_covariance(),
             auxiliary: auxiliary(filter, &self.at.terms, prior_sigma),
+            gravity: filter.gravity(),
             attitude_covariance,
             attitude_sigma,
             cost: self.cost,

@@ -10,7 +10,7 @@ use turncal::imu::BodyFrame;
 use turncal::imu::InstallationForm;
 use turncal::report::group::Group;
 
-/// Differences are calibration less reference; units are those of the group that a key names.
+/// Differences are calibration minus reference; units are those of the group that a key names.
 #[derive(Serialize)]
 pub(super) struct Document<'a> {
     body_frame: BodyFrame,

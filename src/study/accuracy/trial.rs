@@ -15,7 +15,7 @@ use crate::imu::BodyFrame;
 use crate::imu::{InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 
-/// One run. Errors are estimate less truth; everything is in the general form.
+/// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone)]
 pub struct Trial {
     /// Its number, the stream of its random numbers.
@@ -32,7 +32,7 @@ pub struct Trial {
     pub(super) bound_track: Vec<ParameterVector>,
     /// σ of the bound of constants beside the parameters, zero where they are none.
     pub further_bound: AuxiliaryVector,
-    /// What the blocks of states did to the filter; of the first run only.
+    /// What the error terms did to the filter; of the first run only.
     pub effects: Vec<ErrorTermTest>,
     /// Error of the closed form for each part of its dwells; none where it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,

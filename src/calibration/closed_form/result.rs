@@ -1,0 +1,82 @@
+//! What a closed form gives.
+
+use super::super::estimate::Estimate;
+use super::super::finding::Finding;
+use super::super::model::Model;
+use super::super::parameters::{OBSERVED_BELOW, parameter_name};
+use crate::imu::{BodyFrame, PerSensor};
+
+/// Where the inputs of a closed form are known from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reference {
+    /// Attitudes of the table's log.
+    Table,
+    /// Labels of sections: an axis up, a turn about an axis by an angle.
+    Labels,
+    /// Gravity alone: its magnitude at rest, its direction before and after each turn.
+    Gravity,
+}
+
+impl Reference {
+    /// What fixes the body axes.
+    pub fn body_frame(self) -> BodyFrame {
+        match self {
+            Self::Table | Self::Labels => BodyFrame::Table,
+            Self::Gravity => BodyFrame::Accelerometer,
+        }
+    }
+}
+
+/// A closed-form calibration of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosedForm {
+    /// The estimate; its σ follow from random walk, pulses and how well the inputs are known.
+    pub estimate: Estimate,
+    /// Where the inputs are known from.
+    pub reference: Reference,
+    /// Dwells or labelled positions used for each triad.
+    pub positions: PerSensor<usize>,
+    /// Turns used for the gyros.
+    pub turns: usize,
+    /// Total time of all dwells used, s.
+    pub standing_time: f64,
+    /// What a calibration engineer must know before using the figures.
+    pub findings: Vec<Finding>,
+}
+
+/// Parameters further from their prior than this many of its σ contradict it.
+const CONTRADICTS: f64 = 5.0;
+
+/// Parameters that are hardly better known than before, and those that the prior does not allow, if
+/// there are any.
+pub(super) fn remarks(model: &Model, estimate: &Estimate, reference: Reference) -> Vec<Finding> {
+    let sigma = estimate.sigma();
+    let off = estimate.vector() - model.prior_mean;
+    let far = |&i: &usize| {
+        let prior = model.prior_sigma[i];
+        prior > 0.0 && off[i].abs() > CONTRADICTS * prior.hypot(sigma[i])
+    };
+    let hidden = |&i: &usize| {
+        let prior = model.prior_sigma[i];
+        prior > 0.0 && sigma[i] > OBSERVED_BELOW * prior
+    };
+    let named = |which: &dyn Fn(&usize) -> bool| -> Vec<String> {
+        let those = estimate.estimated().filter(which);
+        let names = those.filter_map(|index| parameter_name(estimate.form(), index));
+        names.collect()
+    };
+    let (far, hidden) = (named(&far), named(&hidden));
+    let far = (!far.is_empty()).then_some(Finding::FarFromPrior {
+        sigmas: CONTRADICTS,
+        parameters: far,
+    });
+    let hidden = (!hidden.is_empty()).then_some(Finding::NotObserved {
+        by: match reference {
+            Reference::Table => "these positions",
+            Reference::Labels => "these sections",
+            Reference::Gravity => "these dwells and moves",
+        },
+        parameters: hidden,
+    });
+    far.into_iter().chain(hidden).collect()
+}
