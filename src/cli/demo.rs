@@ -5,12 +5,12 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use turncal::calibration::{self, ClosedForm, Options, Problem};
-use turncal::report::{self, Report};
+use turncal::report::calibration::{self as of_calibration, Report};
 use turncal::simulation::{Scenario, Simulated};
 
 use super::calibrate::{dwell_times, navigate, note, solve, write_report};
 use super::input::seed;
-use super::output::{Overwrite, print};
+use super::output::{Overwrite, show};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
 
@@ -63,24 +63,27 @@ impl Demo {
             || navigate(run, &methods, Some(&turning.truth)),
         );
         let assessment = assessment?;
+        let mut findings = closed_form.findings.clone();
+        findings.extend(solution.findings(&assessment));
         let report = Report {
             title: "turncal demo",
             run,
             aiding: problem.model.aiding,
             body_frame: problem.model.aiding.body_frame(),
             outcome: solution.outcome(),
+            findings: &findings,
             effects: &assessment.error_terms,
             quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
-            closed_form: Some(report::ClosedForm {
+            closed_form: Some(of_calibration::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
-                findings: &closed_form.findings,
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
+        let document = report.document();
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;
@@ -97,11 +100,11 @@ impl Demo {
         let standing = Problem::new(&standing.run, &Options::default());
         let record = closed_form.record(&standing, &closed_form.quality(&standing)?);
         record.write(&closed.join("calibration.json"), false)?;
-        write_report(&report, &root.join("report"))?;
+        write_report(&document, &root.join("report"))?;
         directory.commit()?;
         drop(activity);
 
-        print(report.summary().as_bytes())?;
+        show(&document, false)?;
         let page = self.output.join("report").join("index.html");
         eprintln!("\nreport: {}", page.display());
         Ok(())

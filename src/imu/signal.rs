@@ -1,4 +1,4 @@
-//! From an ideal output to what a sample of the instrument holds: noise, gauss_markov, pulses.
+//! From an ideal output to what a sample of the instrument holds: noise, Gauss–Markov bias, pulses.
 
 use nalgebra::Vector3;
 use rand::Rng;

@@ -18,6 +18,11 @@ impl Group {
         format!("{} {kind}", self.sensor().name())
     }
 
+    /// Its title with the unit.
+    pub fn titled(self) -> String {
+        format!("{}, {}", self.title(), self.unit())
+    }
+
     /// Such as `gyro K`.
     pub fn short(self) -> String {
         let letter = match self.kind() {
@@ -65,6 +70,12 @@ impl Group {
             ParameterKind::Scale => (value - 1.0) / self.unit_value(),
             ParameterKind::Installation | ParameterKind::Bias => value / self.unit_value(),
         }
+    }
+
+    /// Those of some parameters that are in the group.
+    pub fn among(self, parameters: &[usize]) -> Vec<usize> {
+        let all = parameters.iter().copied();
+        all.filter(|&index| Self::of(index) == self).collect()
     }
 
     /// Largest magnitude and root mean square of some of a vector's entries, in the group's unit;

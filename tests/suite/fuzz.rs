@@ -19,7 +19,7 @@ use turncal::imu::{InstallationForm, Output};
 use turncal::models;
 use turncal::noise::Stretch;
 use turncal::noise::conventions::convert;
-use turncal::report::check::CheckReport;
+use turncal::report::check;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::survey::Survey;
@@ -252,12 +252,9 @@ fn runs_that_make_no_sense_are_looked_at_all_the_same() {
         fuzz(&run, file, |directory| {
             let run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
             let survey = Survey::of(&run);
-            let report = CheckReport {
-                run: &run,
-                survey: &survey,
-            };
-            let _ = report.summary();
-            serde_json::to_string(&report.document()).unwrap();
+            let document = check::document(&run, &survey);
+            let _ = turncal::report::terminal::text(&document, Some(80));
+            let _ = turncal::report::json(&document);
             Ok(())
         })
     });

@@ -1,7 +1,8 @@
 //! What was studied, as pairs of a name and a value.
 
-use super::super::further::title;
+use super::super::document::Facts;
 use super::super::number::{count, minutes, three_digits, value};
+use super::super::terms::title;
 use crate::calibration::ErrorTerm;
 use crate::study::Accuracy;
 use crate::units::DEGREE;
@@ -9,7 +10,7 @@ use crate::units::DEGREE;
 /// Reasons of failure that are shown.
 const REASONS: usize = 3;
 
-pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
+pub(super) fn facts(accuracy: &Accuracy) -> Facts {
     let study = &accuracy.study;
     let scenario = &study.scenario;
     let aiding = if accuracy.table.count > 0 {
@@ -42,7 +43,7 @@ pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
             ),
         ),
         ("aiding", aiding.to_owned()),
-        ("blocks of states", blocks(accuracy)),
+        ("error terms", terms(accuracy)),
         ("table time", table_time(accuracy)),
         ("failures", failures(accuracy)),
     ];
@@ -69,13 +70,11 @@ pub(super) fn facts(accuracy: &Accuracy) -> Vec<(String, String)> {
             ),
         ));
     }
-    rows.into_iter()
-        .map(|(name, value)| (name.to_owned(), value))
-        .collect()
+    Facts::new("The study", rows)
 }
 
-/// Which blocks of states the filter had, and which it should have had.
-fn blocks(accuracy: &Accuracy) -> String {
+/// Which error terms the filter had, and which it should have had.
+fn terms(accuracy: &Accuracy) -> String {
     let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
     let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
     let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
