@@ -29,7 +29,7 @@ pub struct Document {
 pub enum Medium {
     /// On the page, which has room for all.
     Page,
-    /// In a terminal, where a plot takes a line of text.
+    /// In a terminal alone.
     Terminal,
     /// On both.
     Both,

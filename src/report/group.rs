@@ -5,7 +5,7 @@ use crate::calibration::parameter_name;
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
 use crate::units;
 
-pub use crate::calibration::Group;
+pub(super) use crate::calibration::Group;
 
 impl Group {
     /// Such as `gyro scale factor K`.
@@ -90,14 +90,14 @@ impl Group {
 }
 
 /// The end of a parameter's name, such as `x` or `xy`.
-pub fn axis_name(form: InstallationForm, index: usize) -> String {
+pub(super) fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
 }
 
 /// A short name for a figure's margin, such as `gyro E xy`.
-pub fn short_name(form: InstallationForm, index: usize) -> String {
+pub(super) fn short_name(form: InstallationForm, index: usize) -> String {
     format!("{} {}", Group::of(index).short(), axis_name(form, index))
 }
 

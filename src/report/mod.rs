@@ -5,6 +5,22 @@
 //! calibration. A plot is a value, too ([`plot`]), and one renderer draws them all ([`svg`]).
 //!
 //! Nothing is estimated here. What is worked out is what showing needs: differences, units, extremes.
+//!
+//! A figure is added to a result by handing its document one more plot:
+//!
+//! ```
+//! use turncal::report::plot::{Axis, Panel, Plot, Series};
+//! use turncal::report::{Document, svg};
+//!
+//! let roots = (0..50).map(|k| (f64::from(k), f64::from(k).sqrt()));
+//! let panel = Panel::new("square root", Axis::linear("number"), Axis::linear(""))
+//!     .with(Series::line(roots).label("√"));
+//! let plot = Plot::new("roots.svg", "Square roots", (1, 240), [panel]).caption("How roots grow.");
+//! assert!(svg::draw(&plot)?.contains("number"));
+//! let mut document = Document::new("Roots");
+//! document.page(plot);
+//! # Ok::<(), svg::DrawError>(())
+//! ```
 
 pub mod document;
 mod files;
@@ -20,9 +36,10 @@ pub mod calibration;
 pub mod check;
 pub mod comparison;
 pub mod conversion;
+pub mod demo;
 mod effects;
 pub mod experiment;
-pub mod group;
+mod group;
 pub mod navigation;
 mod outlook;
 mod quantity;

@@ -35,15 +35,16 @@ impl Synthetic {
         Report {
             title: "Calibration of a made-up instrument",
             run: &self.run,
-            body_frame: self.run.body_frame(),
+            aiding: self.run.aiding(),
+            body_frame: self.run.aiding().body_frame(),
             outcome: Some(&self.outcome),
+            findings: &self.outcome.findings,
             effects: &[],
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {
                 estimate: &self.closed,
                 note: "six positions for each triad, 60 min of its own",
-                warnings: &[],
             }),
             truth: Some(&self.truth),
             dwells: &self.dwells,
@@ -132,10 +133,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             }));
         }
     }
-    let pass = |live, largest_step, merit, rejected| Pass {
-        live,
+    let pass = |feedback, largest_step, cost, rejected| Pass {
+        feedback,
         largest_step,
-        merit,
+        cost,
         observations: 7200,
         rejected,
     };
@@ -157,11 +158,13 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         estimate: estimate(&truth, &final_sigma, &drawn),
         prior_sigma,
         prior_mean,
-        further: Default::default(),
-        prior_attitude: AttitudePrior {
+        auxiliary: Default::default(),
+        gravity: (run.site.gravity, 0.0),
+        aiding: run.aiding(),
+        prior_attitudes: vec![AttitudePrior {
             mean: Matrix3::identity(),
             sigma: Vector3::repeat(60.0 * ARCSEC),
-        },
+        }],
         attitude_sigma: Vector3::repeat(ARCSEC),
         observability: Observability {
             directions: vec![Direction {
@@ -173,8 +176,8 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         },
         linearised_at: Linearisation {
             triads: truth,
-            further: Default::default(),
-            initial_attitude: Matrix3::identity(),
+            terms: Default::default(),
+            initial_attitudes: vec![Matrix3::identity()],
         },
         passes: vec![
             pass(true, 812.0, 9.1e5, 4),
@@ -183,7 +186,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         ],
         converged: true,
         log_determinant: 0.0,
-        live_history: history(0.8),
+        feedback_history: history(0.8),
         history: history(0.3),
         innovations,
         consistency: Consistency {
@@ -192,10 +195,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             table: nis(1.051, 1197),
         },
         velocity_sigma: 1.2e-5,
-        warnings: vec![
-            "The path turns about z by less than a full turn; gyro K z rests on one move."
+        findings: vec![Finding::Recording {
+            note: "The path turns about z by less than a full turn; gyro K z rests on one move."
                 .to_owned(),
-        ],
+        }],
     };
     let closed = estimate(&truth, &(final_sigma * 40.0), &vector(rng));
     let mission = Mission::standing_level(&run.site, 600);

@@ -110,9 +110,6 @@ mod tests {
         TableLog {
             time: (0..attitude.len()).map(|k| k as f64).collect(),
             attitude,
-            position_sigma: 0.0,
-            reading_sigma: 0.0,
-            geometry: Default::default(),
             tilts: Vec::new(),
         }
     }

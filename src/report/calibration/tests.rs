@@ -151,7 +151,7 @@ fn warnings_stand_before_every_figure_and_text_is_escaped() {
         .find(|(name, _)| name == "index.html")
         .unwrap()
         .1;
-    let warning = page.find(&made_up.outcome.warnings[0]).unwrap();
+    let warning = page.find(&made_up.outcome.findings[0].to_string()).unwrap();
     assert!(warning < page.find("<figure").unwrap());
     assert!(page.contains("&lt;IMU&gt; &amp; co"));
 }
@@ -211,7 +211,7 @@ fn a_closed_form_alone_is_reported() {
 #[test]
 fn a_run_without_a_table_is_reported() {
     let mut made_up = synthetic(InstallationForm::General);
-    made_up.run.table = None;
+    made_up.run.recording.table = None;
     made_up.outcome.feedback_history.clear();
     made_up.outcome.passes.retain(|pass| !pass.feedback);
     let innovations = &mut made_up.outcome.innovations;
@@ -290,7 +290,7 @@ fn a_filter_that_saw_next_to_nothing_is_reported() {
             made_up.outcome.estimate.covariance = ParameterMatrix::zeros();
         }
         made_up.dwells.clear();
-        if let Some(table) = &mut made_up.run.table {
+        if let Some(table) = &mut made_up.run.recording.table {
             table.time.clear();
             table.attitude.clear();
         }

@@ -75,10 +75,6 @@ pub enum Anchor {
     Below,
     /// Its lower right corner: the text is above, to the left.
     AboveLeft,
-    /// Its upper right corner.
-    BelowLeft,
-    /// Its lower left corner.
-    AboveRight,
 }
 
 /// How a line is drawn.

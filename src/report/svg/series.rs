@@ -83,8 +83,6 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
                 Anchor::Above => (HPos::Center, VPos::Bottom),
                 Anchor::Below => (HPos::Center, VPos::Top),
                 Anchor::AboveLeft => (HPos::Right, VPos::Bottom),
-                Anchor::BelowLeft => (HPos::Right, VPos::Top),
-                Anchor::AboveRight => (HPos::Left, VPos::Bottom),
             };
             on.text(text, (x + shift.0, y + shift.1), anchor, color, SMALL)
         }
