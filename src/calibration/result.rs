@@ -18,7 +18,7 @@ pub const FORMAT: &str = "turncal-calibration/1";
 /// The equation of a record.
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
 
-/// The equation of a record with further terms of the instrument.
+/// The equation of a record with error terms of the instrument.
 pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
      to u, zero in test_vectors";
 
@@ -57,7 +57,7 @@ pub struct Calibration {
     /// Covariance of the estimated parameters, in their units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
-    /// Parameters of further terms, such as `accel.second_order.x`, in SI, and errors of the table,
+    /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,

@@ -35,14 +35,14 @@ pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
 
 /// Rows of the table of parameters; errors where `errors` asks for them and the truth states them.
 pub(super) fn rows(
-    further: &Auxiliary,
+    auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
     errors: bool,
 ) -> Vec<Vec<String>> {
-    let posterior = further.sigma();
+    let posterior = auxiliary.sigma();
     let row = |k: usize| {
         let (name, (unit, in_si)) = (auxiliary_name(k)?, unit(AuxiliaryKind::of(k)?.error_term()));
-        let (of, own, prior) = (further.values[k], posterior[k], further.prior_sigma[k]);
+        let (of, own, prior) = (auxiliary.values[k], posterior[k], auxiliary.prior_sigma[k]);
         let truth = truth.get(&name).map(|truth| of - truth.value);
         let mut row = vec![
             name,
@@ -58,7 +58,7 @@ pub(super) fn rows(
         }
         Some(row)
     };
-    further.estimated().filter_map(row).collect()
+    auxiliary.estimated().filter_map(row).collect()
 }
 
 /// Prior over posterior σ, with words where the data did not observe the parameter.

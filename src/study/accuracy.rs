@@ -3,9 +3,9 @@
 //!
 //! Everything is compared in the general form and in the body frame of the table.
 
+mod auxiliary;
 mod baseline;
 mod figures;
-mod further;
 mod navigation;
 mod trial;
 
@@ -24,9 +24,9 @@ use crate::turntable::TableError;
 use figures::{Squares, rms};
 use navigation::Way;
 
+pub use auxiliary::ErrorTermAccuracy;
 pub use baseline::Baseline;
 pub use figures::Figures;
-pub use further::FurtherAccuracy;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
@@ -84,7 +84,7 @@ pub struct Accuracy {
     /// NEES/n over all runs; `None` if no run gave an estimate.
     pub anees: Option<Anees>,
     /// Figures of each block of constants beside the parameters that was estimated.
-    pub further: Vec<FurtherAccuracy>,
+    pub error_terms: Vec<ErrorTermAccuracy>,
     /// What each error term did to the filter in the first run: see [`crate::calibration::test_error_terms`].
     pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
@@ -162,7 +162,7 @@ impl AccuracyStudy {
                 .collect(),
             navigation,
             not_navigated,
-            further: further::figures(&trials),
+            error_terms: auxiliary::figures(&trials),
             effects: trials
                 .first()
                 .map_or_else(Vec::new, |trial| trial.effects.clone()),

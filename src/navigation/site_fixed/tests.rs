@@ -128,7 +128,7 @@ fn transition_of_parameter_errors_is_the_derivative_of_navigation() {
 }
 
 #[test]
-fn transition_of_further_parameters_is_the_derivative_of_navigation() {
+fn transition_of_error_terms_is_the_derivative_of_navigation() {
     let walk = PerSensor::default();
     // As large as precise instruments have them.
     let some = TermVector::from_fn(|k, _| {

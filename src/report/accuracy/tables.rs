@@ -5,7 +5,7 @@ use super::super::number::{count, interval, minutes, or_dash, three_digits, valu
 use super::super::terms::{title, unit};
 use super::compared::{Compared, compared, journey_name, region_name, white_within};
 use crate::calibration::Nis;
-use crate::study::accuracy::{Containment, FurtherAccuracy};
+use crate::study::accuracy::{Containment, ErrorTermAccuracy};
 use crate::study::{Accuracy, Ratio};
 
 const AGAINST_BOUND: [&str; 7] = [
@@ -75,14 +75,14 @@ pub(super) fn bound(accuracy: &Accuracy) -> Table {
 
 /// Auxiliary parameters, term by term.
 pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
-    let row = |of: &FurtherAccuracy| {
-        let (unit, in_si) = unit(of.block);
+    let row = |of: &ErrorTermAccuracy| {
+        let (unit, in_si) = unit(of.term);
         let rms = [of.filter, of.claimed, of.bound];
         let cells = against_bound(rms, in_si, of.ratio.as_ref());
-        [cells![title(of.block), unit], cells].concat()
+        [cells![title(of.term), unit], cells].concat()
     };
     Table::new("Error terms beside K, E and D", AGAINST_BOUND)
-        .section(accuracy.further.iter().map(row))
+        .section(accuracy.error_terms.iter().map(row))
         .note("RMS over all runs and the parameters of a term.")
 }
 
