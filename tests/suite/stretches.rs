@@ -212,7 +212,10 @@ fn two_runs_of_one_instrument_hold_the_information_of_both_in_either_order() {
         let (shift, change) = apart(&joint.estimate, &reverse.estimate);
         // Attitudes are referred to the table's, or level, at the mean so far, which in the first turns of
         // a run knows scale factors no better than the prior: of second order, and of the order of runs.
-        assert!(shift < 0.05 && change < 1e-3, "{aiding:?}: {shift} {change}");
+        assert!(
+            shift < 0.05 && change < 1e-3,
+            "{aiding:?}: {shift} {change}"
+        );
         let truth = first.truth;
         if aiding == Aiding::Table {
             assert_as_accurate_as_claimed(&joint, &to_vector(&truth));
