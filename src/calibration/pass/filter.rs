@@ -131,16 +131,15 @@ impl Filter {
             }
         }
         self.x.as_mut_slice()[..NAVIGATION].copy_from_slice(&x);
-        for constant in NAVIGATION..n {
-            for moving in 0..NAVIGATION {
-                let covariance = rows[constant][moving];
+        for (constant, row) in rows.iter().enumerate().skip(NAVIGATION) {
+            for (moving, &covariance) in row.iter().enumerate() {
                 self.p[(moving, constant)] = covariance;
                 self.p[(constant, moving)] = covariance;
             }
         }
         for (column, sum) in corner.iter().enumerate() {
-            for row in 0..NAVIGATION {
-                self.p[(row, column)] = sum[row] + block.noise[(row, column)];
+            for (row, sum) in sum.iter().enumerate() {
+                self.p[(row, column)] = sum + block.noise[(row, column)];
             }
         }
         self.vary(block.duration);
