@@ -152,6 +152,14 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             largest_step_sigma: last.map_or(f64::NAN, |pass| pass.largest_step),
         });
     }
+    let noise = &outcome.noise;
+    if let Some(test) = noise.test.filter(|test| noise.learnt && test.rejected) {
+        findings.push(Finding::NoiseLearnt {
+            ratio: test.ratio.unwrap_or(f64::NAN),
+            limit: test.ratio_limit,
+            sources: noise.sources.clone(),
+        });
+    }
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();
     let by = "this path";

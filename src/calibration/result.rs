@@ -324,6 +324,7 @@ impl Calibration {
             quality: None,
             blocks: Vec::new(),
             observability: Vec::new(),
+            noise: None,
             warnings: Vec::new(),
             findings: Vec::new(),
             fixed: Vec::new(),

@@ -10,7 +10,7 @@ use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
+    NoisePolicy,     self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
     Solution, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};

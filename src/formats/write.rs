@@ -9,7 +9,7 @@ use flate2::{Compression, GzBuilder};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use super::error::{FileError, Place, list, suggestion};
-use super::noise_keys::NoiseKeys;
+use crate::imu::NoiseKeys;
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use crate::calibration::Calibration;

@@ -12,6 +12,7 @@ mod likelihood_ratio;
 mod policy;
 mod replay;
 mod report;
+mod run_toml;
 mod source;
 
 pub(super) use learn::{Learnt, learn};
