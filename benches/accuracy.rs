@@ -4,7 +4,7 @@
 //! `turncal study accuracy`.
 
 use turncal::imu::InstallationForm;
-use turncal::report::accuracy::summary;
+use turncal::report::{accuracy, terminal};
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         runs: RUNS,
         seed: SEED,
     };
-    print!("{}", summary(&study.run(&|| {})?));
+    let document = accuracy::document(&study.run(&|| {})?);
+    print!("{}", terminal::text(&document, None));
     Ok(())
 }

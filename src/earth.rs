@@ -5,6 +5,8 @@
 
 use nalgebra::Vector3;
 
+use crate::units::MILLIGAL;
+
 /// Semi-major axis in m.
 pub const SEMI_MAJOR_AXIS: f64 = 6_378_137.0;
 /// Flattening.
@@ -100,16 +102,32 @@ pub struct Site {
     pub height: f64,
     /// Magnitude of gravity in m/s², plumb-line gravity with its centrifugal part.
     pub gravity: f64,
+    /// Its 1σ in m/s². The scale factors of all three accelerometers share what it is wrong by.
+    pub gravity_sigma: f64,
 }
 
+/// 1σ by which gravity at a place departs from normal gravity, m/s²: 30 mGal. Free-air anomalies have an
+/// RMS of 30 to 40 mGal over the Earth (Torge, *Gravimetry*, §2.1).
+pub const ANOMALY_SIGMA: f64 = 30.0 * MILLIGAL;
+
 impl Site {
-    /// A site with normal gravity.
+    /// A site with normal gravity, known to within the usual anomaly.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
             latitude,
             longitude,
             height,
             gravity: normal_gravity(latitude, height),
+            gravity_sigma: ANOMALY_SIGMA,
+        }
+    }
+
+    /// The same site with a measured gravity and its 1σ, m/s².
+    pub fn with_gravity(self, gravity: f64, sigma: f64) -> Self {
+        Self {
+            gravity,
+            gravity_sigma: sigma,
+            ..self
         }
     }
 

@@ -1,5 +1,5 @@
 //! Constants that are estimated beside scale factors, installation and biases: errors of the table's
-//! own geometry, then parameters of the instrument's further terms.
+//! own geometry, then parameters of the instrument's error terms.
 
 use nalgebra::{SMatrix, SVector};
 

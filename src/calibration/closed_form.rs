@@ -9,7 +9,11 @@ mod result;
 mod table;
 
 use super::error::CalibrationError;
+use super::estimate::Estimate;
+use super::parameters::parameter;
 use super::problem::Problem;
+use crate::earth::Site;
+use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
 pub use least_squares::{Position, six_position_triad};
 pub use result::{ClosedForm, Reference};
@@ -41,12 +45,24 @@ pub(super) fn six_position_by(
     reference: Reference,
     problem: &Problem,
 ) -> Result<ClosedForm, CalibrationError> {
-    match reference {
+    let mut closed_form = match reference {
         Reference::Table => {
             let dwells: Vec<Dwell> = problem.dwells().cloned().collect();
             six_position_of(problem, &dwells)
         }
         Reference::Labels => labels::by_labels(problem),
         Reference::Gravity => gravity::by_gravity(problem),
-    }
+    }?;
+    share_gravity(&mut closed_form.estimate, &problem.run().site);
+    Ok(closed_form)
+}
+
+/// The accelerometers were told by gravity, so its error is in their scale factors, the same part in all
+/// three.
+fn share_gravity(estimate: &mut Estimate, site: &Site) {
+    let part = (site.gravity_sigma / site.gravity).powi(2);
+    let scale = estimate.triads.accel.scale;
+    let first = parameter(Sensor::Accel, 0);
+    let mut of_scale = estimate.covariance.fixed_view_mut::<3, 3>(first, first);
+    of_scale += scale * scale.transpose() * part;
 }

@@ -47,12 +47,12 @@ impl Comparison {
     }
 }
 
-/// A calibration less the reference.
+/// A calibration minus the reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
     /// The calibration.
     pub calibration: Canonical,
-    /// Calibration less reference, normalised: scale factors relative, angles pure numbers, biases in
+    /// Calibration minus reference, normalised: scale factors relative, angles pure numbers, biases in
     /// rad/s or m/s².
     pub difference: ParameterVector,
     /// 1σ of the difference, as if both came of different data; none where a side claims no σ.

@@ -18,8 +18,8 @@ pub struct Correction {
     pub matrix: PerSensor<Matrix3<f64>>,
     /// `D`, the file's quantity per second.
     pub bias: PerSensor<Vector3<f64>>,
-    /// Parameters `q` of further terms, in SI; zero where the record has none.
-    pub further: TermVector,
+    /// Parameters `q` of error terms, in SI; zero where the record has none.
+    pub terms: TermVector,
 }
 
 /// One sample, calibrated, along right, front and up of the calibration's body frame.
@@ -109,7 +109,7 @@ impl Correction {
                 .filter(|_| volume.abs() > SMALLEST_VOLUME);
             inverse.ok_or(CorrectionError::Singular(sensor))
         };
-        let mut further = TermVector::zeros();
+        let mut terms = TermVector::zeros();
         for (name, term) in &record.terms {
             if name.starts_with("table.") {
                 continue;
@@ -117,7 +117,7 @@ impl Correction {
             let known =
                 (0..TERM_PARAMETERS).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
             let known = known.ok_or_else(|| CorrectionError::UnknownTerm(name.clone()))?;
-            further[known] = term.value;
+            terms[known] = term.value;
         }
         Ok(Self {
             matrix: PerSensor {
@@ -126,7 +126,7 @@ impl Correction {
             },
             bias: PerSensor::from_fn(|sensor| Vector3::from(triad_record(record, sensor).bias)),
             sensitivity,
-            further,
+            terms,
         })
     }
 
@@ -163,9 +163,9 @@ impl Correction {
         Ok(correction)
     }
 
-    /// Parameters of further terms that are not zero.
+    /// Parameters of error terms that are not zero.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..TERM_PARAMETERS).filter(|&k| self.further[k] != 0.0)
+        (0..TERM_PARAMETERS).filter(|&k| self.terms[k] != 0.0)
     }
 
     /// Whether it has a parameter of a term.
@@ -175,7 +175,7 @@ impl Correction {
 
     /// The samples of a run, one after the other.
     ///
-    /// Further terms respond to the calibrated sample itself. The angular acceleration that the size
+    /// Error terms respond to the calibrated sample itself. The angular acceleration that the size
     /// effect asks for is the difference of the rates before and after; where the record is not
     /// continuous it is taken for zero. The time offset asks for the rate over the Earth and gets the
     /// inertial one: 10 ms times Earth rate is 0.7 µg.
@@ -232,7 +232,7 @@ impl Correction {
                 force: u.accel,
             };
             u = PerSensor::from_fn(|sensor| {
-                of_triads.get(sensor) - sensed.added(sensor, &self.further)
+                of_triads.get(sensor) - sensed.added(sensor, &self.terms)
             });
         }
         u

@@ -195,8 +195,9 @@ impl fmt::Display for Finding {
                 ..
             } => write!(
                 f,
-                "The data show {term}: NIS {nis_without:.3} without it, {nis_with:.3} with it. \
-                 Calibrate again with --with {term}."
+                "The data show errors that are not modelled. Of the error terms that are off, {term} \
+                 would explain most (NIS {nis_without:.2} → {nis_with:.2}): use --with {term}, then look \
+                 again."
             ),
             Self::FarFromPrior { sigmas, parameters } => write!(
                 f,

@@ -73,6 +73,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         prior_attitudes: priors,
         attitude_sigma: held.attitude_sigma,
         auxiliary: held.auxiliary,
+        gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
         linearised_at: held.at,
         converged,
         log_determinant: held.log_determinant,

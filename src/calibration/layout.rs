@@ -8,7 +8,8 @@
 //! | position | 3 | δp = computed − true, East-North-Up, m |
 //! | parameters | up to 24 | δθ = true − estimated, see [`super::parameters`]; those that form and body frame leave free |
 //! | error terms | one for each parameter that is on | true − estimated, see [`crate::imu::Term`] |
-//! | bias variation | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
+//! | gravity | 1 | true − stated magnitude of gravity, m/s²; where it has a σ |
+//! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
 //! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
@@ -37,6 +38,8 @@ pub(super) struct Layout {
     parameters: Vec<usize>,
     /// The parameter of the error terms that each of the states after them is.
     terms: Vec<usize>,
+    /// Whether gravity's error is a state.
+    gravity: bool,
     /// Triad and axis of each bias that varies.
     varying: Vec<(Sensor, usize)>,
     /// Whether the table's position error is a state.
@@ -57,6 +60,7 @@ impl Layout {
             terms: (0..TERM_PARAMETERS)
                 .filter(|&k| model.term_sigma[k] > 0.0)
                 .collect(),
+            gravity: model.gravity_sigma > 0.0,
             varying: triads
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
                 .collect(),
@@ -83,13 +87,18 @@ impl Layout {
         placed(self.terms_begin(), &self.terms)
     }
 
+    /// Error of gravity, if it is a state.
+    pub fn gravity(&self) -> Option<usize> {
+        self.gravity.then(|| self.gravity_begin())
+    }
+
     /// State, triad and index of the constant part among the triad's parameters of each varying bias.
     pub fn varying_biases(&self) -> impl Iterator<Item = (usize, Sensor, usize)> + '_ {
         let states = placed(self.varying_begin(), &self.varying);
         states.map(|(state, (sensor, axis))| (state, sensor, PER_TRIAD - 3 + axis))
     }
 
-    /// The states that drive the navigation errors: parameters, error terms, varying biases.
+    /// The states that drive the navigation errors: parameters, error terms, gravity, varying biases.
     pub fn driving(&self) -> Range<usize> {
         NAVIGATION..self.table_begin()
     }
@@ -124,8 +133,12 @@ impl Layout {
         NAVIGATION + self.parameters.len()
     }
 
-    fn varying_begin(&self) -> usize {
+    fn gravity_begin(&self) -> usize {
         self.terms_begin() + self.terms.len()
+    }
+
+    fn varying_begin(&self) -> usize {
+        self.gravity_begin() + usize::from(self.gravity)
     }
 
     fn table_begin(&self) -> usize {

@@ -45,6 +45,8 @@ pub struct Model {
     pub velocity_sigma: Option<f64>,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
+    /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
+    pub gravity_sigma: f64,
     /// 1σ per axis of the table's position error, rad; zero without a table.
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
@@ -80,6 +82,7 @@ impl Model {
             motion_noise: PerSensor::default(),
             velocity_sigma: None,
             term_sigma: run.instrument.term_sigma,
+            gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
             geometry: accuracy.geometry,

@@ -35,6 +35,8 @@ pub struct Outcome {
     pub attitude_sigma: Vector3<f64>,
     /// Errors of the table's geometry and parameters of the instrument's error terms.
     pub auxiliary: Auxiliary,
+    /// Gravity and its 1σ after the run, m/s².
+    pub gravity: (f64, f64),
     /// What the run showed of the parameters and what it left as it was.
     pub observability: Observability,
     /// Where the last pass linearised.

@@ -71,15 +71,18 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with another run of the instrument. What is known of the instrument beforehand stays that
-    /// of the first.
+    /// The same with another run of the instrument. What is known of the instrument and of a table
+    /// beforehand stays that of the first; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         let mut others = self.others.clone();
         others.push(run);
+        let mut model = self.model.clone();
+        model.gravity_sigma = model.gravity_sigma.max(run.site.gravity_sigma);
         all.extend(stretches(run, others.len(), &self.model));
         Self {
             others,
+            model,
             stretches: all.into(),
             ..self.clone()
         }

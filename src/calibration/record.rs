@@ -17,8 +17,8 @@ use super::problem::Problem;
 use super::quality::{Measures, Quality, Spread};
 use super::result::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FindingRecord, MeasuresRecord, Method, NisRecord, NoiseRecord, QualityRecord, SpreadRecord, TermRecord,
-    TestVector, TriadRecord,
+    FindingRecord, GravityRecord, MeasuresRecord, Method, NisRecord, NoiseRecord, QualityRecord,
+    SpreadRecord, TermRecord, TestVector, TriadRecord,
 };
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
@@ -53,6 +53,10 @@ impl Outcome {
                 true => EQUATION_WITH_TERMS.to_owned(),
                 false => EQUATION.to_owned(),
             }),
+            gravity: Some(GravityRecord {
+                m_s2: self.gravity.0,
+                sigma_m_s2: self.gravity.1,
+            }),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
@@ -73,6 +77,10 @@ impl ClosedForm {
         Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::SixPosition),
+            gravity: Some(GravityRecord {
+                m_s2: problem.run().site.gravity,
+                sigma_m_s2: problem.run().site.gravity_sigma,
+            }),
             warnings: texts(&self.findings),
             findings: self.findings.iter().map(FindingRecord::from).collect(),
             ..self

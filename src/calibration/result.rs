@@ -19,7 +19,7 @@ pub const FORMAT: &str = "turncal-calibration/1";
 /// The equation of a record.
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
 
-/// The equation of a record with further terms of the instrument.
+/// The equation of a record with error terms of the instrument.
 pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
      to u, zero in test_vectors";
 
@@ -58,10 +58,13 @@ pub struct Calibration {
     /// Covariance of the estimated parameters, in their units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
-    /// Parameters of further terms, such as `accel.second_order.x`, in SI, and errors of the table,
+    /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
+    /// Gravity at the site.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<GravityRecord>,
     /// Number of passes over the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
@@ -74,7 +77,7 @@ pub struct Calibration {
     /// What it leaves of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<QualityRecord>,
-    /// What blocks of states beside the triads' parameters did, or would do.
+    /// What error terms did, or would do.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
@@ -125,6 +128,15 @@ pub struct TermRecord {
     /// 1σ; none for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
+}
+
+/// Gravity at the site of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GravityRecord {
+    /// Its magnitude.
+    pub m_s2: f64,
+    /// 1σ, which the scale factors of all three accelerometers share.
+    pub sigma_m_s2: f64,
 }
 
 /// How a calibration was found.
@@ -184,7 +196,7 @@ pub struct QualityRecord {
 /// Departures from gravity and from known turns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MeasuresRecord {
-    /// Size of specific force at rest less gravity.
+    /// Magnitude of specific force at rest minus gravity.
     pub gravity_m_s2: SpreadRecord,
     /// Angle between up as gyros carry it over a turn and as accelerometers see it after.
     pub direction_rad: SpreadRecord,
@@ -203,7 +215,7 @@ pub struct SpreadRecord {
     pub largest: f64,
 }
 
-/// A block of states against the same run without it.
+/// An error term against the same run without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
     /// Its name, such as `accel-second-order`.
@@ -213,7 +225,7 @@ pub struct BlockRecord {
     /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; none where there is
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
-    /// By how much the merit, −2 ln of likelihood and prior, falls with the block.
+    /// By how much the cost, −2 ln of likelihood and prior, falls with it.
     pub merit_gain: f64,
     /// What that stays below in 9999 runs of 10000 where the block's errors are not there.
     pub merit_gain_limit: f64,
@@ -318,6 +330,7 @@ impl Calibration {
             parameters: Vec::new(),
             covariance: Vec::new(),
             terms: BTreeMap::new(),
+            gravity: None,
             passes: None,
             converged: None,
             consistency: None,

@@ -26,7 +26,7 @@ pub struct ParameterScatter {
     pub index: usize,
     /// Number of calibrations that entered.
     pub count: usize,
-    /// Mean less the reference's value, weighted by 1/σ²; not weighted without σ.
+    /// Mean minus the reference's value, weighted by 1/σ²; not weighted without σ.
     pub mean: f64,
     /// 1σ of the weighted mean by the claimed σ.
     pub mean_sigma: Option<f64>,

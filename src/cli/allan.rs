@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use turncal::noise::{NoiseAnalysis, Stretch};
-use turncal::report::allan::AllanReport;
+use turncal::report::allan;
 use turncal::run::Run;
 
 use super::input::run_file;
@@ -45,14 +45,6 @@ impl Allan {
         let activity = Activity::new("identifying noise");
         let analysis = NoiseAnalysis::new(&run, stretch);
         drop(activity);
-        let report = AllanReport {
-            run: &run.recording.name,
-            analysis: &analysis,
-        };
-        begun.deliver(
-            |directory| report.write(directory),
-            || report.document(),
-            || report.summary(),
-        )
+        begun.deliver(&allan::document(&run.recording.name, &analysis))
     }
 }

@@ -10,17 +10,18 @@ use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    NoisePolicy,     self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
-    Solution, in_body_frame, triads_of,
+    self, Calibration, CalibrationError, ClosedForm, Estimate, NoisePolicy, Options, Problem,
+    Reference, Solution, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
-use turncal::report::{self, Navigated, Report};
+use turncal::report::Document;
+use turncal::report::calibration::{self as of_calibration, Navigated, Report};
 use turncal::run::Run;
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
 use super::error_term::TermArgument;
 use super::input::run_file;
-use super::output::{Overwrite, print};
+use super::output::{Overwrite, print, show};
 use super::progress::Activity;
 
 /// Estimates scale factors, installation and biases of a run
@@ -223,6 +224,7 @@ impl Calibrate {
         );
         let assessment = assessment?;
         let calibration = solution.calibration(&problem, &assessment);
+        let findings = solution.findings(&assessment);
         let note = solution.closed_form().map(note).unwrap_or_default();
         let dwells = dwell_times(&problem);
         let report = Report {
@@ -231,31 +233,32 @@ impl Calibrate {
             aiding: problem.model.aiding,
             body_frame: calibration.body_frame,
             outcome: solution.outcome(),
+            findings: &findings,
             effects: &assessment.error_terms,
             quality: Some(&assessment.quality),
             true_terms: &true_terms,
             closed_form: solution
                 .closed_form()
-                .map(|closed_form| report::ClosedForm {
+                .map(|closed_form| of_calibration::ClosedForm {
                     estimate: &closed_form.estimate,
                     note: &note,
-                    findings: &closed_form.findings,
                 }),
             truth: truth_in_form.as_ref(),
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
+        let document = report.document();
         activity.next("writing");
         if let Some(directory) = directory {
             calibration.write(&directory.path().join("calibration.json"), false)?;
-            write_report(&report, &directory.path().join("report"))?;
+            write_report(&document, &directory.path().join("report"))?;
             directory.commit()?;
         }
         drop(activity);
         if self.json {
             print(&calibration.to_json(Path::new("standard output"))?)?;
         } else {
-            print(report.summary().as_bytes())?;
+            show(&document, false)?;
         }
         if let Some(target) = target.filter(|_| !self.json) {
             let page = target.join("report").join("index.html");
@@ -325,10 +328,10 @@ pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
 }
 
 /// Writes a report into a new directory.
-pub fn write_report(report: &Report, directory: &Path) -> anyhow::Result<()> {
+pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
     std::fs::create_dir(directory)
         .with_context(|| format!("cannot create {}", directory.display()))?;
-    Ok(report.write(directory)?)
+    Ok(turncal::report::write(document, directory)?)
 }
 
 /// In the general form, which can hold any truth, with the constants beside it that it states.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use turncal::report::check::CheckReport;
+use turncal::report::check;
 use turncal::run::Run;
 use turncal::survey::Survey;
 
@@ -37,14 +37,6 @@ impl Check {
         activity.next("looking at the run");
         let survey = Survey::of(&run);
         drop(activity);
-        let report = CheckReport {
-            run: &run,
-            survey: &survey,
-        };
-        begun.deliver(
-            |directory| report.write(directory),
-            || report.document(),
-            || report.summary(),
-        )
+        begun.deliver(&check::document(&run, &survey))
     }
 }

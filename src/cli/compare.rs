@@ -1,13 +1,11 @@
 //! `turncal compare`: calibrations side by side.
 
-mod document;
-
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::{Named, compare};
-use turncal::report::side_by_side;
+use turncal::report::comparison;
 
 use super::names::short_names;
 use super::output::Delivery;
@@ -55,10 +53,7 @@ impl Compare {
             .collect();
         let (truth, calibrations) = named.split_at(usize::from(self.truth.is_some()));
         let comparison = compare(calibrations, truth.first().copied())?;
-        self.delivery.begin(&paths)?.deliver(
-            |directory| side_by_side::write(&comparison, directory),
-            || document::Document::new(&comparison),
-            || side_by_side::text(&comparison),
-        )
+        let begun = self.delivery.begin(&paths)?;
+        begun.deliver(&comparison::document(&comparison))
     }
 }

@@ -4,13 +4,19 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use turncal::calibration::{self, ClosedForm, Options, Problem};
-use turncal::report::{self, Report};
+use rayon::prelude::*;
+use turncal::calibration::{self, ClosedForm, Estimate, Options, Problem};
+use turncal::imu::{PerSensor, Triad};
+use turncal::models::{self, Place};
+use turncal::report::calibration::{self as of_calibration, Report};
+use turncal::report::demo::{self, Flown};
+use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
+use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 
 use super::calibrate::{dwell_times, navigate, note, solve, write_report};
 use super::input::seed;
-use super::output::{Overwrite, print};
+use super::output::{Overwrite, show};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
 
@@ -43,7 +49,9 @@ impl Demo {
             || simulated(&Scenario::load("demo")?, self.seed),
             || static_positions(self.seed),
         );
-        let (turning, (standing, closed_form)) = (turning?, standing?);
+        let (turning, standing) = (turning?, standing?);
+        let still = Problem::new(&standing.run, &Options::default());
+        let whole = calibration::six_position(&still)?;
         let run = &turning.run;
         let problem = Problem::new(run, &Options::default());
         let solution = solve(&problem, calibration::Method::Ekf, &activity)?;
@@ -51,7 +59,14 @@ impl Demo {
             bail!("the demonstration did not converge; take another --seed");
         }
 
-        let note = note(&closed_form);
+        let minutes = |run: &Run| run.recording.imu.duration() / 60.0;
+        let (table_time, whole_time) = (minutes(run), minutes(&standing.run));
+        let closed_form = cut(&still, table_time / whole_time)?;
+        let note = format!(
+            "{}; the first part of each dwell, as if the table had been driven for the {table_time:.0} min of \
+             the filter's run",
+            note(&closed_form)
+        );
         let dwells = dwell_times(&problem);
         activity.next("navigating");
         let methods = [
@@ -63,24 +78,35 @@ impl Demo {
             || navigate(run, &methods, Some(&turning.truth)),
         );
         let assessment = assessment?;
+        let estimates = [&closed_form.estimate, solution.estimate(), &whole.estimate];
+        let missions = fly(run, &estimates, &turning.truth)?;
+        let names = [
+            format!("closed form, {table_time:.0} min"),
+            format!("EKF, {table_time:.0} min"),
+            format!("closed form, {whole_time:.0} min"),
+        ];
+        let mut findings = closed_form.findings.clone();
+        findings.extend(solution.findings(&assessment));
         let report = Report {
             title: "turncal demo",
             run,
             aiding: problem.model.aiding,
             body_frame: problem.model.aiding.body_frame(),
             outcome: solution.outcome(),
+            findings: &findings,
             effects: &assessment.error_terms,
             quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
-            closed_form: Some(report::ClosedForm {
+            closed_form: Some(of_calibration::ClosedForm {
                 estimate: &closed_form.estimate,
                 note: &note,
-                findings: &closed_form.findings,
             }),
             truth: Some(&turning.truth),
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
+        let mut document = report.document();
+        demo::add(&mut document, &names, &missions);
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;
@@ -94,24 +120,69 @@ impl Demo {
         write(&standing, &closed)?;
         let record = solution.calibration(&problem, &assessment);
         record.write(&filtered.join("calibration.json"), false)?;
-        let standing = Problem::new(&standing.run, &Options::default());
-        let record = closed_form.record(&standing, &closed_form.quality(&standing)?);
+        let record = whole.record(&still, &whole.quality(&still)?);
         record.write(&closed.join("calibration.json"), false)?;
-        write_report(&report, &root.join("report"))?;
+        write_report(&document, &root.join("report"))?;
         directory.commit()?;
         drop(activity);
 
-        print(report.summary().as_bytes())?;
+        show(&document, false)?;
         let page = self.output.join("report").join("index.html");
         eprintln!("\nreport: {}", page.display());
         Ok(())
     }
 }
 
-/// The static positions and what the closed form makes of them.
-fn static_positions(seed: Option<u64>) -> anyhow::Result<(Simulated, ClosedForm)> {
-    let standing = simulated(&Scenario::load("demo-six-position")?, seed)?;
-    let problem = Problem::new(&standing.run, &Options::default());
-    let closed_form = calibration::six_position(&problem)?;
-    Ok((standing, closed_form))
+/// The static positions that the paper's closed form takes.
+fn static_positions(seed: Option<u64>) -> anyhow::Result<Simulated> {
+    simulated(&Scenario::load("demo-six-position")?, seed)
+}
+
+/// The closed form from the first part of each dwell that makes this part of the run's time.
+fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
+    let imu = &problem.run().recording.imu;
+    let seconds = |dwell: &Dwell| dwell.samples.len() as f64 * imu.period;
+    let at_rest: f64 = problem.dwells().map(seconds).sum();
+    let moves = imu.duration() - at_rest;
+    let part = (part * imu.duration() - moves) / at_rest;
+    let dwells = problem.dwells();
+    let dwells: Vec<Dwell> = dwells
+        .map(|dwell| dwell.first_seconds(part * seconds(dwell), imu))
+        .collect();
+    Ok(calibration::six_position_of(problem, &dwells)?)
+}
+
+/// Navigates 40 h by each estimate, stationary and in flight.
+fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::Result<Vec<Flown>> {
+    let (flight, _) = models::trajectory("flight", &Place::Embedded)?;
+    let still = Mission::standing_level(&run.site, FORTY_HOURS);
+    let flying = Mission {
+        motion: Motion::Moving(flight.at_latitude(run.site.latitude)),
+        ..still.clone()
+    };
+    let missions = [
+        (
+            "stationary and level",
+            "Stationary, gyro bias makes nearly all of the error, and only time at rest lowers its σ.",
+            still,
+        ),
+        (
+            "in flight",
+            "In flight turns and accelerations expose scale factors and installation, which the filter \
+             observes in minutes.",
+            flying,
+        ),
+    ];
+    let missions = missions.into_iter().map(|(how, shows, mission)| {
+        let ends = estimates.par_iter().map(|estimate| {
+            let outlook = mission.outlook(estimate, Some(truth))?;
+            outlook.into_iter().last().context("no navigation")
+        });
+        Ok(Flown {
+            how,
+            shows,
+            ends: ends.collect::<anyhow::Result<_>>()?,
+        })
+    });
+    missions.collect()
 }

@@ -146,11 +146,7 @@ impl Navigate {
             trajectory: trajectory.as_deref(),
             moments: &moments,
         };
-        begun.deliver(
-            |directory| navigation.write(directory),
-            || navigation.document(),
-            || navigation.summary(),
-        )
+        begun.deliver(&navigation.document())
     }
 
     /// How the body moves, and the name of its trajectory.

@@ -4,7 +4,7 @@ use turncal::noise::conventions::{convert, known};
 use turncal::report::conversion;
 
 use super::input::positive;
-use super::output::print;
+use super::output::show;
 
 /// A noise figure in every convention: data sheets, Kalibr, PSINS, KF-GINS
 ///
@@ -36,11 +36,6 @@ pub struct Noise {
 impl Noise {
     pub fn run(&self) -> anyhow::Result<()> {
         let conversion = convert(self.value, &self.unit, self.rate)?;
-        let text = if self.json {
-            serde_json::to_string_pretty(&conversion::document(&conversion))? + "\n"
-        } else {
-            conversion::text(&conversion)
-        };
-        print(text.as_bytes())
+        show(&conversion::document(&conversion), self.json)
     }
 }

@@ -4,10 +4,9 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use serde::Serialize;
 use turncal::formats::FileError;
 use turncal::formats::WholeDirectory;
-use turncal::report::ReportError;
+use turncal::report::{self, Document, terminal};
 
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -61,28 +60,29 @@ pub struct Begun<'a> {
 }
 
 impl Begun<'_> {
-    /// Writes what is asked for, each from its own source.
-    pub fn deliver<D: Serialize>(
-        self,
-        write: impl FnOnce(&Path) -> Result<(), ReportError>,
-        document: impl FnOnce() -> D,
-        text: impl FnOnce() -> String,
-    ) -> anyhow::Result<()> {
+    /// Writes and prints a document as it is asked for.
+    pub fn deliver(self, document: &Document) -> anyhow::Result<()> {
         let mut page = None;
         if let Some((target, whole)) = self.directory {
-            write(&whole.path())?;
+            report::write(document, &whole.path())?;
             whole.commit()?;
             page = Some(target.join("index.html"));
         }
-        if self.json {
-            return print((serde_json::to_string_pretty(&document())? + "\n").as_bytes());
-        }
-        print(text().as_bytes())?;
-        if let Some(page) = page {
+        show(document, self.json)?;
+        if let Some(page) = page.filter(|_| !self.json) {
             eprintln!("\nreport: {}", page.display());
         }
         Ok(())
     }
+}
+
+/// Prints a document as text as wide as the terminal, or as JSON.
+pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
+    let text = match json {
+        true => report::json(document),
+        false => terminal::text(document, columns().map(usize::from)),
+    };
+    print(text.as_bytes())
 }
 
 /// Refuses an output file that is one of the inputs: not even force replaces those.

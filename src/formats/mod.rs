@@ -22,8 +22,8 @@ mod uniform;
 mod whole;
 mod write;
 
-pub use error::{FileError, Place};
 pub use crate::imu::NoiseKeys;
+pub use error::{FileError, Place};
 pub(crate) use quantity::unit_scale;
 pub(crate) use sheet::Sheet;
 pub(crate) use whole::write_whole_with;

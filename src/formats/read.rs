@@ -11,7 +11,7 @@ use super::table_log::TableLogFile;
 use crate::earth::Site;
 use crate::recording::{Recording, faults};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::units::DEGREE;
+use crate::units::{DEGREE, MILLIGAL};
 
 /// The version of the format of `run.toml`.
 pub(super) const FORMAT: &str = "turncal-run/1";
@@ -118,7 +118,13 @@ fn name(path: &Path) -> String {
 fn site(top: &Fields) -> Result<Site, FileError> {
     let fields = top.need_table(
         "site",
-        &["latitude_deg", "longitude_deg", "height_m", "gravity_m_s2"],
+        &[
+            "latitude_deg",
+            "longitude_deg",
+            "height_m",
+            "gravity_m_s2",
+            "gravity_sigma_mgal",
+        ],
         "the place of the turntable",
     )?;
     let latitude = fields
@@ -135,7 +141,10 @@ fn site(top: &Fields) -> Result<Site, FileError> {
         .within(-500.0, 9000.0)?;
     let mut site = Site::with_normal_gravity(latitude, longitude, height);
     if let Some(field) = fields.get("gravity_m_s2") {
-        site.gravity = field.within(9.7, 9.9)?;
+        site = site.with_gravity(field.within(9.7, 9.9)?, 0.0);
+    }
+    if let Some(field) = fields.get("gravity_sigma_mgal") {
+        site.gravity_sigma = field.not_negative()? * MILLIGAL;
     }
     Ok(site)
 }

@@ -9,14 +9,14 @@ use flate2::{Compression, GzBuilder};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use super::error::{FileError, Place, list, suggestion};
-use crate::imu::NoiseKeys;
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use crate::calibration::Calibration;
+use crate::imu::NoiseKeys;
 use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
-use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
+use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, MILLIGAL, PPM};
 
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
 /// `segments.csv`, `truth.json`.
@@ -184,11 +184,13 @@ latitude_deg = {latitude:?}
 longitude_deg = {longitude:?}
 height_m = {height:?}
 gravity_m_s2 = {gravity:?}
+gravity_sigma_mgal = {gravity_sigma:?}
 "#,
             latitude = short(site.latitude / DEGREE),
             longitude = short(site.longitude / DEGREE),
             height = site.height,
             gravity = site.gravity,
+            gravity_sigma = short(site.gravity_sigma / MILLIGAL),
         ),
         meta_text(&run.recording.meta),
         format!(
@@ -236,7 +238,7 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
     sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
     sections.extend(terms_text(run));
     sections.push(format!(
-        "# how still the IMU is while the table stands\n[standstill]\nposition_sigma_m = {:?}\n",
+        "# how still the IMU is while the table is at rest\n[standstill]\nposition_sigma_m = {:?}\n",
         run.standstill.position_sigma
     ));
     if let Some(sigma) = run.standstill.velocity_sigma {
@@ -321,8 +323,7 @@ fn terms_text(run: &Run) -> Option<String> {
         (sigma > 0.0).then(line)
     });
     let lines: String = on.collect();
-    (!lines.is_empty())
-        .then(|| format!("# further error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
+    (!lines.is_empty()).then(|| format!("# error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
 }
 
 fn meta_text(meta: &BTreeMap<String, String>) -> String {

@@ -66,7 +66,7 @@ impl InstallationForm {
                             .map(|column| c[(row, column)].powi(2))
                             .sum();
                         // Beyond a right angle no row of unit norm exists; a filter's step that
-                        // far is caught by its merit, not here.
+                        // far is caught by its cost, not here.
                         c[(row, row)] = (1.0 - off).max(0.0).sqrt();
                     }
                 }

@@ -1,4 +1,4 @@
-//! From an ideal output to what a sample of the instrument holds: noise, gauss_markov, pulses.
+//! From an ideal output to what a sample of the instrument holds: noise, Gauss–Markov bias, pulses.
 
 use nalgebra::Vector3;
 use rand::Rng;
@@ -20,11 +20,11 @@ pub enum Output {
 pub struct Noise {
     /// Angle random walk in rad/√s, or velocity random walk in (m/s)/√s.
     pub random_walk: f64,
-    /// Slow wandering of the bias.
+    /// Gauss–Markov bias.
     pub gauss_markov: Option<GaussMarkov>,
 }
 
-/// A bias that wanders as a stationary first-order Gauss–Markov process.
+/// A bias that varies as a stationary first-order Gauss–Markov process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussMarkov {
     /// Stationary 1σ in rad/s or m/s².
@@ -38,7 +38,7 @@ pub struct GaussMarkov {
 pub struct NoiseSource {
     noise: Noise,
     period: f64,
-    wander: Vector3<f64>,
+    bias: Vector3<f64>,
 }
 
 fn normal(rng: &mut impl Rng) -> Vector3<f64> {
@@ -46,10 +46,10 @@ fn normal(rng: &mut impl Rng) -> Vector3<f64> {
 }
 
 impl NoiseSource {
-    /// A source for samples of this period in s; the wandering bias starts from its stationary
+    /// A source for samples of this period in s; the Gauss–Markov bias starts from its stationary
     /// distribution.
     pub fn new(noise: Noise, period: f64, rng: &mut impl Rng) -> Self {
-        let wander = noise
+        let bias = noise
             .gauss_markov
             .map_or_else(Vector3::zeros, |gauss_markov| {
                 normal(rng) * gauss_markov.sigma
@@ -57,7 +57,7 @@ impl NoiseSource {
         Self {
             noise,
             period,
-            wander,
+            bias,
         }
     }
 
@@ -66,10 +66,10 @@ impl NoiseSource {
         let white = normal(rng) * (self.noise.random_walk * self.period.sqrt());
         if let Some(gauss_markov) = self.noise.gauss_markov {
             let keep = (-self.period / gauss_markov.correlation_time).exp();
-            self.wander = self.wander * keep
-                + normal(rng) * (gauss_markov.sigma * (1.0 - keep * keep).sqrt());
+            self.bias =
+                self.bias * keep + normal(rng) * (gauss_markov.sigma * (1.0 - keep * keep).sqrt());
         }
-        white + self.wander * self.period
+        white + self.bias * self.period
     }
 }
 

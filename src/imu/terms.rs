@@ -1,4 +1,4 @@
-//! Further error terms of an instrument, beside `K`, `E` and `D`: each changes what a triad takes for
+//! Error terms of an instrument, beside `K`, `E` and `D`: each changes what a triad takes for
 //! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -14,7 +14,7 @@ pub type TermVector = SVector<f64, TERM_PARAMETERS>;
 /// What each parameter adds to the input of a triad.
 pub type TermResponse = SMatrix<f64, 3, TERM_PARAMETERS>;
 
-/// A further error term.
+/// An error term.
 ///
 /// Source: IEEE Std 1293-2018, §5.3 (accelerometers: second order, asymmetry); IEEE Std 952-2020, §5
 /// (gyros: acceleration sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect,
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_of_a_later_time_see_gravity_turned_further() {
+    fn samples_of_a_later_time_sense_gravity_turned_more() {
         let rate = Vector3::new(0.0, 0.4, 0.0);
         let up = |t: f64| crate::attitude::exp(-rate * t) * Vector3::new(0.0, 0.0, 9.8);
         let sensed = Sensed {

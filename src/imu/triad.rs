@@ -148,7 +148,7 @@ impl Triad {
     }
 
     /// The name of a parameter in files, such as `gyro.installation.xy`; `None` if the form does not
-    /// have it.
+    /// have it, or no form has.
     pub fn parameter_name(
         sensor: Sensor,
         form: InstallationForm,
@@ -161,7 +161,7 @@ impl Triad {
                 let &(row, column) = form.angle_names().get(parameter - INSTALLATION)?;
                 format!("{sensor}.installation.{}{}", AXES[row], AXES[column])
             }
-            ParameterKind::Bias => format!("{sensor}.bias.{}", AXES[parameter - BIAS]),
+            ParameterKind::Bias => format!("{sensor}.bias.{}", AXES.get(parameter - BIAS)?),
         })
     }
 }

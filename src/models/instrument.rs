@@ -22,7 +22,7 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// How one instrument of the grade differs from the next before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of the parameters of its further terms, around zero; zero where it has none.
+    /// 1σ of the parameters of its error terms, around zero; zero where it has none.
     pub term_sigma: TermVector,
 }
 
@@ -184,7 +184,7 @@ struct InstrumentFile {
     terms: TermsFile,
 }
 
-/// Further terms, each as in a run's `[imu.terms]`.
+/// Error terms, each as in a run's `[imu.terms]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 struct TermsFile {

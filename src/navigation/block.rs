@@ -262,7 +262,11 @@ impl Moments {
             noise: NoiseInput {
                 duration: t,
                 // Of no time there is no mean, and no noise either.
-                force: if t > 0.0 { skew(self.force / t) } else { Matrix3::zeros() },
+                force: if t > 0.0 {
+                    skew(self.force / t)
+                } else {
+                    Matrix3::zeros()
+                },
                 motion: self.motion,
                 moving: self.moving,
                 bridged,

@@ -25,7 +25,7 @@ pub struct Navigator<'a> {
     pub state: State,
 }
 
-/// Further terms of the instrument that navigation knows of.
+/// Error terms of the instrument that navigation knows of.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TermValues {
     /// Parameters that are on, whatever their values.

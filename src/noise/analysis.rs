@@ -173,7 +173,7 @@ impl AxisNoise {
     }
 
     /// Lowest Allan deviation with its cluster time, if it is not the last: what is read off a curve as
-    /// bias gauss_markov.
+    /// bias instability.
     pub fn minimum(&self) -> Option<(f64, f64)> {
         let Curve { tau, variance } = &self.curve;
         let points = tau.iter().zip(variance);

@@ -28,7 +28,7 @@ pub(super) use clusters::mean;
 /// squared.
 const SIGNIFICANT: f64 = 9.0;
 /// What its correlation time must raise it by besides: two, for this only tells which process it is that
-/// wanders.
+/// varies.
 const TELLS_TIME: f64 = 4.0;
 /// From so many degrees of freedom on a variance is as good as normal.
 const MANY: f64 = 1e4;
@@ -80,7 +80,7 @@ pub struct Identified {
     /// Equivalent degrees of freedom of each point.
     pub freedom: Vec<f64>,
     /// What a filter that knows white noise and one Gauss–Markov process should use: the same as what was
-    /// found, but for the nearest Gauss–Markov process in the place of whatever else wanders.
+    /// found, but for the nearest Gauss–Markov process in the place of whatever else varies.
     pub for_filter: Vec<Found>,
 }
 

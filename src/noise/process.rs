@@ -20,7 +20,7 @@ pub enum Process {
     RateRandomWalk,
     /// A rate that grows evenly; slope +1, strength R in rad/s² or m/s³. Not random.
     RateRamp,
-    /// A stationary wandering of the rate, first-order Gauss–Markov; strength its 1σ in rad/s or m/s².
+    /// A stationary first-order Gauss–Markov process of the rate; strength its 1σ in rad/s or m/s².
     GaussMarkov {
         /// Correlation time in s.
         correlation_time: f64,

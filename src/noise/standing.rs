@@ -112,7 +112,7 @@ impl Stretch {
     fn section(run: &Run) -> Result<Self, StretchError> {
         let sections = run.recording.segments.iter();
         let stretch = sections
-            .map(|segment| Self::of_segment(run, segment, "the longest segment that stands,"))
+            .map(|segment| Self::of_segment(run, segment, "the longest static segment,"))
             .filter(|stretch| stretch.stands)
             .max_by_key(|stretch| stretch.samples.len());
         match stretch {

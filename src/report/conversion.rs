@@ -1,75 +1,36 @@
-//! A noise figure in every convention, as text and as a document.
+//! A noise figure in every convention.
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
+use super::document::{Document, Facts};
 use crate::noise::conventions::{Conversion, Line};
 
-#[derive(Serialize)]
-struct Document {
-    quantity: &'static str,
-    sensor: &'static str,
-    given: Figure,
-    rate_hz: Option<f64>,
-    figures: Vec<Figure>,
-}
-
-#[derive(Serialize)]
-struct Figure {
-    value: f64,
-    unit: &'static str,
-    meaning: &'static str,
-}
-
-impl From<&Line> for Figure {
-    fn from(line: &Line) -> Self {
-        Self {
-            value: line.value,
-            unit: line.unit,
-            meaning: line.meaning,
-        }
-    }
-}
-
-/// The conversion as one document.
-pub fn document(conversion: &Conversion) -> impl Serialize {
-    Document {
-        quantity: conversion.quantity,
-        sensor: conversion.sensor.name(),
-        given: (&conversion.given).into(),
-        rate_hz: conversion.rate,
-        figures: conversion.lines.iter().map(Figure::from).collect(),
-    }
-}
-
-/// The conversion as text: how the figure was taken, and a line for each convention.
-pub fn text(conversion: &Conversion) -> String {
-    let Line {
-        value,
-        unit,
-        meaning,
-    } = conversion.given;
-    let at = match conversion.rate {
-        Some(rate) => format!(" at {rate} Hz"),
-        None => String::new(),
-    };
-    let longest = conversion
+/// How the figure was taken, and a line for each convention.
+pub fn document(conversion: &Conversion) -> Document {
+    let given = &conversion.given;
+    let at = conversion
+        .rate
+        .map_or(String::new(), |rate| format!(" at {rate} Hz"));
+    let mut document = Document::new(format!("{} {}{at}", given.value, given.unit));
+    document.lead = vec![format!("Read as {}. The same is:", given.meaning)];
+    let name = |line: &Line| format!("{:>11} {}", digits(line.value), line.unit);
+    let rows = conversion
         .lines
         .iter()
-        .map(|line| line.unit.chars().count());
-    let longest = longest.max().unwrap_or(0);
-    let mut text = format!(
-        "{value} {unit}{at}, read as {}: {meaning}\n\n",
-        conversion.quantity
-    );
-    for line in &conversion.lines {
-        text.push_str(&format!(
-            "{:>12}  {:<longest$}  {}\n",
-            digits(line.value),
-            line.unit,
-            line.meaning
-        ));
-    }
-    text
+        .map(|line| (name(line), line.meaning));
+    document.both(Facts::new("", rows));
+    document.data = json!({
+        "quantity": conversion.quantity,
+        "sensor": conversion.sensor.name(),
+        "given": data(given),
+        "rate_hz": conversion.rate,
+        "figures": conversion.lines.iter().map(data).collect::<Value>(),
+    });
+    document
+}
+
+fn data(line: &Line) -> Value {
+    json!({ "value": line.value, "unit": line.unit, "meaning": line.meaning })
 }
 
 /// Five digits, with a power of ten where that is shorter.
@@ -83,7 +44,9 @@ fn digits(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::terminal;
     use super::*;
+    use crate::noise::conventions::convert;
 
     #[test]
     fn figures_are_shown_with_five_digits() {
@@ -92,5 +55,11 @@ mod tests {
             shown,
             ["0.30000", "18.000", "8.7266e-5", "123457", "0.0050000"]
         );
+    }
+
+    #[test]
+    fn a_figure_is_shown_in_every_convention() {
+        let conversion = convert(0.3, "deg/sqrt(h)", Some(100.0)).unwrap();
+        insta::assert_snapshot!(terminal::text(&document(&conversion), Some(80)));
     }
 }

@@ -5,7 +5,7 @@ use crate::calibration::parameter_name;
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
 use crate::units;
 
-pub use crate::calibration::Group;
+pub(super) use crate::calibration::Group;
 
 impl Group {
     /// Such as `gyro scale factor K`.
@@ -16,6 +16,11 @@ impl Group {
             ParameterKind::Bias => "bias D",
         };
         format!("{} {kind}", self.sensor().name())
+    }
+
+    /// Its title with the unit.
+    pub fn titled(self) -> String {
+        format!("{}, {}", self.title(), self.unit())
     }
 
     /// Such as `gyro K`.
@@ -67,6 +72,12 @@ impl Group {
         }
     }
 
+    /// Those of some parameters that are in the group.
+    pub fn among(self, parameters: &[usize]) -> Vec<usize> {
+        let all = parameters.iter().copied();
+        all.filter(|&index| Self::of(index) == self).collect()
+    }
+
     /// Largest magnitude and root mean square of some of a vector's entries, in the group's unit;
     /// `None` if there are none.
     pub fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
@@ -79,14 +90,14 @@ impl Group {
 }
 
 /// The end of a parameter's name, such as `x` or `xy`.
-pub fn axis_name(form: InstallationForm, index: usize) -> String {
+pub(super) fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
 }
 
 /// A short name for a figure's margin, such as `gyro E xy`.
-pub fn short_name(form: InstallationForm, index: usize) -> String {
+pub(super) fn short_name(form: InstallationForm, index: usize) -> String {
     format!("{} {}", Group::of(index).short(), axis_name(form, index))
 }
 

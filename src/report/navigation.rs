@@ -1,33 +1,26 @@
-//! The report of a navigation: one table for terminal and page, figures against time in the manner of
-//! the paper's Figures 2 to 10, the errors minute by minute as CSV, and one JSON document.
+//! The report of a navigation: errors with their predicted σ as table, as figures against time in the manner of
+//! the paper's Figures 2 to 10, minute by minute as CSV, and hour by hour as JSON.
 
-mod document;
-mod figures;
-pub(super) mod outlook;
-mod quantity;
 #[cfg(test)]
 mod tests;
 
 use std::fmt::Write;
-use std::path::Path;
 
-use maud::html;
-use serde::Serialize;
+use serde_json::{Map, Value, json};
 
-use super::page::{document as html_document, drawn};
-use super::side_by_side::Table;
-use super::{ReportError, facts, number, terminal, write_files};
+use super::document::{Document, Facts, NONE, Table, cells};
+use super::number::{or_dash, three_digits, value};
+use super::plot::{Panel, Plot, Series};
+use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::BodyFrame;
 use crate::imu::Sensor;
 use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion};
 use crate::units::{DEGREE, NAUTICAL_MILE};
-use quantity::Quantity;
 
 const HOUR: f64 = 3600.0;
 /// Hours over which the paper gives the drift of position.
 const PAPER_HOURS: f64 = 40.0;
-const NONE: &str = "–";
 
 /// A navigation with what it was made of.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +31,7 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// False if the calibration says that its method did not converge.
     pub converged: bool,
-    /// Whether one of the two has further terms, which are not navigated.
+    /// Whether one of the two has error terms beside K, E and D, which are not navigated.
     pub terms: bool,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
@@ -53,73 +46,42 @@ pub struct Navigation<'a> {
 }
 
 impl Navigation<'_> {
-    /// The navigation as text.
-    pub fn summary(&self) -> String {
-        let mut text = format!("{}\n{}", self.title(), terminal::facts(&self.facts()));
-        for warning in self.warnings() {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "\nWarning: {warning}");
+    /// Everything that is said of the navigation.
+    pub fn document(&self) -> Document {
+        let (calibration, truth) = (self.calibration, self.truth);
+        let title = format!("Navigation error of {calibration} against {truth}");
+        let mut document = Document::new(title);
+        document.warnings.items = self.warnings();
+        document.both(self.facts());
+        document.both(self.table());
+        for plot in self.figures() {
+            document.page(plot);
         }
-        let _ = write!(text, "\n{}", terminal::columns(&self.table()));
-        text
-    }
-
-    /// The errors hour by hour, and their extremes, as one JSON document.
-    pub fn document(&self) -> impl Serialize {
-        document::document(self)
-    }
-
-    /// Writes `navigation.csv`, `index.html`, which needs nothing else, and every figure as an SVG file
-    /// of its own into an existing directory.
-    ///
-    /// # Errors
-    /// [`ReportError`] if a figure cannot be drawn or a file not be written.
-    pub fn write(&self, directory: &Path) -> Result<(), ReportError> {
-        let figures = figures::figures(&[figures::Side {
-            name: "error",
-            moments: self.moments,
-        }])?;
-        let path = directory.join("navigation.csv");
-        std::fs::write(&path, self.csv()).map_err(|source| ReportError::Write { path, source })?;
-        let title = self.title();
-        let body = html! {
-            header { h1 { (title) } }
-            @for warning in self.warnings() { p.warnings { (warning) } }
-            (super::tables::section(&self.table()))
-            @for figure in &figures { (drawn(figure)) }
-            section { h2 { "The navigation" } (facts::facts(&self.facts())) }
-        };
-        write_files(directory, &html_document(&title, &body), &figures)
-    }
-
-    fn title(&self) -> String {
-        format!(
-            "Navigation error of {} against {}",
-            self.calibration, self.truth
-        )
+        document.files = vec![("navigation.csv".to_owned(), self.csv())];
+        document.data = self.data();
+        document
     }
 
     fn hours(&self) -> f64 {
         f64::from(self.mission.intervals) * INTERVAL / HOUR
     }
 
-    fn facts(&self) -> Vec<(String, String)> {
-        let degrees = |angle: f64| number::value(angle / DEGREE, 0.01);
+    fn facts(&self) -> Facts {
+        let degrees = |angle: f64| value(angle / DEGREE, 0.01);
         let motion = match &self.mission.motion {
             Motion::Standing(at) => {
                 let [pitch, roll, heading] = to_pitch_roll_heading(&at.attitude).map(degrees);
                 format!(
-                    "standing at latitude {}°, height {} m; pitch {pitch}°, roll {roll}°, heading \
-                     {heading}°",
+                    "stationary at latitude {}°, height {} m; pitch {pitch}°, roll {roll}°, heading {heading}°",
                     degrees(at.latitude),
-                    number::value(at.height, 10.0),
+                    value(at.height, 10.0),
                 )
             }
             Motion::Moving(trajectory) => format!(
                 "{} from latitude {}°, height {} m",
                 self.trajectory.unwrap_or("a trajectory"),
                 degrees(trajectory.start().latitude),
-                number::value(trajectory.start().height, 10.0),
+                value(trajectory.start().height, 10.0),
             ),
         };
         let errors = match self.only {
@@ -127,47 +89,42 @@ impl Navigation<'_> {
             Some(Sensor::Gyro) => "of the gyros; the accelerometers are exact",
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
-        let hours = number::three_digits(self.hours());
-        [
+        let start = "perfect alignment, velocity and position; height is held to the true one";
+        let rows = [
             ("motion", motion),
-            ("duration", format!("{hours} h")),
+            ("duration", format!("{} h", three_digits(self.hours()))),
             ("errors", errors.to_owned()),
             ("body frame", self.body_frame.words().to_owned()),
-            (
-                "start",
-                "perfect alignment, velocity and position; height is held to the true one"
-                    .to_owned(),
-            ),
-        ]
-        .map(|(name, value)| (name.to_owned(), value))
-        .to_vec()
+            ("start", start.to_owned()),
+        ];
+        Facts::new("The navigation", rows)
     }
 
     fn warnings(&self) -> Vec<String> {
+        let name = self.calibration;
         let mut warnings = Vec::new();
         if !self.converged {
-            warnings.push(format!(
-                "{} did not converge: its σ mean nothing.",
-                self.calibration
-            ));
+            warnings.push(format!("{name} did not converge: its σ mean nothing."));
         }
         if self.moments.iter().any(|m| m.covariance.is_none()) {
-            warnings.push(format!(
-                "{} claims no σ, so none is predicted.",
-                self.calibration
-            ));
+            warnings.push(format!("{name} claims no σ, so none is predicted."));
         }
         if self.terms {
-            warnings.push(
-                "Auxiliary error terms are taken for exact: these are the errors that K, E and D leave."
-                    .to_owned(),
-            );
+            let text = "Error terms beside K, E and D are taken for exact: these are the errors that K, E and D \
+                        leave.";
+            warnings.push(text.to_owned());
         }
         warnings
     }
 
+    /// Position error at the end over the time, nmile/h.
+    fn drift(&self) -> Option<f64> {
+        let last = self.moments.last().filter(|last| last.time > 0.0)?;
+        Some(last.error.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
+    }
+
     fn table(&self) -> Table {
-        let headings = [
+        let columns = [
             "",
             "unit",
             "largest",
@@ -177,50 +134,68 @@ impl Navigation<'_> {
             "error/σ",
         ];
         let rows = Quantity::ALL.map(|quantity| self.row(quantity));
-        let [attitude, velocity, position] = [0..3, 3..6, 6..9].map(|r| rows[r].to_vec());
-        let mut notes = vec![
-            "Computed less true. σ: of the error at the end, predicted from the calibration's \
-             covariance; of horizontal errors the root of the mean square."
-                .to_owned(),
-        ];
-        if let Some(last) = self.moments.last().filter(|last| last.time > 0.0) {
-            let end = last.error.horizontal_position() / NAUTICAL_MILE;
-            let drift = end / (last.time / HOUR);
-            notes.push(format!(
+        let table = Table::new("Errors", columns)
+            .sections(rows.chunks(3).map(<[_]>::to_vec))
+            .note(
+                "Computed minus true. σ: of the error at the end, predicted from the calibration's covariance; \
+                 of horizontal errors the root of the mean square.",
+            );
+        match self.drift() {
+            None => table,
+            Some(drift) => table.note(format!(
                 "Position at the end over the time: {} nmile/h, {} nmile/{PAPER_HOURS} h.",
-                number::three_digits(drift),
-                number::three_digits(drift * PAPER_HOURS),
-            ));
-        }
-        Table {
-            title: "Errors",
-            headings: headings.map(str::to_owned).to_vec(),
-            sections: vec![attitude, velocity, position],
-            notes,
+                three_digits(drift),
+                three_digits(drift * PAPER_HOURS),
+            )),
         }
     }
 
     fn row(&self, quantity: Quantity) -> Vec<String> {
         let error = |moment: &Epoch| quantity.error(&moment.error);
-        let size = |m: &&Epoch| error(m).abs();
-        let largest = self
-            .moments
-            .iter()
-            .max_by(|a, b| size(a).total_cmp(&size(b)));
+        let magnitude = |m: &&Epoch| error(m).abs();
+        let moments = self.moments.iter();
+        let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
         let last = self.moments.last();
         let sigma = last.and_then(|m| quantity.sigma(m)).filter(|s| *s > 0.0);
-        let shown =
-            |m: Option<&Epoch>| m.map_or(NONE.to_owned(), |m| number::three_digits(error(m)));
         let ratio = last.zip(sigma).filter(|_| quantity.is_component());
-        vec![
-            quantity.name().to_owned(),
-            quantity.unit().to_owned(),
-            shown(largest),
-            largest.map_or(NONE.to_owned(), |m| number::value(m.time / HOUR, 1.0)),
-            shown(last),
-            sigma.map_or(NONE.to_owned(), number::three_digits),
-            ratio.map_or(NONE.to_owned(), |(m, s)| number::value(error(m) / s, 1.0)),
+        cells![
+            quantity.name(),
+            quantity.unit(),
+            or_dash(largest.map(error), three_digits),
+            or_dash(largest.map(|m| m.time / HOUR), |t| value(t, 1.0)),
+            or_dash(last.map(error), three_digits),
+            or_dash(sigma, three_digits),
+            ratio.map_or(NONE.to_owned(), |(m, s)| value(error(m) / s, 1.0)),
         ]
+    }
+
+    /// Attitude, velocity and position against time with their predicted σ as a band.
+    fn figures(&self) -> [Plot; 3] {
+        let horizontal =
+            " Horizontal: length of both components, with the root of its predicted mean square.";
+        let figures = [
+            ("attitude.svg", "Attitude error", ""),
+            ("velocity.svg", "Velocity error", horizontal),
+            ("position.svg", "Position error", horizontal),
+        ];
+        let mut quantities = Quantity::ALL.chunks(3);
+        figures.map(|(file, heading, more)| {
+            let quantities = quantities.next().unwrap_or_default().iter();
+            let panels = quantities.map(|&quantity| self.panel(quantity));
+            Plot::new(file, heading, (1, 210), panels).caption(format!(
+                "Computed minus true. Line: actual error by full navigation; band: ±1σ predicted from the \
+                 calibration's covariance by the linear model, within which the error of two calibrations in \
+                 three lies at any one time.{more}"
+            ))
+        })
+    }
+
+    fn panel(&self, quantity: Quantity) -> Panel {
+        let moments = || self.moments.iter();
+        let errors = moments().map(|m| (m.time / HOUR, quantity.error(&m.error)));
+        let sigma = moments().filter_map(|m| Some((m.time / HOUR, quantity.sigma(m)?)));
+        let error = Series::line(errors).label("error");
+        quantity.panel(self.hours(), &sigma.collect::<Vec<_>>(), vec![error])
     }
 
     /// A row a minute: time, errors, predicted σ where there is one.
@@ -233,6 +208,7 @@ impl Navigation<'_> {
         }
         text.push('\n');
         for moment in self.moments {
+            // Writing to a string cannot fail.
             let _ = write!(text, "{}", moment.time / HOUR);
             let errors = Quantity::ALL.map(|q| Some(q.error(&moment.error)));
             let sigmas = Quantity::ALL.map(|q| q.sigma(moment));
@@ -243,4 +219,69 @@ impl Navigation<'_> {
         }
         text
     }
+
+    fn data(&self) -> Value {
+        let hourly = || {
+            self.moments
+                .iter()
+                .filter(|moment| moment.time % HOUR == 0.0)
+        };
+        let (latitude, height, attitude) = match &self.mission.motion {
+            Motion::Standing(at) => (
+                at.latitude,
+                at.height,
+                Some(to_pitch_roll_heading(&at.attitude)),
+            ),
+            Motion::Moving(path) => (path.start().latitude, path.start().height, None),
+        };
+        let mut data = json!({
+            "calibration": self.calibration,
+            "truth": self.truth,
+            "body_frame": self.body_frame,
+            "errors": self.only.map_or("both", |sensor| sensor.name()),
+        });
+        if let Some(name) = self.trajectory {
+            data["trajectory"] = name.into();
+        }
+        data["latitude_deg"] = (latitude / DEGREE).into();
+        data["height_m"] = height.into();
+        if let Some(angles) = attitude {
+            data["attitude_deg"] = json!(angles.map(|angle| angle / DEGREE));
+        }
+        data["hours"] = self.hours().into();
+        data["series"] = hourly().map(at).collect();
+        data["max_abs"] = largest(hourly());
+        data["max_abs_by_minute"] = largest(self.moments.iter());
+        data["final"] = self.moments.last().map(at).into();
+        data["drift_nmile_per_h"] = self.drift().into();
+        data["drift_nmile_per_40_h"] = self.drift().map(|drift| drift * PAPER_HOURS).into();
+        data
+    }
+}
+
+/// One number for each quantity under its key.
+fn by_key(of: impl Fn(Quantity) -> f64) -> Map<String, Value> {
+    let all = Quantity::ALL.into_iter();
+    all.map(|quantity| (quantity.key().to_owned(), of(quantity).into()))
+        .collect()
+}
+
+/// Errors and their predicted σ at one time.
+fn at(moment: &Epoch) -> Value {
+    let mut row = Map::from_iter([("t_h".to_owned(), (moment.time / HOUR).into())]);
+    row.extend(by_key(|quantity| quantity.error(&moment.error)));
+    let sigma = moment.covariance.as_ref();
+    let sigma = sigma.map(|_| by_key(|quantity| quantity.sigma(moment).unwrap_or_default()));
+    row.insert("sigma".to_owned(), sigma.into());
+    row.into()
+}
+
+fn largest<'m>(moments: impl Iterator<Item = &'m Epoch> + Clone) -> Value {
+    let of = |quantity: Quantity| {
+        moments
+            .clone()
+            .map(|m| quantity.error(&m.error).abs())
+            .fold(0.0, f64::max)
+    };
+    by_key(of).into()
 }

@@ -1,7 +1,5 @@
 //! Numbers as a reader wants them: digits up to the second that σ leaves meaning to.
 
-use crate::study::Ratio;
-
 const MINUS: char = '−';
 const MINUTE: f64 = 60.0;
 
@@ -34,7 +32,7 @@ pub(super) fn sigma(sigma: f64) -> String {
 
 /// A quantity to three digits.
 pub(super) fn three_digits(x: f64) -> String {
-    if x.is_finite() && x.abs() >= 1000.0 {
+    if x.is_finite() && x.abs() >= 999.5 {
         let last = 10f64.powf(x.abs().log10().floor() - 2.0);
         return whole((x / last).round() * last);
     }
@@ -74,13 +72,19 @@ pub(super) fn interval((low, high): (f64, f64)) -> String {
     format!("{}…{}", value(low, fine), value(high, fine))
 }
 
-/// A ratio with the digits that its interval leaves meaning to, and the interval.
-pub(super) fn ratio(ratio: &Ratio) -> [String; 2] {
-    let (low, high) = ratio.interval;
-    [
-        value(ratio.value, 0.5 * (high - low)),
-        interval(ratio.interval),
-    ]
+/// A value with the digits that its interval leaves meaning to, and the interval.
+pub(super) fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
+    [value(of, 0.5 * (high - low)), interval((low, high))]
+}
+
+/// A value with its 1σ.
+pub(super) fn plus_minus(of: f64, own: f64) -> String {
+    format!("{} ± {}", value(of, own), sigma(own))
+}
+
+/// A number or a dash.
+pub(super) fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
+    of.map_or_else(|| "–".to_owned(), shown)
 }
 
 /// A time in minutes with its unit.

@@ -1,254 +1,241 @@
-//! The report as text: what a calibration engineer reads at a glance.
+//! A document as text for a terminal of any width.
 
-use std::fmt::Write;
+use comfy_table::{CellAlignment, ContentArrangement, presets};
+use textwrap::Options;
 
-use comfy_table::{CellAlignment, Table, presets};
+use super::document::{Block, Document, Facts, List, Medium, Table};
 
-use super::group::{Group, axis_name};
-use super::number::{count, sigma, three_digits, value};
-use super::{Report, blocks, further, navigation, quality, side_by_side};
-use crate::calibration::{Estimate, Nis, Outcome, to_vector};
+/// A heading of a column is broken into lines of at least so many letters.
+const HEADING: usize = 9;
+/// Between two columns.
+const GAP: usize = 2;
 
-impl Report<'_> {
-    /// The estimates with their σ, what the run taught, and warnings.
-    pub fn summary(&self) -> String {
-        let mut text = self.heading();
-        if let Some(estimate) = self.estimate() {
-            let _ = writeln!(text, "\n{}", self.estimates(estimate));
-        }
-        if self.truth.is_some() {
-            let _ = writeln!(text, "\n{}", self.group_errors());
-        }
-        if let Some(line) = navigation::outlook::line(self.navigation.unwrap_or_default()) {
-            let _ = writeln!(text, "\n{line}");
-        }
-        if let Some(left) = self.quality_table() {
-            let _ = write!(text, "\n{}\n{}", left.title, columns(&left));
-        }
-        for of_blocks in blocks::tables(self.effects) {
-            let _ = write!(text, "\n{}\n{}", of_blocks.title, columns(&of_blocks));
-        }
-        for warning in self.warnings() {
-            let _ = writeln!(text, "\nWarning: {warning}");
-        }
-        text
-    }
-
-    /// What the calibration leaves of gravity and turns.
-    pub(super) fn quality_table(&self) -> Option<side_by_side::Table> {
-        quality::table(self.quality?, self.table())
-    }
-
-    /// What a calibration engineer must know before using the figures.
-    pub(super) fn warnings(&self) -> Vec<String> {
-        let of_closed_form = self.closed_form.map_or(&[][..], |closed| closed.findings);
-        let of_outcome = self.outcome.map_or(&[][..], |outcome| &outcome.findings);
-        let findings = of_closed_form.iter().chain(of_outcome);
-        let mut warnings: Vec<String> = findings.map(ToString::to_string).collect();
-        warnings.extend(blocks::advice(self.effects));
-        warnings
-    }
-
-    fn heading(&self) -> String {
-        let imu = &self.run.recording.imu;
-        let mut text = format!(
-            "{}: {} s, {} samples at {} Hz, {} dwells",
-            self.title,
-            value(imu.duration(), 10.0),
-            count(imu.len()),
-            three_digits(1.0 / imu.period),
-            self.dwells.len(),
-        );
-        if let Some(estimate) = self.estimate() {
-            let _ = write!(text, "; {} installation", estimate.form().name());
-        }
-        let _ = writeln!(text, "; body frame: {}", self.body_frame.words());
-        if let Some(outcome) = self.outcome {
-            let _ = writeln!(text, "{}", passes(outcome));
-        } else if let Some(closed_form) = self.closed_form {
-            let _ = writeln!(text, "closed form: {}", closed_form.note);
-        }
-        text
-    }
-
-    fn estimates(&self, estimate: &Estimate) -> Table {
-        let (values, sigmas) = (estimate.vector(), estimate.sigma());
-        let truth = self.truth.map(to_vector);
-        let prior = self.outcome.map(|outcome| outcome.prior_sigma);
-        let mut headings = vec!["", "", "value", "", "σ", "unit"];
-        if prior.is_some() {
-            headings.extend(["prior σ", "prior : σ"]);
-        }
-        if truth.is_some() {
-            headings.extend(["error", "error/σ"]);
-        }
-        let mut table = table(&headings);
-        for group in Group::all() {
-            for (n, index) in group.estimated(estimate).into_iter().enumerate() {
-                let shown = |x: f64| x / group.unit_value();
-                let s = shown(sigmas[index]);
-                let mut row = vec![
-                    if n == 0 { group.title() } else { String::new() },
-                    axis_name(estimate.form(), index),
-                    value(group.shown(values[index]), s),
-                    "±".to_owned(),
-                    sigma(s),
-                    group.unit().to_owned(),
-                ];
-                if let Some(prior) = prior {
-                    row.push(three_digits(shown(prior[index])));
-                    row.push(three_digits(prior[index] / sigmas[index]));
-                }
-                if let Some(truth) = truth {
-                    let error = shown(values[index] - truth[index]);
-                    row.push(value(error, s));
-                    row.push(value(error / s, 1.0));
-                }
-                table.add_row(row);
-            }
-        }
-        if let Some(outcome) = self.outcome {
-            for row in further::rows(&outcome.auxiliary, self.true_terms) {
-                let mut cells = vec![
-                    if row.first {
-                        row.title.to_owned()
-                    } else {
-                        String::new()
-                    },
-                    row.axis,
-                    row.value,
-                    "±".to_owned(),
-                    row.sigma,
-                    row.unit.to_owned(),
-                    row.prior,
-                    three_digits(1.0 / row.remaining),
-                ];
-                if truth.is_some() {
-                    cells.extend(row.error.unwrap_or(["–", "–"].map(str::to_owned)));
-                }
-                table.add_row(cells);
-            }
-        }
-        align(table)
-    }
-
-    /// Each method's errors, group by group.
-    fn group_errors(&self) -> Table {
-        let Some(truth) = self.truth.map(to_vector) else {
-            return table(&[]);
-        };
-        let methods: Vec<(&str, &Estimate)> = self
-            .closed_form
-            .map(|closed| ("closed form", closed.estimate))
-            .into_iter()
-            .chain(self.outcome.map(|outcome| ("EKF", &outcome.estimate)))
-            .collect();
-        let mut headings = vec!["largest error".to_owned(), "unit".to_owned()];
-        for (name, _) in &methods {
-            headings.extend([(*name).to_owned(), "RMS".to_owned(), "RMS σ".to_owned()]);
-        }
-        if methods.len() == 2 {
-            headings.push("gain of σ".to_owned());
-        }
-        let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
-        let mut table = table(&headings);
-        for group in Group::all() {
-            let mut row = vec![group.title(), group.unit().to_owned()];
-            let mut claimed = Vec::new();
-            for (_, estimate) in &methods {
-                let indices = group.estimated(estimate);
-                let of = |v| group.spread(&v, &indices).unwrap_or((f64::NAN, f64::NAN));
-                let (largest, rms) = of(estimate.vector() - truth);
-                let (_, sigma) = of(estimate.sigma());
-                claimed.push(sigma);
-                row.extend([largest, rms, sigma].map(three_digits));
-            }
-            if let [closed, filter] = claimed[..] {
-                row.push(three_digits(closed / filter));
-            }
-            table.add_row(row);
-        }
-        align(table)
-    }
-}
-
-fn passes(outcome: &Outcome) -> String {
-    let consistency = &outcome.consistency;
-    let nis = |nis: &Nis| {
-        format!(
-            "{} ({} to {})",
-            value(nis.mean, 0.01),
-            value(nis.interval.0, 0.01),
-            value(nis.interval.1, 0.01)
-        )
+/// The document as text: what was done, tables, and last, where a reader looks first, conclusions and warnings.
+/// Lines are at most `width` letters long; without a width, as for a file or a pipe, they are as long as they
+/// are, so that each row and each sentence is one line.
+pub fn text(document: &Document, width: Option<usize>) -> String {
+    let paragraphs = |texts: &[&str]| -> Vec<String> {
+        let texts = texts.iter().filter(|text| !text.is_empty());
+        texts.flat_map(|text| wrapped(text, "", width)).collect()
     };
-    let observed = [
-        ("velocity", consistency.velocity),
-        ("table", consistency.table),
-    ];
-    let observed: Vec<String> = observed
-        .iter()
-        .filter(|(_, of)| of.count > 0)
-        .map(|(name, of)| format!("{name} {}", nis(of)))
+    let lead = document.lead.iter().map(String::as_str);
+    let lead: Vec<&str> = std::iter::once(document.title.as_str())
+        .chain(lead)
         .collect();
-    format!(
-        "{} after {} passes; NIS with its 95 % interval: {}",
-        if outcome.converged {
-            "converged"
-        } else {
-            "NOT CONVERGED"
-        },
-        outcome.passes.len(),
-        observed.join(", "),
-    )
-}
-
-/// Pairs of a name and a value, the values below each other.
-pub(super) fn facts(rows: &[(String, String)]) -> String {
-    let width = rows.iter().map(|(name, _)| name.chars().count()).max();
-    let width = width.unwrap_or(0);
-    let mut text = String::new();
-    for (name, value) in rows {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "  {name:<width$}  {value}");
+    let mut parts = vec![paragraphs(&lead)];
+    for (medium, block) in &document.blocks {
+        if *medium == Medium::Page {
+            continue;
+        }
+        parts.push(match block {
+            Block::Facts(of) => facts(of, width),
+            Block::Table(of) => table(of, width),
+            Block::List(of) => list(of, "  ", width),
+            Block::Text(heading, text) => paragraphs(&[heading, text]),
+            Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
+            Block::Plot(_) => continue,
+        });
     }
-    text
+    parts.push(list(&document.conclusions, "  ", width));
+    parts.push(list(&document.warnings, "! ", width));
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    let parts: Vec<String> = parts.map(|part| part.join("\n")).collect();
+    let text = parts.join("\n\n");
+    let lines = text.lines().map(|line| line.trim_end().to_owned() + "\n");
+    lines.collect()
 }
 
-/// A table in columns, its sections apart, with its notes.
-pub(super) fn columns(of: &side_by_side::Table) -> String {
-    let headings: Vec<&str> = of.headings.iter().map(String::as_str).collect();
-    let mut table = table(&headings);
-    table.add_rows(of.sections.iter().flatten());
-    let shown = align(table).to_string();
-    let lines: Vec<&str> = shown.lines().map(str::trim_end).collect();
-    let width = lines.iter().map(|line| line.chars().count()).max();
-    let rule = "─".repeat(width.unwrap_or(0));
+/// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
+fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
+    let fits = |width: &usize| textwrap::core::display_width(text) > *width;
+    let Some(width) = width.filter(fits) else {
+        return vec![text.to_owned()];
+    };
+    let options = Options::new(width)
+        .subsequent_indent(indent)
+        .break_words(false);
+    let lines = textwrap::wrap(text, options).into_iter();
+    lines.map(|line| line.into_owned()).collect()
+}
+
+fn list(of: &List, mark: &str, width: Option<usize>) -> Vec<String> {
+    if of.items.is_empty() {
+        return Vec::new();
+    }
+    let items = of.items.iter();
+    let items = items.flat_map(|item| wrapped(&format!("{mark}{item}"), "  ", width));
+    headed(&of.heading, items)
+}
+
+/// Values below each other.
+fn facts(of: &Facts, width: Option<usize>) -> Vec<String> {
+    let names = of.rows.iter().map(|(name, _)| name.chars().count());
+    let longest = names.max().unwrap_or(0);
+    let indent = " ".repeat(longest + 4);
+    let rows = of.rows.iter();
+    let rows = rows
+        .flat_map(|(name, value)| wrapped(&format!("  {name:<longest$}  {value}"), &indent, width));
+    headed(&of.heading, rows)
+}
+
+/// Lines below a heading, if there is one.
+fn headed(heading: &str, lines: impl Iterator<Item = String>) -> Vec<String> {
+    let heading = Some(heading.to_owned()).filter(|heading| !heading.is_empty());
+    heading.into_iter().chain(lines).collect()
+}
+
+/// A table that is made narrower step by step: headings in several lines, then without the columns that it can
+/// do without, at last in parts below each other that repeat the first column.
+fn table(of: &Table, width: Option<usize>) -> Vec<String> {
+    let mut lines = headed(&of.heading, std::iter::empty());
+    let all: Vec<usize> = (0..of.columns.len()).collect();
+    let Some(width) = width else {
+        lines.extend(laid_out(of, &all, false));
+        lines.extend(of.notes.clone());
+        return lines;
+    };
+    let wide = |columns: &[usize], broken: bool| {
+        let widths = columns
+            .iter()
+            .map(|&column| column_width(of, column, broken) + GAP);
+        widths.sum::<usize>().saturating_sub(GAP) > width
+    };
+    let broken = wide(&all, false);
+    let mut columns = all;
+    let mut optional = of.optional.iter();
+    while wide(&columns, broken)
+        && let Some(least) = optional.next_back()
+    {
+        columns.retain(|column| column != least);
+    }
+    let mut rest = columns.split_off(columns.len().min(1));
+    let first = columns;
+    while !rest.is_empty() {
+        let mut count = rest.len();
+        while count > 1 && wide(&[&first, &rest[..count]].concat(), broken) {
+            count -= 1;
+        }
+        let later = rest.split_off(count);
+        lines.extend(laid_out(of, &[first.as_slice(), &rest].concat(), broken));
+        if !later.is_empty() {
+            lines.push(String::new());
+        }
+        rest = later;
+    }
+    lines.extend(
+        of.notes
+            .iter()
+            .flat_map(|note| wrapped(note, "", Some(width))),
+    );
+    lines
+}
+
+fn cell_width(of: &Table, column: usize) -> usize {
+    let cells = of
+        .sections
+        .iter()
+        .flatten()
+        .filter_map(|row| row.get(column));
+    let widths = cells.map(|cell| textwrap::core::display_width(cell));
+    widths.max().unwrap_or(0)
+}
+
+fn heading(of: &Table, column: usize, broken: bool) -> String {
+    let heading = &of.columns[column];
+    if !broken {
+        return heading.clone();
+    }
+    let room = cell_width(of, column).max(HEADING);
+    textwrap::fill(heading, Options::new(room).break_words(false))
+}
+
+fn column_width(of: &Table, column: usize, broken: bool) -> usize {
+    let heading = heading(of, column, broken);
+    let lines = heading.lines().map(textwrap::core::display_width);
+    lines.max().unwrap_or(0).max(cell_width(of, column))
+}
+
+/// Some columns with a rule before each section.
+fn laid_out(of: &Table, columns: &[usize], broken: bool) -> Vec<String> {
+    let mut table = comfy_table::Table::new();
+    table
+        .load_preset(presets::NOTHING)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(columns.iter().map(|&column| heading(of, column, broken)));
+    for row in of.sections.iter().flatten() {
+        table.add_row(
+            columns
+                .iter()
+                .map(|&column| row.get(column).map_or("", String::as_str)),
+        );
+    }
+    let last = columns.len().saturating_sub(1);
+    for (place, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, if place == last { 0 } else { GAP as u16 }));
+        if place > 0 {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let shown = table.to_string();
+    let lines: Vec<&str> = shown.lines().collect();
+    let widest = lines
+        .iter()
+        .map(|line| textwrap::core::display_width(line))
+        .max();
+    let rule = "─".repeat(widest.unwrap_or(0));
     // A heading may take several lines, a row takes one.
-    let count: usize = of.sections.iter().map(Vec::len).sum();
-    let (heading, mut rows) = lines.split_at(lines.len().saturating_sub(count));
-    let mut text = heading.join("\n") + "\n";
+    let rows: usize = of.sections.iter().map(Vec::len).sum();
+    let (heading, mut rows) = lines.split_at(lines.len().saturating_sub(rows));
+    let mut laid_out: Vec<String> = heading.iter().map(|&line| line.to_owned()).collect();
     for section in &of.sections {
-        let (of_section, others) = rows.split_at(section.len().min(rows.len()));
-        let _ = writeln!(text, "{rule}\n{}", of_section.join("\n"));
+        let (these, others) = rows.split_at(section.len().min(rows.len()));
+        laid_out.push(rule.clone());
+        laid_out.extend(these.iter().map(|&line| line.to_owned()));
         rows = others;
     }
-    for note in &of.notes {
-        let _ = writeln!(text, "{note}");
-    }
-    text
+    laid_out
 }
 
-/// A table without frames: first column to the left, all others to the right.
-fn table(headings: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(headings);
-    table
-}
+#[cfg(test)]
+mod tests {
+    use super::super::document::cells;
+    use super::*;
 
-fn align(mut table: Table) -> Table {
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
+    fn document() -> Document {
+        let mut document = Document::new("A result");
+        document
+            .lead
+            .push("What was done to what, in a sentence that goes on.".to_owned());
+        document.both(Facts::new(
+            "Facts",
+            [("long name", "one two three four five six seven")],
+        ));
+        let mut table = Table::new("Table", ["", "first number", "second number", "the last"])
+            .section([cells!["gyro x", "1.0", "22.0 ± 0.1", "–"]])
+            .section([cells!["gyro y", "−1.0", "2.0 ± 0.1", "3"]])
+            .note("How it is read, which takes some words more than fit.");
+        table.optional = vec![2];
+        document.both(table);
+        document
+            .warnings
+            .items
+            .push("Something must be known before this is used.".to_owned());
+        document
     }
-    table
+
+    #[test]
+    fn text_for_a_pipe_has_a_line_for_each_row_and_sentence() {
+        insta::assert_snapshot!(text(&document(), None));
+    }
+
+    #[test]
+    fn text_fits_a_terminal_and_leaves_out_what_it_can_do_without() {
+        insta::assert_snapshot!(text(&document(), Some(40)));
+        for width in [24, 32, 40, 60] {
+            let text = text(&document(), Some(width));
+            let longest = text.lines().map(textwrap::core::display_width).max();
+            assert!(longest <= Some(width), "{width}:\n{text}");
+        }
+        assert!(!text(&document(), Some(24)).contains("22.0"));
+    }
 }

@@ -1,4 +1,4 @@
-//! Where the instrument stands: dwells, found from the table's readings or, without a table, from the
+//! Where the instrument is at rest: dwells, found from the table's readings or, without a table, from the
 //! instrument itself.
 
 mod imu;
@@ -14,7 +14,7 @@ use crate::imu::Sensor;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
 
-/// A stretch of samples during which the instrument stands.
+/// Samples during which the instrument is at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dwell {
     /// Samples that lie wholly within it.
@@ -32,7 +32,7 @@ pub struct Position {
     pub attitude: Matrix3<f64>,
 }
 
-/// Readings of a standing table differ by less than this many σ of their noise …
+/// Readings of a table at rest differ by less than this many σ of their noise …
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
@@ -42,7 +42,7 @@ const SHORTEST: f64 = 0.5;
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 /// … beyond their noise …
 const STILL_SIGMAS: f64 = 6.0;
-/// … and more than the worst bias may wander, rad/s.
+/// … and more than the worst bias may drift, rad/s.
 const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 
 impl Run {

@@ -21,16 +21,16 @@ pub struct Integrator {
 ///
 /// `ω_ib = ω_nb + C_n_b ω_ie`, `f = −C_n_b g + ω̇_ib × r + ω_ib × (ω_ib × r)`, with r the lever arm.
 ///
-/// to which the instrument's further terms with these parameters are added. While the table stands both are constant and computed once.
+/// to which the instrument's error terms with these parameters are added. While the table stands both are constant and computed once.
 pub fn true_increments(
     motion: &Motion,
     site: &Site,
     integrator: &Integrator,
-    further: &TermVector,
+    terms: &TermVector,
 ) -> PerSensor<Vec<Vector3<f64>>> {
     let &Integrator { period, .. } = integrator;
     let samples = (motion.duration() / period + 1e-6) as usize;
-    let sensed = Sensed::new(motion, site, integrator.lever_arm, *further);
+    let sensed = Sensed::new(motion, site, integrator.lever_arm, *terms);
     let mut gyro = Vec::with_capacity(samples);
     let mut accel = Vec::with_capacity(samples);
     let mut push = |(angle, velocity): (Vector3<f64>, Vector3<f64>)| {
@@ -67,17 +67,17 @@ struct Sensed<'a> {
     earth_rate_n: Vector3<f64>,
     gravity_n: Vector3<f64>,
     lever_arm: Vector3<f64>,
-    further: TermVector,
+    terms: TermVector,
 }
 
 impl<'a> Sensed<'a> {
-    fn new(motion: &'a Motion, site: &Site, lever_arm: Vector3<f64>, further: TermVector) -> Self {
+    fn new(motion: &'a Motion, site: &Site, lever_arm: Vector3<f64>, terms: TermVector) -> Self {
         Self {
             motion,
             earth_rate_n: site.earth_rate_n(),
             gravity_n: site.gravity_n(),
             lever_arm,
-            further,
+            terms,
         }
     }
 
@@ -90,7 +90,7 @@ impl<'a> Sensed<'a> {
         let r = self.lever_arm;
         let force = acceleration.cross(&r) + rate.cross(&rate.cross(&r))
             - state.attitude.tr_mul(&self.gravity_n);
-        if self.further == TermVector::zeros() {
+        if self.terms == TermVector::zeros() {
             return (rate, force);
         }
         let sensed = imu::Sensed {
@@ -99,7 +99,7 @@ impl<'a> Sensed<'a> {
             angular_acceleration: acceleration,
             force,
         };
-        let added = |sensor| sensed.added(sensor, &self.further);
+        let added = |sensor| sensed.added(sensor, &self.terms);
         (rate + added(Sensor::Gyro), force + added(Sensor::Accel))
     }
 

@@ -122,7 +122,7 @@ impl Scenario {
         Ok(self)
     }
 
-    /// The same scenario with the errors of a block, of usual size unless its models state one.
+    /// The same scenario with an error term, of usual magnitude unless its models state one.
     pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
             ErrorTerm::GaussMarkovBias => {
@@ -159,8 +159,8 @@ impl Scenario {
         let errors = &self.table.errors;
         match block {
             ErrorTerm::GaussMarkovBias => {
-                let wanders = |sensor| self.instrument.noise.get(sensor).gauss_markov.is_some();
-                Sensor::ALL.into_iter().any(wanders)
+                let varies = |sensor| self.instrument.noise.get(sensor).gauss_markov.is_some();
+                Sensor::ALL.into_iter().any(varies)
             }
             ErrorTerm::TableBase => sees_table && errors.level.max(errors.north) > 0.0,
             ErrorTerm::TableAxes => sees_table && errors.nonorthogonality > 0.0,
@@ -213,7 +213,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// The true parameters of further terms.
+    /// The true parameters of error terms.
     pub(super) fn draw_terms(&self, rng: &mut ChaCha8Rng) -> TermVector {
         self.instrument.term_sigma.map(|sigma| {
             let unit: f64 = StandardNormal.sample(rng);
@@ -289,10 +289,8 @@ impl SiteFile {
             self.longitude_deg.0 * DEGREE,
             self.height_m.0,
         );
-        Site {
-            gravity: self.gravity_m_s2.map_or(site.gravity, |g| g.0),
-            ..site
-        }
+        // What is simulated is known.
+        site.with_gravity(self.gravity_m_s2.map_or(site.gravity, |g| g.0), 0.0)
     }
 }
 

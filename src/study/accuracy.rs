@@ -3,9 +3,9 @@
 //!
 //! Everything is compared in the general form and in the body frame of the table.
 
+mod auxiliary;
 mod baseline;
 mod figures;
-mod further;
 mod navigation;
 mod trial;
 
@@ -25,9 +25,9 @@ use crate::turntable::TableError;
 use figures::{Squares, rms};
 use navigation::Way;
 
+pub use auxiliary::ErrorTermAccuracy;
 pub use baseline::Baseline;
 pub use figures::Figures;
-pub use further::FurtherAccuracy;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
@@ -38,7 +38,7 @@ pub struct AccuracyStudy {
     pub scenario: Scenario,
     /// The filter's installation form; the truth has that of the scenario.
     pub form: InstallationForm,
-    /// Blocks of states whose errors are there and that the filter does not have.
+    /// Error terms that are there and that the filter does not have.
     pub unmodelled: Vec<ErrorTerm>,
     /// Which noise the filter uses.
     pub noise: NoisePolicy,
@@ -87,8 +87,8 @@ pub struct Accuracy {
     /// NEES/n over all runs; `None` if no run gave an estimate.
     pub anees: Option<Anees>,
     /// Figures of each block of constants beside the parameters that was estimated.
-    pub further: Vec<FurtherAccuracy>,
-    /// What each block of states did to the filter in the first run: see [`crate::calibration::test_error_terms`].
+    pub error_terms: Vec<ErrorTermAccuracy>,
+    /// What each error term did to the filter in the first run: see [`crate::calibration::test_error_terms`].
     pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
@@ -165,7 +165,7 @@ impl AccuracyStudy {
                 .collect(),
             navigation,
             not_navigated,
-            further: further::figures(&trials),
+            error_terms: auxiliary::figures(&trials),
             effects: trials
                 .first()
                 .map_or_else(Vec::new, |trial| trial.effects.clone()),

@@ -1,5 +1,5 @@
 //! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated by
-//! the closed form and by the filter, and navigate with what is left of their errors.
+//! the closed form and by the filter, and navigate with the errors that remain.
 //!
 //! A calibration's navigation error is `error(t) = (S(t) + Φ(t) X₀) δθ`: S what the parameter errors
 //! δθ do on the way, X₀ what they did to the alignment at the start. Both are linear, so each mission

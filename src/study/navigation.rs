@@ -63,7 +63,7 @@ pub struct Pair {
     pub truth: PerSensor<Triad>,
     /// What it is taken for.
     pub calibration: PerSensor<Triad>,
-    /// Covariance of the calibration less the truth; none if no σ is claimed.
+    /// Covariance of the calibration minus the truth; none if no σ is claimed.
     pub covariance: Option<ParameterMatrix>,
 }
 

@@ -2,7 +2,7 @@
 //! Jiang, Li 2016, §3.2).
 //!
 //! Installation angles are drawn (six independent ones for each triad, rows of unit norm), the triad
-//! is calibrated by the closed form from six positions without noise, and what is left of its errors
+//! is calibrated by the closed form from six positions without noise, and the errors that remain
 //! at rest is navigated with, standing level at a perfect alignment and with height held: gyros and
 //! accelerometers one after the other. The figure of a sample is the largest absolute error of the
 //! run.
@@ -299,7 +299,7 @@ impl Table1Study {
     }
 }
 
-/// What a calibration computes from the output at rest, less the true input.
+/// What a calibration computes from the output at rest, minus the true input.
 fn sensed(truth: &Triad, calibrated: Option<Triad>, input: &Vector3<f64>) -> Option<Vector3<f64>> {
     let calibrated = calibrated?;
     Some(calibrated.correction()? * (truth.output(input) - calibrated.bias) - input)

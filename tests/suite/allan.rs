@@ -165,7 +165,7 @@ fn a_label_that_is_not_there_is_answered_with_those_that_are() {
     let moving = json(&turncal(&["allan", &run, "--segment", "turning", "--json"]).success());
     assert_eq!(moving["stands"], false);
     let warnings = moving["warnings"].to_string();
-    assert!(warnings.contains("does not stand"), "{warnings}");
+    assert!(warnings.contains("is not stationary"), "{warnings}");
 }
 
 #[test]

@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 use serde_json::Value;
-use turncal::calibration::{CalibrationError, Reference, estimate, six_position};
+use turncal::calibration::{
+    Finding, Options, Problem, Reference, estimate, parameter_name, six_position,
+};
 use turncal::imu::{InstallationForm, PerSensor};
 use turncal::simulation::Scenario;
 use turncal::units::{DEGREE, MICRO_G, MILLI_G};
@@ -34,11 +36,11 @@ fn labelled_sections_give_what_another_program_finds_in_them() {
             return;
         };
         let run = read(&directory);
-        let closed_form =
-            six_position(&Problem::new(&run, &Options::default().installation(FORM))).unwrap();
+        let problem = Problem::new(&run, &Options::default());
+        let closed_form = six_position(&problem).unwrap();
         assert_eq!(closed_form.reference, Reference::Labels);
         assert_eq!((closed_form.positions.accel, closed_form.turns), (6, 3));
-        let record = closed_form.record(&run, &closed_form.quality(&run).unwrap());
+        let record = closed_form.record(&problem, &closed_form.quality(&problem).unwrap());
         let peer = peer(&directory, angle);
         for i in 0..3 {
             let scale = record.accel.scale[i];
@@ -59,19 +61,30 @@ fn labelled_sections_give_what_another_program_finds_in_them() {
 }
 
 #[test]
-fn sections_laid_end_to_end_are_refused_where_turns_must_be_navigated() {
+fn static_sections_laid_end_to_end_show_accelerometers_and_name_what_gyros_hide() {
     let Some(directory) = shared("real-mems-raw-sections") else {
         return;
     };
     let mut run = read(&directory);
-    let refused = estimate(
-        &Problem::new(&run, &Options::default().installation(FORM)),
-        &|_| {},
-    )
-    .unwrap_err();
-    assert_eq!(refused, CalibrationError::NotContinuous);
+    assert!(!run.recording.imu.continuous);
+    let problem = Problem::new(&run, &Options::default());
+    let outcome = estimate(&problem, &|_| {}).unwrap();
+    assert!(outcome.converged);
+    // Six static sections, each a stretch of its own; the turns between them cannot be navigated.
+    assert_eq!(problem.dwells().count(), 6);
+    assert_eq!(outcome.prior_attitudes.len(), 6);
+    let hidden = |finding: &Finding| match finding {
+        Finding::NotObserved { parameters, .. } => parameters.clone(),
+        _ => Vec::new(),
+    };
+    let hidden: Vec<String> = outcome.findings.iter().flat_map(hidden).collect();
+    let gyro = |name: &String| name.starts_with("gyro.scale") || name.starts_with("gyro.inst");
+    let of_gyros = (0..).map_while(|k| parameter_name(FORM, k)).filter(gyro);
+    let of_gyros: Vec<String> = of_gyros.collect();
+    assert_eq!((of_gyros.len(), hidden), (9, of_gyros));
+
     run.recording.segments.truncate(5);
-    let refused = six_position(&Problem::new(&run, &Options::default().installation(FORM)))
+    let refused = six_position(&Problem::new(&run, &Options::default()))
         .unwrap_err()
         .to_string();
     assert!(
@@ -86,20 +99,14 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
         return;
     };
     let run = read(&directory);
-    let filtered = estimate(
-        &Problem::new(&run, &Options::default().installation(FORM)),
-        &|_| {},
-    )
-    .unwrap();
+    let problem = Problem::new(&run, &Options::default());
+    let filtered = estimate(&problem, &|_| {}).unwrap();
     assert!(filtered.converged);
-    let by_filter = filtered.quality(&run).unwrap();
+    let by_filter = filtered.quality(&problem).unwrap();
     let mut unlabelled = run.clone();
     unlabelled.recording.segments.clear();
-    let by_gravity = six_position(&Problem::new(
-        &unlabelled,
-        &Options::default().installation(FORM),
-    ))
-    .unwrap();
+    let unlabelled = Problem::new(&unlabelled, &Options::default());
+    let by_gravity = six_position(&unlabelled).unwrap();
     assert_eq!(by_gravity.reference, Reference::Gravity);
     // What imucal leaves over all standstills, and on those that it did not use.
     for all in [by_filter.all, by_gravity.quality(&unlabelled).unwrap().all] {
@@ -121,12 +128,9 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
 fn errors_of_scale_show_in_gravity_and_in_turns_by_their_size() {
     let simulated = Scenario::load("demo").unwrap().simulate(6, 0).unwrap();
     let run = simulated.run;
-    let outcome = estimate(
-        &Problem::new(&run, &Options::default().installation(FORM)),
-        &|_| {},
-    )
-    .unwrap();
-    let quality = outcome.quality(&run).unwrap();
+    let problem = Problem::new(&run, &Options::default());
+    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let quality = outcome.quality(&problem).unwrap();
     // 5 µg/√Hz over 15 s and a bias instability; arc seconds of table and walk.
     assert!(quality.all.gravity.rms < 3.0 * MICRO_G);
     assert!(quality.all.turns.rms < 5.0 / 3600.0 * DEGREE);
@@ -144,7 +148,7 @@ fn errors_of_scale_show_in_gravity_and_in_turns_by_their_size() {
         triad.scale.component_mul_assign(&size);
         triad
     });
-    let judged = spoilt.quality(&run).unwrap();
+    let judged = spoilt.quality(&problem).unwrap();
     // What is held out is judged by a calibration of its own, which is not spoilt.
     assert_eq!(judged.held_out, quality.held_out);
     let all = judged.all;

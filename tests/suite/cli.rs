@@ -183,7 +183,7 @@ fn both_methods_may_follow_one_another_without_a_name_for_their_output() {
 #[test]
 fn wrong_usage_is_status_two_and_names_the_way() {
     for (arguments, way) in [
-        (&["calibrate"][..], "Usage: turncal calibrate <RUN>"),
+        (&["calibrate"][..], "Usage: turncal calibrate <RUN.toml>"),
         (
             &["calibrate", "run.toml", "--installation", "four-angle"],
             "general, six-angle, three-angle",

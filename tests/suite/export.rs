@@ -7,10 +7,9 @@ use std::process;
 
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
-use turncal::calibration::result::Calibration;
-use turncal::calibration::result::{BodyFrame, TermRecord, TestVector, TriadRecord};
+use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
 use turncal::formats::export::{Exported, Format, write};
-use turncal::imu::{BiasVariation, Noise, Nominal, PerSensor};
+use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
 
@@ -136,10 +135,7 @@ fn the_c_header_compiles_without_a_warning_and_gives_the_test_vectors() {
         ("notes", "*/ int x = ;\n#error \u{2028} in C:\\"),
         ("table", "which??/"),
     ] {
-        record
-            .recording
-            .meta
-            .insert(name.to_owned(), notes.to_owned());
+        record.meta.insert(name.to_owned(), notes.to_owned());
     }
     let root = tempfile::tempdir().unwrap();
     let header = exported(&record, Format::C).text;
@@ -405,7 +401,7 @@ fn run() -> Run {
     };
     run.instrument.noise.gyro = Noise {
         random_walk: 2e-5,
-        bias_variation: Some(BiasVariation {
+        gauss_markov: Some(GaussMarkov {
             sigma: 4e-7,
             correlation_time: 200.0,
         }),
@@ -468,7 +464,7 @@ fn without_a_run_noise_keys_are_comments_that_say_where_figures_come_from() {
 #[test]
 fn a_calibration_in_a_unit_of_its_own_is_divided_by_that_unit() {
     let mut record = record();
-    record.instrument.unit = Some(PerSensor {
+    record.unit = Some(PerSensor {
         gyro: "deg/s".to_owned(),
         accel: "g".to_owned(),
     });
@@ -569,7 +565,7 @@ fn wrong_use_of_export_says_what_to_do() {
     .code(1);
     assert_eq!(fs::read(&path).unwrap(), before);
     let mut other = run();
-    other.nominal.accel = Nominal(Vector3::repeat(1e3));
+    other.instrument.nominal.accel = Nominal(Vector3::repeat(1e3));
     let error = write(&record(), Format::Kalibr, Some(&other)).unwrap_err();
     assert!(error.to_string().contains("accel x"), "{error}");
 }

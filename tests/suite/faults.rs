@@ -5,9 +5,9 @@ use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use turncal::calibration::{CalibrationError, Outcome, estimate};
+use turncal::calibration::{Finding, Options, Outcome, Problem, estimate};
 use turncal::formats::write_run;
-use turncal::imu::{InstallationForm, Output, Sensor};
+use turncal::imu::{Output, Sensor};
 use turncal::recording::FaultKind;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
@@ -72,7 +72,7 @@ impl Log {
 
     /// Rows of the longest dwell, or of the longest turn.
     fn longest(&self, turn: bool) -> Range<usize> {
-        let dwells = self.clean.dwells();
+        let dwells = self.clean.dwells(self.clean.aiding());
         let stretches: Vec<Range<usize>> = if turn {
             let pairs = dwells.windows(2);
             pairs
@@ -86,14 +86,7 @@ impl Log {
 }
 
 fn calibrated(run: &Run) -> Outcome {
-    let outcome = estimate(
-        &Problem::new(
-            run,
-            &Options::default().installation(InstallationForm::General),
-        ),
-        &|_| {},
-    )
-    .unwrap();
+    let outcome = estimate(&Problem::new(run, &Options::default()), &|_| {}).unwrap();
     assert!(outcome.converged);
     outcome
 }
@@ -117,7 +110,7 @@ fn against(clean: &Outcome, spoilt: &Outcome) -> (f64, f64, f64) {
 
 #[test]
 fn sound_records_have_no_faults() {
-    assert_eq!(Log::new().clean.imu.faults, []);
+    assert_eq!(Log::new().clean.recording.imu.faults, []);
     for name in [
         "nineteen-position-clean",
         "nineteen-position-full",
@@ -130,7 +123,7 @@ fn sound_records_have_no_faults() {
         let Some(directory) = shared(name) else {
             continue;
         };
-        assert_eq!(read(&directory).imu.faults, [], "{name}");
+        assert_eq!(read(&directory).recording.imu.faults, [], "{name}");
     }
 }
 
@@ -139,7 +132,7 @@ fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
     let mut log = Log::new();
     let clean = calibrated(&log.clean);
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
-    let second = (1.0 / log.clean.imu.period).round() as usize;
+    let second = (1.0 / log.clean.recording.imu.period).round() as usize;
 
     // In the middle of a dwell gyro x, in that of a turn accelerometer x.
     let middle = |rows: Range<usize>| rows.start + rows.len() / 2 - second / 2;
@@ -200,7 +193,7 @@ fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
         assert!(fault.samples.start.abs_diff(start) <= 3, "{fault:?}");
         assert!(fault.samples.len().abs_diff(second) <= 5, "{fault:?}");
     }
-    assert_eq!(run.recording.imu.len(), log.clean.imu.len());
+    assert_eq!(run.recording.imu.len(), log.clean.recording.imu.len());
     assert_eq!(run.recording.notes.len(), 4, "{:?}", run.recording.notes);
 
     let spoilt = calibrated(&run);
@@ -213,35 +206,36 @@ fn what_is_wrong_is_found_and_its_error_is_in_the_sigma() {
 }
 
 #[test]
-fn what_no_interpolation_bridges_is_refused_with_its_place() {
+fn what_no_interpolation_bridges_parts_the_record_and_is_said_with_its_place() {
     let mut log = Log::new();
     let turn = log.longest(true);
-    let second = (1.0 / log.clean.imu.period).round() as usize;
+    let second = (1.0 / log.clean.recording.imu.period).round() as usize;
     log.rows.drain(turn.start..turn.start + 5 * second / 2);
     let run = log.read();
-    let refused = estimate(
-        &Problem::new(
-            &run,
-            &Options::default().installation(InstallationForm::General),
-        ),
-        &|_| {},
-    )
-    .unwrap_err();
-    assert!(matches!(refused, CalibrationError::Unbridged { .. }));
+    let [before, after] = &run.recording.imu.stretches[..] else {
+        panic!("{:?}", run.recording.imu.stretches);
+    };
+    let lost = after.samples.start - before.samples.end;
+    assert_eq!(lost, 5 * second / 2);
+    let spoilt = calibrated(&run);
     let line = format!("line {}", turn.start + 1);
-    let words = refused.to_string();
-    assert!(
-        words.contains("missing from") && words.contains(&line),
-        "{words}"
-    );
-    // What stands is as it was.
-    assert_eq!(run.dwells(run.aiding()).len(), log.clean.dwells().len());
+    let said = |finding: &Finding| {
+        let words = finding.to_string();
+        words.contains("part the record") && words.contains(&line)
+    };
+    assert!(spoilt.findings.iter().any(said), "{:?}", spoilt.findings);
+    // What stands is as it was, and so are the parameters.
+    let dwells = |run: &Run| run.dwells(run.aiding()).len();
+    assert_eq!(dwells(&run), dwells(&log.clean));
+    let (rms, least, _) = against(&calibrated(&log.clean), &spoilt);
+    assert!(rms < 1.0, "{rms}");
+    assert!(least > 0.999, "{least}: lost samples told something");
 }
 
 #[test]
 fn time_comes_in_any_unit_or_not_at_all() {
     let mut log = Log::new();
-    let clean = log.clean.imu.clone();
+    let clean = log.clean.recording.imu.clone();
     let directory = log.place.path().join("run");
     let toml = std::fs::read_to_string(directory.join("run.toml")).unwrap();
     let stamps: Vec<f64> = log.rows.iter().map(|row| row[0].parse().unwrap()).collect();
@@ -261,14 +255,14 @@ fn time_comes_in_any_unit_or_not_at_all() {
             1,
         );
         std::fs::write(directory.join("run.toml"), with_unit).unwrap();
-        let imu = log.read().imu;
+        let imu = log.read().recording.imu;
         assert_eq!((imu.len(), imu.faults.len()), (clean.len(), 0), "{unit}");
-        assert!((imu.start() - clean.start).abs() < 1e-6, "{unit}");
+        assert!((imu.start() - clean.start()).abs() < 1e-6, "{unit}");
         assert!((imu.period - clean.period).abs() < 1e-12, "{unit}");
     }
     let untimed = toml.replace("time = \"t\", gyro", "gyro");
     let (before, _) = untimed.split_once("[turntable]").unwrap();
     std::fs::write(directory.join("run.toml"), before).unwrap();
-    let imu = log.read().imu;
+    let imu = log.read().recording.imu;
     assert_eq!((imu.len(), imu.start()), (clean.len(), 0.0));
 }

@@ -12,14 +12,14 @@ use proptest::sample::{Index, select};
 use proptest::test_runner::{Config, TestRunner};
 use tempfile::TempDir;
 use turncal::calibration::result::Calibration;
-use turncal::calibration::{Correction, estimate, six_position};
+use turncal::calibration::{Correction, Options, Problem, estimate, six_position};
 use turncal::formats::draft::Draft;
 use turncal::formats::write_run;
-use turncal::imu::{InstallationForm, Output};
+use turncal::imu::Output;
 use turncal::models;
 use turncal::noise::Stretch;
 use turncal::noise::conventions::convert;
-use turncal::report::check::CheckReport;
+use turncal::report::check;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::survey::Survey;
@@ -228,11 +228,9 @@ fn read_run(directory: &Path) -> Result<(), String> {
         if without_table {
             run.recording.table = None;
         }
-        if let Ok(closed_form) = six_position(&Problem::new(
-            &run,
-            &Options::default().installation(InstallationForm::General),
-        )) {
-            let _ = closed_form.quality(&run);
+        let problem = Problem::new(&run, &Options::default());
+        if let Ok(closed_form) = six_position(&problem) {
+            let _ = closed_form.quality(&problem);
         }
     }
     Ok(())
@@ -252,12 +250,9 @@ fn runs_that_make_no_sense_are_looked_at_all_the_same() {
         fuzz(&run, file, |directory| {
             let run = Run::read(&directory.join("run.toml")).map_err(|error| error.to_string())?;
             let survey = Survey::of(&run);
-            let report = CheckReport {
-                run: &run,
-                survey: &survey,
-            };
-            let _ = report.summary();
-            serde_json::to_string(&report.document()).unwrap();
+            let document = check::document(&run, &survey);
+            let _ = turncal::report::terminal::text(&document, Some(80));
+            let _ = turncal::report::json(&document);
             Ok(())
         })
     });
@@ -301,14 +296,9 @@ fn runs_whose_figures_make_no_sense_are_calibrated_or_refused() {
             if without_table {
                 run.recording.table = None;
             }
-            if let Ok(outcome) = estimate(
-                &Problem::new(
-                    &run,
-                    &Options::default().installation(InstallationForm::General),
-                ),
-                &|_| {},
-            ) {
-                let _ = outcome.quality(&run);
+            let problem = Problem::new(&run, &Options::default());
+            if let Ok(outcome) = estimate(&problem, &|_| {}) {
+                let _ = outcome.quality(&problem);
             }
         }
         Ok(())
@@ -362,15 +352,9 @@ fn spoilt_models() {
 fn spoilt_calibrations() {
     let run = small_run();
     let read = Run::read(&run.path().join("run.toml")).unwrap();
-    let outcome = estimate(
-        &Problem::new(
-            &read,
-            &Options::default().installation(InstallationForm::General),
-        ),
-        &|_| {},
-    )
-    .unwrap();
-    let record = outcome.record(&read, &[], &outcome.quality(&read).unwrap());
+    let problem = Problem::new(&read, &Options::default());
+    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let record = outcome.record(&problem, &[], &outcome.quality(&problem).unwrap());
     let path = run.path().join("calibration.json");
     record.write(&path, false).unwrap();
     let kept = fuzz(&run, "calibration.json", |directory| {

@@ -77,7 +77,7 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
         let error = Run::read(&path).unwrap_err().to_string();
         assert!(error.contains("no `latitude_deg`"), "{error}");
 
-        let scale = given.nominal.gyro.0.x.to_string();
+        let scale = given.instrument.nominal.gyro.0.x.to_string();
         let known = BTreeMap::from([
             ("site.latitude_deg", "49.6".to_owned()),
             ("site.height_m", "280.0".to_owned()),
@@ -90,15 +90,20 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
         ]);
         fs::write(&path, completed(&draft, &known)).unwrap();
         let found = Run::read(&path).unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
-        assert_eq!(found.unit, given.unit, "{name}");
-        assert_eq!(found.imu.continuous, given.imu.continuous, "{name}");
+        assert_eq!(found.instrument.unit, given.instrument.unit, "{name}");
+        assert_eq!(
+            found.recording.imu.continuous, given.recording.imu.continuous,
+            "{name}"
+        );
         assert!(
-            (found.imu.period / given.imu.period - 1.0).abs() < 1e-5,
+            (found.recording.imu.period / given.recording.imu.period - 1.0).abs() < 1e-5,
             "{name}"
         );
         for sensor in Sensor::ALL {
-            let (found_scale, given_scale) =
-                (found.nominal.get(sensor).0.x, given.nominal.get(sensor).0.x);
+            let (found_scale, given_scale) = (
+                found.instrument.nominal.get(sensor).0.x,
+                given.instrument.nominal.get(sensor).0.x,
+            );
             assert!(
                 (found_scale / given_scale - 1.0).abs() < 0.1,
                 "{name} {found_scale} {given_scale}"

@@ -405,7 +405,6 @@ impl Reader<'_> {
 }
 
 #[test]
-#[ignore = "until the rooms are rebuilt"]
 fn no_module_imports_one_that_imports_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs");
     let modules = Crate::read(&root);

@@ -153,7 +153,7 @@ fn a_report_has_a_page_figures_and_a_table_by_the_minute() {
     let shown = navigate(&calibration, &truth, &options).success();
     let text = String::from_utf8(shown.get_output().stdout.clone()).unwrap();
     assert!(
-        text.contains("standing at latitude 45") && text.contains("nmile/40 h"),
+        text.contains("stationary at latitude 45") && text.contains("nmile/40 h"),
         "{text}"
     );
     let csv = std::fs::read_to_string(report.join("navigation.csv")).unwrap();

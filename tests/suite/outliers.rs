@@ -6,10 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::attitude::exp;
-use turncal::calibration::{Observation, to_vector};
-use turncal::calibration::{Outcome, estimate};
-use turncal::calibration::{PARAMETERS, ParameterVector};
-use turncal::imu::InstallationForm;
+use turncal::calibration::{
+    Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem, estimate, to_vector,
+};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
 
@@ -25,8 +24,8 @@ fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng) {
+    let turn = exp(direction(rng) * (size * run.table.reading_sigma));
     let table = run.recording.table.as_mut().unwrap();
-    let turn = exp(direction(rng) * (size * table.reading_sigma));
     table.attitude[reading] = turn * table.attitude[reading];
 }
 
@@ -42,14 +41,7 @@ fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
-    let outcome = estimate(
-        &Problem::new(
-            &simulated.run,
-            &Options::default().installation(InstallationForm::General),
-        ),
-        &|_| {},
-    )
-    .unwrap();
+    let outcome = estimate(&Problem::new(&simulated.run, &Options::default()), &|_| {}).unwrap();
     assert!(outcome.converged);
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);
     let normalised = error.component_div(&outcome.estimate.sigma());

@@ -2,10 +2,10 @@
 
 use assert_cmd::Command;
 use serde_json::Value;
-use turncal::calibration::ParameterVector;
-use turncal::calibration::to_vector;
-use turncal::calibration::{bound, estimate, six_position};
-use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
+use turncal::calibration::{
+    Options, ParameterVector, Problem, bound, estimate, six_position, to_vector,
+};
+use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::simulation::Scenario;
 use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
@@ -39,27 +39,19 @@ fn rms(of_runs: &[ParameterVector], triad: usize, kind: ParameterKind) -> f64 {
 
 /// Errors of filter and closed form, σ of the bound and of the filter, of each run made by itself.
 fn by_hand() -> [Vec<ParameterVector>; 4] {
-    let form = InstallationForm::General;
     let scenario = Scenario::load("demo").unwrap();
     let positions = scenario.clone().with_path("six-position").unwrap();
     let mut all = [const { Vec::new() }; 4];
     for stream in 0..RUNS {
         let made = scenario.simulate(SEED, stream).unwrap();
-        let filtered = estimate(
-            &Problem::new(&made.run, &Options::default().installation(form)),
-            &|_| {},
-        )
-        .unwrap()
-        .estimate;
+        let problem = Problem::new(&made.run, &Options::default());
+        let filtered = estimate(&problem, &|_| {}).unwrap().estimate;
         let truth = to_vector(&made.truth);
-        let bound = bound(&made.run, &made.truth, &made.further).unwrap();
+        let bound = bound(&problem, &made.truth, &made.terms).unwrap();
         let at_rest = positions.simulate(SEED, stream).unwrap();
-        let closed = six_position(&Problem::new(
-            &at_rest.run,
-            &Options::default().installation(form),
-        ))
-        .unwrap()
-        .estimate;
+        let closed = six_position(&Problem::new(&at_rest.run, &Options::default()))
+            .unwrap()
+            .estimate;
         let of_run = [
             filtered.vector() - truth,
             closed.vector() - to_vector(&at_rest.truth),

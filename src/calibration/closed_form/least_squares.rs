@@ -62,7 +62,7 @@ pub fn six_position_triad(
     let mut bias = Vector3::zeros();
     // Of the rows of A and of D, four numbers a row.
     let mut covariance = [Matrix4::zeros(); 3];
-    // A size for the inputs, so that columns are of one size.
+    // One scale for the inputs, so that columns are alike.
     let unscale = Matrix4::from_diagonal(&Vector4::new(1.0 / size, 1.0 / size, 1.0 / size, 1.0));
     for axis in 0..3 {
         let sigma = |p: &Position| p.weighted[axis].sqrt().max(NOISELESS * size);
@@ -135,7 +135,7 @@ fn split_covariance(
     result
 }
 
-/// How much of a small turn about any axis each component of an input sees, squared: the size of the
+/// How much of a small turn about any axis each component of an input sees, squared: the magnitude of the
 /// other two components.
 pub(super) fn across(input: &Vector3<f64>) -> Vector3<f64> {
     input.map(|component| input.norm_squared() - component.powi(2))

@@ -13,7 +13,7 @@ pub enum Reference {
     Table,
     /// Labels of sections: an axis up, a turn about an axis by an angle.
     Labels,
-    /// Gravity alone: its size at rest, its direction before and after each turn.
+    /// Gravity alone: its magnitude at rest, its direction before and after each turn.
     Gravity,
 }
 

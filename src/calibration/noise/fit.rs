@@ -80,7 +80,8 @@ impl Likelihood<'_> {
                 })
                 .collect())
         });
-        let differences: Vec<Vec<(f64, f64)>> = differences.collect::<Result<_, CalibrationError>>()?;
+        let differences: Vec<Vec<(f64, f64)>> =
+            differences.collect::<Result<_, CalibrationError>>()?;
         let n = sources.len();
         let score = DVector::from_fn(n, |i, _| {
             let each = here.scalars.iter().zip(&differences[i]);

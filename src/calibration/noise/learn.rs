@@ -174,9 +174,7 @@ impl Likelihood<'_> {
             let one_sided = usize::from(bounded.contains(&i));
             limit(1 - one_sided, one_sided, chance)
         };
-        let suspect = |i: &usize| {
-            slope.statistic_of(*i, bounded.contains(i)) > of_one(*i, SCREEN)
-        };
+        let suspect = |i: &usize| slope.statistic_of(*i, bounded.contains(i)) > of_one(*i, SCREEN);
         let suspects: Vec<usize> = (0..sources.len()).filter(suspect).collect();
         let suspicious = test.score > test.score_limit || !suspects.is_empty();
         if policy == NoisePolicy::Auto && !suspicious {

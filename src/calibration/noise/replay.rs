@@ -5,7 +5,7 @@ use super::super::error::CalibrationError;
 use super::super::layout::Layout;
 use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::parameters::to_vector;
-use super::super::pass::{Filter, Measurement, ScalarInnovation, navigator};
+use super::super::pass::{Filter, Measurement, ScalarInnovation, begin, navigator};
 use super::super::problem::{Problem, Stretch};
 use super::super::schedule::{AtRest, Step};
 use crate::imu::{PerSensor, Sensor};
@@ -116,10 +116,9 @@ impl<'a> Script<'a> {
         let stretches = problem.stretches().iter().zip(self.priors);
         let of_each = self.events.iter().zip(&self.at.initial_attitudes);
         for ((stretch, prior), (events, initial)) in stretches.zip(of_each) {
-            let anew = before != Some(stretch.recording);
-            before = Some(stretch.recording);
             let start = stretch.start(prior, initial);
-            pass.filter.begin(&start, model.position_sigma, anew);
+            begin(&mut pass.filter, model, before, stretch, &start);
+            before = Some(stretch);
             for event in events {
                 match event {
                     Event::Move(block) => pass.filter.propagate(block),
@@ -195,7 +194,10 @@ impl Pass<'_> {
             // One scalar after the other is the Cholesky factorisation of all three.
             let three = self.filter.update(measurement);
             scalars.extend(three);
-            three.iter().map(|s| s.innovation.powi(2) / s.variance).sum()
+            three
+                .iter()
+                .map(|s| s.innovation.powi(2) / s.variance)
+                .sum()
         } else {
             let whitened = self.filter.whitened(measurement);
             whitened.map_or(f64::NAN, |(whitened, _)| whitened.norm_squared())

@@ -20,10 +20,18 @@ impl NoiseReport {
             // Writing to a string cannot fail.
             let _ = match figures.source {
                 Source::AngleRandomWalk => {
-                    writeln!(text, "{} = {value}", NoiseKeys::of(Sensor::Gyro).random_walk.0)
+                    writeln!(
+                        text,
+                        "{} = {value}",
+                        NoiseKeys::of(Sensor::Gyro).random_walk.0
+                    )
                 }
                 Source::VelocityRandomWalk => {
-                    writeln!(text, "{} = {value}", NoiseKeys::of(Sensor::Accel).random_walk.0)
+                    writeln!(
+                        text,
+                        "{} = {value}",
+                        NoiseKeys::of(Sensor::Accel).random_walk.0
+                    )
                 }
                 Source::GyroGaussMarkov => {
                     gauss_markov(&mut text, Sensor::Gyro, &value, correlation_time.gyro)

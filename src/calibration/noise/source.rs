@@ -100,7 +100,13 @@ impl Source {
     /// as none.
     pub(super) fn sigma(self, problem: &Problem) -> f64 {
         let model = &problem.model;
-        let gauss_markov = |sensor| model.noise.get(sensor).gauss_markov.map_or(0.0, |g| g.sigma);
+        let gauss_markov = |sensor| {
+            model
+                .noise
+                .get(sensor)
+                .gauss_markov
+                .map_or(0.0, |g| g.sigma)
+        };
         match self {
             Self::AngleRandomWalk => model.noise.gyro.random_walk,
             Self::VelocityRandomWalk => model.noise.accel.random_walk,

@@ -63,8 +63,8 @@ impl Filter {
 
     /// A stretch begins: navigation errors and the table's position start anew, `anew` tells whether the
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, as in another recording.
-    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool) {
+    /// 4th ed., §3.8) does, too, as in another recording; `gravity` is its 1σ at another site.
+    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude();
         for axis in 0..3 {
             for (first, mean, sigma) in [
@@ -83,6 +83,9 @@ impl Filter {
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
         self.redraw_table(table_sigma);
+        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+            self.redraw(state, 0.0, sigma);
+        }
         if anew {
             for k in 0..self.varying.len() {
                 let (state, sigma, _) = self.varying[k];
@@ -159,15 +162,17 @@ impl Filter {
             of_triad(sensor, parameter)
         });
         let terms = block.terms.iter().map(|term| term.column.column(0));
+        // Stated gravity that is too small pulls the computed velocity down too little.
+        let t = block.duration;
+        let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
+        let gravity = self.layout.gravity().map(|_| pull);
         // A bias does the same whether it varies or stays.
         let varying = self.layout.varying_biases();
         let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        navigation
-            .chain(parameters)
-            .chain(terms)
-            .chain(varying)
-            .map(|column| std::array::from_fn(|row| column[row]))
-            .collect()
+        let known = navigation.chain(parameters).chain(terms);
+        let known = known.map(|column| std::array::from_fn(|row| column[row]));
+        let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
+        known.chain(gravity).chain(varying).collect()
     }
 
     /// Varying biases forget as time goes by, and are driven.
@@ -211,7 +216,12 @@ impl Filter {
         let mut scalars = [ScalarInnovation::default(); 3];
         let n = self.x.len();
         let (mut ph, mut gain, mut rest) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        for (axis, (row, z)) in measurement.rows.iter().zip(&measurement.residual).enumerate() {
+        for (axis, (row, z)) in measurement
+            .rows
+            .iter()
+            .zip(&measurement.residual)
+            .enumerate()
+        {
             self.times_upper(row, &mut ph);
             let variance = times(row, &ph) + measurement.variance;
             let scale = 1.0 / variance;
@@ -381,6 +391,12 @@ impl Filter {
     /// Covariance of two states' errors.
     pub fn covariance(&self, one: usize, other: usize) -> f64 {
         self.p[(one, other)]
+    }
+
+    /// Mean and 1σ of the error of gravity, true − stated; zero where it is no state.
+    pub fn gravity(&self) -> (f64, f64) {
+        let of = |state: usize| (self.x[state], self.p[(state, state)].max(0.0).sqrt());
+        self.layout.gravity().map_or((0.0, 0.0), of)
     }
 
     /// 1σ of the initial attitude error φ₀ of this stretch, East, North and Up.

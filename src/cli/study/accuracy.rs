@@ -94,10 +94,6 @@ impl Accuracy {
         let runs = Runs::new(self.runs);
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);
-        begun.deliver(
-            |directory| report::accuracy::write(&accuracy, directory),
-            || report::accuracy::document(&accuracy),
-            || report::accuracy::summary(&accuracy),
-        )
+        begun.deliver(&report::accuracy::document(&accuracy))
     }
 }

@@ -61,10 +61,6 @@ impl Experiment {
         let runs = Runs::new(self.samples);
         let experiment = study.run(&|| runs.one_done())?;
         drop(runs);
-        begun.deliver(
-            |directory| report::experiment::write(&experiment, directory),
-            || report::experiment::document(&experiment),
-            || report::experiment::summary(&experiment),
-        )
+        begun.deliver(&report::experiment::document(&experiment))
     }
 }

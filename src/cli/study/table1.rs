@@ -49,10 +49,6 @@ impl Table1 {
         let activity = Activity::new("calibrating and navigating");
         let table = study.run()?;
         drop(activity);
-        begun.deliver(
-            |directory| report::table1::write(&table, directory),
-            || report::table1::document(&table),
-            || report::table1::summary(&table),
-        )
+        begun.deliver(&report::table1::document(&table))
     }
 }

@@ -125,7 +125,7 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     triads
 }
 
-/// Triads side by side: gravity keeps the size of one of them, the other is a gyro's.
+/// Triads side by side: gravity keeps the magnitude of one of them, the other is a gyro's.
 fn by_numbers(
     sheet: &Sheet,
     time: Option<usize>,
@@ -151,7 +151,7 @@ fn by_numbers(
     }
 }
 
-/// Median departure of a triad's size from its median, relative.
+/// Median departure of a triad's magnitude from its median, relative.
 fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
     let rows = 0..sheet.columns[triad[0]].len();
     let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));

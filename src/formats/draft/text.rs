@@ -162,7 +162,7 @@ impl Draft {
             }
         }
         if columns.by_size && columns.triads.gyro.is_some() {
-            text.push_str("# The triads were told by their numbers: gravity keeps the size of the accelerometers'.\n");
+            text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
         }
         let mut fields = Vec::new();
         match columns.time {
@@ -196,7 +196,9 @@ impl Draft {
     }
 
     fn noise_table(&self, text: &mut String) {
-        text.push_str("\n# white noise at rest; better from hours of standing still, by turncal allan\n[imu.noise]\n");
+        text.push_str(
+            "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
+        );
         let random_walk =
             |sensor| Some(self.noise.get(sensor).as_ref()? / self.quantities.scale(sensor)?.abs());
         for (sensor, key, unit) in [

@@ -174,7 +174,7 @@ impl Quantities {
         self.output_why = match self.output {
             Output::Pulse => "whole numbers whose sums vary less than they would if fractions were not carried over".to_owned(),
             Output::Increment => format!("gravity times {} s a row", short(seconds)),
-            Output::Rate => "gravity has the same size whatever the rate of rows".to_owned(),
+            Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
         };
     }
 

@@ -26,7 +26,7 @@ pub(super) fn write(source: &Source) -> Exported {
         accel: lower(triads.accel.sensitivity * imu_b.transpose()),
     };
     let q = Term::GSensitivity.parameters().start;
-    let q = Matrix3::from_fn(|i, j| source.correction.further[q + 3 * i + j]);
+    let q = Matrix3::from_fn(|i, j| source.correction.terms[q + 3 * i + j]);
     let of_force = triads.gyro.sensitivity * q * (gyro_imu * imu_b).transpose();
 
     let notes = [

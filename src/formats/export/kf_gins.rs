@@ -160,7 +160,7 @@ fn noise(file: &mut Document, source: &Source) {
         "# imunoise:"
     });
     let noise = source.run.map(|run| run.instrument.noise);
-    let wander = |sensor| {
+    let bias = |sensor| {
         noise
             .as_ref()
             .and_then(|noise| noise.get(sensor).gauss_markov)
@@ -182,12 +182,12 @@ fn noise(file: &mut Document, source: &Source) {
         walk(Sensor::Accel, M_PER_S_PER_SQRT_H),
         "m/s/sqrt(h)",
     );
-    let sigma = |sensor, unit: f64| wander(sensor).map(|bias| bias.sigma / unit);
+    let sigma = |sensor, unit: f64| bias(sensor).map(|bias| bias.sigma / unit);
     key("gbstd", sigma(Sensor::Gyro, DEG_PER_H), "deg/h");
     key("abstd", sigma(Sensor::Accel, MILLIGAL), "mGal");
-    file.line("#  gsstd: [ , , ]  # ppm: how far scale factors wander, from the data sheet");
+    file.line("#  gsstd: [ , , ]  # ppm: 1σ by which scale factors vary, from the data sheet");
     file.line("#  asstd: [ , , ]  # ppm: the same");
-    let times = Sensor::ALL.map(wander).into_iter().flatten();
+    let times = Sensor::ALL.map(bias).into_iter().flatten();
     match times.map(|bias| bias.correlation_time).reduce(f64::min) {
         Some(time) => file.line(&format!(
             "  corrtime: {}  # h, one for all; the shorter of gyros and accelerometers",

@@ -122,11 +122,11 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Parameters of further terms, a line each, in SI.
+    /// Parameters of error terms, a line each, in SI.
     pub fn term_lines(&self, has: impl Fn(Term) -> bool) -> Vec<String> {
         let line = |k: usize| {
             let term = Term::of(k).filter(|&term| has(term))?;
-            let (name, value) = (Term::parameter_name(k)?, self.correction.further[k]);
+            let (name, value) = (Term::parameter_name(k)?, self.correction.terms[k]);
             let adds = match term {
                 Term::AccelSecondOrder => "q f^2 along its axis to f",
                 Term::AccelAsymmetry => "q |f| along its axis to f",
@@ -139,7 +139,7 @@ impl<'a> Source<'a> {
         self.correction.terms().filter_map(line).collect()
     }
 
-    /// That further terms are not held, if there are any.
+    /// That error terms are not held, if there are any.
     pub fn terms_note(&self, held: impl Fn(Term) -> bool) -> Option<String> {
         let names: Vec<&str> = Term::ALL
             .into_iter()
@@ -148,7 +148,7 @@ impl<'a> Source<'a> {
             .collect();
         (!names.is_empty()).then(|| {
             format!(
-                "further terms are not corrected by it ({}); `turncal apply` corrects them",
+                "error terms are not corrected by it ({}); `turncal apply` corrects them",
                 names.join(", ")
             )
         })

@@ -112,17 +112,19 @@ fn transition_of_parameter_errors_is_the_derivative_of_navigation() {
                 difference.rows(0, 6).into_owned(),
                 epsilon = 3e-5
             );
+            // Position moves with t³ by a gyro and with t² by an accelerometer: the first is small.
+            let floor = [3e-4, 5e-3][sensor as usize];
             assert_relative_eq!(
                 column.rows(6, 3).into_owned(),
                 difference.rows(6, 3).into_owned(),
-                epsilon = 5e-3
+                epsilon = floor
             );
         }
     }
 }
 
 #[test]
-fn transition_of_further_parameters_is_the_derivative_of_navigation() {
+fn transition_of_error_terms_is_the_derivative_of_navigation() {
     // As large as precise instruments have them.
     let some = TermVector::from_fn(|k, _| {
         0.1 * Term::of(k).map_or(0.0, Term::usual_sigma) * (k as f64).cos()
@@ -169,13 +171,7 @@ fn an_ideal_instrument_at_rest_stays_at_rest() {
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-    let mut navigator = Navigator::new(
-        &record,
-        &site,
-        &ideal,
-        State::at_rest(attitude),
-    )
-    .unwrap();
+    let mut navigator = Navigator::new(&record, &site, &ideal, State::at_rest(attitude)).unwrap();
     let end = navigator.advance(0..samples).state;
     assert_relative_eq!(end.attitude, attitude, epsilon = 1e-12);
     assert!(end.velocity.norm() < 1e-9 && end.position.norm() < 1e-7);
@@ -226,8 +222,7 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
     let first = navigator.advance(0..SAMPLES / 2);
     let second = navigator.advance(SAMPLES / 2..SAMPLES);
     let of = |block: &Block| block.noise.covariance(&noise);
-    let composed =
-        second.navigation * of(&first) * second.navigation.transpose() + of(&second);
+    let composed = second.navigation * of(&first) * second.navigation.transpose() + of(&second);
     assert_relative_eq!(of(&whole), composed, epsilon = 1e-7);
 }
 

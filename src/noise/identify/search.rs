@@ -253,22 +253,22 @@ impl<'a> Search<'a> {
             })
         };
         let hidden = Process::SLOPES.into_iter().filter(|&process| {
-            // What wanders with a correlation time has no floor besides.
+            // What varies with a correlation time has no floor besides.
             let floor = process == Process::BiasInstability && best.has(MARKOV);
             !best.has(process) && !floor && process != Process::RateRamp
         });
         hidden.filter_map(limit).collect()
     }
 
-    /// With the nearest Gauss–Markov process in the place of whatever wanders.
+    /// With the nearest Gauss–Markov process in the place of whatever varies.
     fn for_filter(&self, best: &Candidate, misfit: f64) -> Option<Vec<Found>> {
-        let wanders = [Process::BiasInstability, Process::RateRandomWalk, MARKOV];
-        let (wandering, others): (Vec<Process>, Vec<Process>) = best
+        let varies = [Process::BiasInstability, Process::RateRandomWalk, MARKOV];
+        let (varying, others): (Vec<Process>, Vec<Process>) = best
             .processes()
             .into_iter()
-            .partition(|process| wanders.iter().any(|w| w.same_kind(*process)));
+            .partition(|process| varies.iter().any(|w| w.same_kind(*process)));
         let mut nearest = best.clone();
-        if !wandering.is_empty() {
+        if !varying.is_empty() {
             nearest = self
                 .with_markov(&others)
                 .filter_map(|processes| self.candidate(&processes, misfit))

@@ -1,16 +1,13 @@
-//! The tables, for terminal and page alike.
+//! The tables, alike for terminal and page.
 
-use super::super::blocks;
-use super::super::further::{title, unit};
-use super::super::number::{count, interval, minutes, ratio, three_digits, value};
-use super::super::side_by_side::Table;
-use super::merit::{Merit, journey_name, merits, region_name};
-use super::verdict::white_within;
+use super::super::document::{NONE, Table, cells};
+use super::super::number::{count, interval, minutes, or_dash, three_digits, value, with_interval};
+use super::super::terms::{title, unit};
+use super::compared::{Compared, compared, journey_name, region_name, white_within};
 use crate::calibration::Nis;
-use crate::study::accuracy::FurtherAccuracy;
+use crate::study::accuracy::{Containment, ErrorTermAccuracy};
 use crate::study::{Accuracy, Ratio};
 
-const NONE: &str = "–";
 const AGAINST_BOUND: [&str; 7] = [
     "",
     "unit",
@@ -20,14 +17,6 @@ const AGAINST_BOUND: [&str; 7] = [
     "error/bound",
     "99 % interval",
 ];
-
-pub(super) fn tables(accuracy: &Accuracy) -> Vec<Table> {
-    let mut tables = vec![bound(accuracy), gain(accuracy), consistency(accuracy)];
-    tables.extend(further(accuracy));
-    tables.extend(blocks::tables(&accuracy.effects));
-    tables.extend(containment(accuracy));
-    tables
-}
 
 /// What ought to be one, with the digits that the width of its interval leaves meaning to.
 pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
@@ -43,151 +32,140 @@ pub(super) fn factor(factor: f64) -> String {
     mean(factor, (0.99, 1.01))
 }
 
-fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
-    of.map_or([NONE; 2].map(str::to_owned), ratio)
+/// A share in per cent.
+pub(super) fn percent(share: f64) -> String {
+    value(100.0 * share, 1.0)
 }
 
-/// A row for each merit, a section for each triad and for navigation.
-fn by_merit(accuracy: &Accuracy, cells: impl Fn(&Merit) -> Vec<String>) -> Vec<Vec<Vec<String>>> {
-    let row = |of: &Merit| {
-        let mut row = vec![of.title.clone(), of.unit.to_owned()];
-        row.extend(cells(of));
-        row
-    };
-    merits(accuracy)
+fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
+    let cells = of.map(|of| with_interval(of.value, of.interval));
+    cells.unwrap_or([NONE; 2].map(str::to_owned))
+}
+
+/// A row for each, a section for each triad and for navigation.
+fn sections(
+    accuracy: &Accuracy,
+    cells: impl Fn(&Compared) -> Vec<String>,
+) -> Vec<Vec<Vec<String>>> {
+    let row = |of: &Compared| [cells![of.title.as_str(), of.unit], cells(of)].concat();
+    compared(accuracy)
         .chunk_by(|a, b| a.sensor == b.sensor)
         .map(|section| section.iter().map(row).collect())
         .collect()
 }
 
 /// RMS error, σ and bound in a unit, and the ratio of the first to the last.
-fn against_bound(rms: [f64; 3], unit: f64, ratio: Option<&Ratio>) -> impl Iterator<Item = String> {
+fn against_bound(rms: [f64; 3], unit: f64, ratio: Option<&Ratio>) -> Vec<String> {
     let rms = rms.map(|rms| three_digits(rms / unit));
-    rms.into_iter().chain(ratio_cells(ratio))
+    rms.into_iter().chain(ratio_cells(ratio)).collect()
 }
 
-fn bound(accuracy: &Accuracy) -> Table {
-    Table {
-        title: "EKF against the Cramér–Rao bound",
-        headings: AGAINST_BOUND.map(str::to_owned).to_vec(),
-        sections: by_merit(accuracy, |of| {
-            let figures = of.figures;
-            let rms = [figures.filter, figures.claimed, figures.bound];
-            against_bound(rms, of.unit_value, figures.ratio.as_ref()).collect()
-        }),
-        notes: [
-            "RMS over all runs and the parameters of a group; σ: what the filter claims.",
-            "Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.",
-            "Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    }
-}
-
-/// Constants beside the parameters; none if no block of them was on.
-fn further(accuracy: &Accuracy) -> Option<Table> {
-    let row = |of: &FurtherAccuracy| {
-        let (unit, in_si) = unit(of.block);
-        [title(of.block).to_owned(), unit.to_owned()]
-            .into_iter()
-            .chain(against_bound(
-                [of.filter, of.claimed, of.bound],
-                in_si,
-                of.ratio.as_ref(),
-            ))
-            .collect()
+pub(super) fn bound(accuracy: &Accuracy) -> Table {
+    let cells = |of: &Compared| {
+        let figures = of.figures;
+        let rms = [figures.filter, figures.claimed, figures.bound];
+        against_bound(rms, of.unit_value, figures.ratio.as_ref())
     };
-    (!accuracy.further.is_empty()).then(|| Table {
-        title: "Blocks of states beside K, E and D",
-        headings: AGAINST_BOUND.map(str::to_owned).to_vec(),
-        sections: vec![accuracy.further.iter().map(row).collect()],
-        notes: vec!["RMS over all runs and the constants of a block.".to_owned()],
-    })
+    Table::new("EKF against the Cramér–Rao bound", AGAINST_BOUND)
+        .sections(sections(accuracy, cells))
+        .note("RMS over all runs and the parameters of a group; σ: what the filter claims.")
+        .note("Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.")
+        .note("Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
 
-fn gain(accuracy: &Accuracy) -> Table {
+/// Auxiliary parameters, term by term.
+pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
+    let row = |of: &ErrorTermAccuracy| {
+        let (unit, in_si) = unit(of.term);
+        let rms = [of.filter, of.claimed, of.bound];
+        let cells = against_bound(rms, in_si, of.ratio.as_ref());
+        [cells![title(of.term), unit], cells].concat()
+    };
+    Table::new("Error terms beside K, E and D", AGAINST_BOUND)
+        .section(accuracy.error_terms.iter().map(row))
+        .note("RMS over all runs and the parameters of a term.")
+}
+
+pub(super) fn gain(accuracy: &Accuracy) -> Table {
     let baseline = &accuracy.baseline;
-    let equal = baseline.equal_time().map_or(NONE.to_owned(), minutes);
-    let own = minutes(baseline.table_time);
-    let headings = vec![
-        String::new(),
-        "unit".to_owned(),
-        format!("EKF\n{}", minutes(accuracy.table_time)),
-        format!("closed form\n{own}"),
-        "gain".to_owned(),
-        "99 % interval".to_owned(),
-        format!("closed form\n{equal}"),
-        "gain".to_owned(),
-        "99 % interval".to_owned(),
+    let columns = cells![
+        "",
+        "unit",
+        format!("EKF {}", minutes(accuracy.table_time)),
+        format!("closed form {}", minutes(baseline.table_time)),
+        "gain",
+        "99 % interval",
+        format!(
+            "closed form {}",
+            baseline.equal_time().map_or(NONE.to_owned(), minutes)
+        ),
+        "gain",
+        "99 % interval",
     ];
-    Table {
-        title: "EKF against the closed form, RMS error",
-        headings,
-        sections: by_merit(accuracy, |of| {
-            let figures = of.figures;
-            let shown = |rms: f64| three_digits(rms / of.unit_value);
-            let some = |rms: Option<f64>| rms.map_or(NONE.to_owned(), shown);
-            let mut row = vec![shown(figures.filter), some(figures.closed_form)];
-            row.extend(ratio_cells(figures.gain.as_ref()));
-            row.push(some(figures.closed_form_in_equal_time));
-            row.extend(ratio_cells(figures.gain_in_equal_time.as_ref()));
-            row
-        }),
-        notes: vec![
-            "Gain: error of the closed form over error of the EKF, above 1 where the EKF is better."
-                .to_owned(),
-        ],
-    }
+    let cells = |of: &Compared| {
+        let figures = of.figures;
+        let shown = |rms: f64| three_digits(rms / of.unit_value);
+        let mut row = vec![shown(figures.filter), or_dash(figures.closed_form, shown)];
+        row.extend(ratio_cells(figures.gain.as_ref()));
+        row.push(or_dash(figures.closed_form_in_equal_time, shown));
+        row.extend(ratio_cells(figures.gain_in_equal_time.as_ref()));
+        row
+    };
+    Table::new("EKF against the closed form, RMS error", columns)
+        .sections(sections(accuracy, cells))
+        .note("Gain: error of the closed form over error of the EKF, above 1 where the EKF is better.")
 }
 
-fn consistency(accuracy: &Accuracy) -> Table {
-    let headings = [
+pub(super) fn consistency(accuracy: &Accuracy) -> Table {
+    let columns = [
         "",
         "mean",
         "95 % interval",
         "99.8 % interval",
         "numbers",
-        "lag-one\ncorrelation",
-        "99 % if\nwhite",
+        "lag-one correlation",
+        "99 % if white",
     ];
-    let mut rows = Vec::new();
-    rows.extend(accuracy.anees.map(|anees| {
-        [
-            format!("NEES/{}", anees.directions),
-            mean(anees.mean, anees.interval_95),
-            interval(anees.interval_95),
-            interval(anees.interval_998),
-            count(nees_numbers(accuracy)),
-            NONE.to_owned(),
-            NONE.to_owned(),
+    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
+    let directions = filtered.filter_map(|f| Some(f.nees?.count)).sum();
+    let nees = accuracy.anees.map(|of| {
+        cells![
+            format!("NEES/{}", of.directions),
+            mean(of.mean, of.interval_95),
+            interval(of.interval_95),
+            interval(of.interval_998),
+            count(directions),
+            NONE,
+            NONE,
         ]
-        .to_vec()
-    }));
-    for (name, nis) in [
+    });
+    let nis = [
         ("NIS zero velocity", &accuracy.velocity),
         ("NIS table attitude", &accuracy.table),
-    ] {
-        if nis.count > 0 {
-            rows.push(nis_row(name, nis));
-        }
-    }
-    Table {
-        title: "Consistency",
-        headings: headings.map(str::to_owned).to_vec(),
-        sections: vec![rows],
-        notes: [
-            "NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.",
-            "Both are one if σ are true; the intervals are χ².",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    }
+    ];
+    let nis = nis.into_iter().filter(|(_, nis)| nis.count > 0);
+    Table::new("Consistency", columns)
+        .section(nees.into_iter().chain(nis.map(|(name, nis)| nis_row(name, nis))))
+        .note("NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.")
+        .note("Both are one if σ are true; the intervals are χ².")
 }
 
-/// Whether position errors lie within their predicted σ; none if nothing was navigated.
-fn containment(accuracy: &Accuracy) -> Option<Table> {
-    let headings = [
+fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
+    let white = white_within(nis);
+    cells![
+        name,
+        mean(nis.mean, nis.interval),
+        NONE,
+        interval(nis.interval),
+        count(nis.count),
+        value(nis.lag_one, white),
+        format!("±{}", value(white, white)),
+    ]
+}
+
+/// Whether position errors lie within their predicted σ.
+pub(super) fn containment(accuracy: &Accuracy) -> Table {
+    let columns = [
         "",
         "runs",
         "within",
@@ -195,61 +173,22 @@ fn containment(accuracy: &Accuracy) -> Option<Table> {
         "99 % interval",
         "as claimed",
     ];
-    let sections: Vec<Vec<Vec<String>>> = accuracy
-        .navigation
-        .iter()
-        .filter(|of| !of.containment.is_empty())
-        .map(|of| {
-            let rows = of.containment.iter();
-            rows.map(|held| {
-                let share = |hits: usize| percent(hits as f64 / held.runs as f64);
-                let (low, high) = held.interval;
-                vec![
-                    format!("{}: {}", journey_name(of.journey), region_name(held.region)),
-                    count(held.runs),
-                    format!("{} %", share(held.within)),
-                    format!("{} %", percent(held.region.probability())),
-                    format!("{}…{} %", share(low), share(high)),
-                    if held.as_claimed() { "yes" } else { "NO" }.to_owned(),
-                ]
-            })
-            .collect()
+    let sections = accuracy.navigation.iter().map(|of| {
+        of.containment.iter().map(|held: &Containment| {
+            let share = |hits: usize| percent(hits as f64 / held.runs as f64);
+            let (low, high) = held.interval;
+            cells![
+                format!("{}: {}", journey_name(of.journey), region_name(held.region)),
+                count(held.runs),
+                format!("{} %", share(held.within)),
+                format!("{} %", percent(held.region.probability())),
+                format!("{}…{} %", share(low), share(high)),
+                if held.as_claimed() { "yes" } else { "NO" },
+            ]
         })
-        .collect();
-    (!sections.is_empty()).then(|| Table {
-        title: "Position error after 40 h within its predicted σ",
-        headings: headings.map(str::to_owned).to_vec(),
-        sections,
-        notes: [
-            "σ and ellipses: predicted from the covariance that the filter claims, by the linear error \
-             model.",
-            "Interval: binomial, of the share of the runs if the covariance is true.",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    })
-}
-
-/// A share in per cent.
-pub(super) fn percent(share: f64) -> String {
-    value(100.0 * share, 1.0)
-}
-
-/// Number of independent directions in all runs.
-fn nees_numbers(accuracy: &Accuracy) -> usize {
-    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
-    filtered.filter_map(|f| Some(f.nees?.count)).sum()
-}
-
-fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
-    let white = white_within(nis);
-    vec![
-        name.to_owned(),
-        mean(nis.mean, nis.interval),
-        NONE.to_owned(),
-        interval(nis.interval),
-        count(nis.count),
-        value(nis.lag_one, white),
-        format!("±{}", value(white, white)),
-    ]
+    });
+    Table::new("Position error after 40 h within its predicted σ", columns)
+        .sections(sections)
+        .note("σ and ellipses: predicted from the covariance that the filter claims, by the linear error model.")
+        .note("Interval: binomial, of the share of the runs if the covariance is true.")
 }

@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
+use super::super::{svg, terminal};
 use super::*;
 use crate::calibration::Group;
 use crate::imu::InstallationForm;
@@ -63,33 +64,30 @@ fn all_failed() -> Accuracy {
 }
 
 fn json(accuracy: &Accuracy) -> Value {
-    serde_json::to_value(document(accuracy)).unwrap()
+    document(accuracy).data
 }
 
 /// Sentences that say that something is wrong.
 fn doubts(accuracy: &Accuracy) -> String {
-    let doubts = verdict::verdict(accuracy).into_iter().filter(|s| !s.good);
-    doubts.map(|s| s.text + "\n").collect()
+    document(accuracy).warnings.items.join("\n")
+}
+
+fn summary(accuracy: &Accuracy) -> String {
+    terminal::text(&document(accuracy), None)
 }
 
 #[test]
-fn every_figure_is_a_file_and_on_the_page_whether_the_filter_works_or_not() {
+fn every_figure_is_drawn_whether_the_filter_works_or_not() {
     for accuracy in [small(), all_failed()] {
-        let directory = tempfile::tempdir().unwrap();
-        write(&accuracy, directory.path()).unwrap();
-        let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
-        let page = read("index.html");
-        for name in ["errors", "ratio", "nees", "gain", "time", "position"] {
-            let svg = read(&format!("{name}.svg"));
-            assert!(svg.starts_with("<svg width=\"1200\""), "{name}");
-            assert!(svg.matches("<text").count() > 5, "{name} has labels");
-            assert!(page.contains(&format!("{name}.svg")), "{name}");
-        }
-        assert!(!page.contains("<IMU>"), "text is escaped");
-        for text in [page, summary(&accuracy)] {
-            assert!(!text.contains("NaN") && !text.contains("inf"));
-        }
+        let document = document(&accuracy);
+        assert_eq!(svg::drawn(document.plots()).len(), 6);
+        let names: Vec<&str> = document.plots().map(|plot| plot.file.as_str()).collect();
+        let expected = ["errors", "ratio", "nees", "gain", "time", "position"];
+        assert_eq!(names, expected.map(|name| format!("{name}.svg")));
+        let text = summary(&accuracy);
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
     }
+    insta::assert_snapshot!(terminal::text(&document(&small()), Some(100)));
 }
 
 #[test]
@@ -197,7 +195,7 @@ fn position_errors_beyond_their_predicted_sigma_are_called_so() {
     (held.within, held.interval) = (0, (1, 3));
     let doubts = doubts(&accuracy);
     assert!(
-        doubts.contains("standing, the position error does not lie"),
+        doubts.contains("stationary, the position error does not lie"),
         "{doubts}"
     );
     assert!(

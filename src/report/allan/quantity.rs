@@ -11,8 +11,6 @@ const SQRT_HOUR: f64 = 60.0;
 pub(super) struct Quantity {
     /// Such as `angle random walk N`.
     pub name: &'static str,
-    /// Its letter, as the standards have it.
-    pub letter: &'static str,
     /// Symbol of the unit.
     pub unit: &'static str,
     /// The unit in SI.
@@ -21,93 +19,32 @@ pub(super) struct Quantity {
     pub key: &'static str,
 }
 
-/// Of a process in one triad.
-pub(super) fn quantity(process: Process, sensor: Sensor) -> Quantity {
-    let (name, letter, unit, value, key) = match (process, sensor) {
-        (Process::Quantisation, Sensor::Gyro) => {
-            ("quantisation Q", "Q", "″", ARCSEC, "quantisation_arcsec")
-        }
-        (Process::Quantisation, Sensor::Accel) => (
-            "quantisation Q",
-            "Q",
-            "mm/s",
-            MILLISECOND,
-            "quantisation_mm_per_s",
-        ),
-        (Process::RandomWalk, Sensor::Gyro) => (
-            "angle random walk N",
-            "N",
-            "°/√h",
-            DEG_PER_SQRT_H,
-            "angle_random_walk_deg_per_sqrt_h",
-        ),
-        (Process::RandomWalk, Sensor::Accel) => (
-            "velocity random walk N",
-            "N",
-            "µg/√Hz",
-            MICRO_G_PER_SQRT_HZ,
-            "velocity_random_walk_ug_per_sqrt_hz",
-        ),
-        (Process::BiasInstability, Sensor::Gyro) => (
-            "bias gauss_markov B",
-            "B",
-            "°/h",
-            DEG_PER_H,
-            "bias_instability_deg_per_h",
-        ),
-        (Process::BiasInstability, Sensor::Accel) => (
-            "bias gauss_markov B",
-            "B",
-            "µg",
-            MICRO_G,
-            "bias_instability_ug",
-        ),
-        (Process::RateRandomWalk, Sensor::Gyro) => (
-            "rate random walk K",
-            "K",
-            "°/h/√h",
-            DEG_PER_H / SQRT_HOUR,
-            "rate_random_walk_deg_per_h_per_sqrt_h",
-        ),
-        (Process::RateRandomWalk, Sensor::Accel) => (
-            "acceleration random walk K",
-            "K",
-            "µg/√h",
-            MICRO_G / SQRT_HOUR,
-            "acceleration_random_walk_ug_per_sqrt_h",
-        ),
-        (Process::RateRamp, Sensor::Gyro) => (
-            "rate ramp R",
-            "R",
-            "°/h/h",
-            DEG_PER_H / HOUR,
-            "rate_ramp_deg_per_h_per_h",
-        ),
-        (Process::RateRamp, Sensor::Accel) => (
-            "acceleration ramp R",
-            "R",
-            "µg/h",
-            MICRO_G / HOUR,
-            "acceleration_ramp_ug_per_h",
-        ),
-        (Process::GaussMarkov { .. }, Sensor::Gyro) => (
-            "Gauss–Markov σ",
-            "σ",
-            "°/h",
-            DEG_PER_H,
-            "gauss_markov_deg_per_h",
-        ),
-        (Process::GaussMarkov { .. }, Sensor::Accel) => {
-            ("Gauss–Markov σ", "σ", "µg", MICRO_G, "gauss_markov_ug")
-        }
-    };
-    Quantity {
-        name,
-        letter,
-        unit,
-        value,
-        key,
+impl Quantity {
+    /// The letter that the standards have for it.
+    pub fn letter(&self) -> &'static str {
+        self.name.rsplit(' ').next().unwrap_or_default()
     }
+}
+
+/// Of a process in one triad.
+#[rustfmt::skip]
+pub(super) fn quantity(process: Process, sensor: Sensor) -> Quantity {
+    use Process::*;
+    let (name, unit, value, key) = match (process, sensor) {
+        (Quantisation, Sensor::Gyro) => ("quantisation Q", "″", ARCSEC, "quantisation_arcsec"),
+        (Quantisation, Sensor::Accel) => ("quantisation Q", "mm/s", MILLISECOND, "quantisation_mm_per_s"),
+        (RandomWalk, Sensor::Gyro) => ("angle random walk N", "°/√h", DEG_PER_SQRT_H, "angle_random_walk_deg_per_sqrt_h"),
+        (RandomWalk, Sensor::Accel) => ("velocity random walk N", "µg/√Hz", MICRO_G_PER_SQRT_HZ, "velocity_random_walk_ug_per_sqrt_hz"),
+        (BiasInstability, Sensor::Gyro) => ("bias instability B", "°/h", DEG_PER_H, "bias_instability_deg_per_h"),
+        (BiasInstability, Sensor::Accel) => ("bias instability B", "µg", MICRO_G, "bias_instability_ug"),
+        (RateRandomWalk, Sensor::Gyro) => ("rate random walk K", "°/h/√h", DEG_PER_H / SQRT_HOUR, "rate_random_walk_deg_per_h_per_sqrt_h"),
+        (RateRandomWalk, Sensor::Accel) => ("acceleration random walk K", "µg/√h", MICRO_G / SQRT_HOUR, "acceleration_random_walk_ug_per_sqrt_h"),
+        (RateRamp, Sensor::Gyro) => ("rate ramp R", "°/h/h", DEG_PER_H / HOUR, "rate_ramp_deg_per_h_per_h"),
+        (RateRamp, Sensor::Accel) => ("acceleration ramp R", "µg/h", MICRO_G / HOUR, "acceleration_ramp_ug_per_h"),
+        (GaussMarkov { .. }, Sensor::Gyro) => ("Gauss–Markov σ", "°/h", DEG_PER_H, "gauss_markov_deg_per_h"),
+        (GaussMarkov { .. }, Sensor::Accel) => ("Gauss–Markov σ", "µg", MICRO_G, "gauss_markov_ug"),
+    };
+    Quantity { name, unit, value, key }
 }
 
 /// Unit of the Allan deviation: symbol, the unit in SI, the unit in ASCII.

@@ -1,13 +1,12 @@
 //! The coefficients and the deviations as tables.
 
-use super::super::number::{count, sigma, three_digits, value};
-use super::super::side_by_side::Table;
+use super::super::document::{NONE, Table, cells};
+use super::super::number::{count, or_dash, plus_minus, sigma, three_digits};
 use super::quantity::{deviation_unit, quantity};
 use super::words;
-use crate::imu::{AXES, PerSensor, Sensor};
+use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind};
 
-const NONE: &str = "–";
 /// In the place of any correlation time.
 const MARKOV: Process = Process::GaussMarkov {
     correlation_time: 1.0,
@@ -17,78 +16,71 @@ const MARKOV: Process = Process::GaussMarkov {
 pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     let triad = analysis.triads.get(sensor);
     let columns: Vec<&AxisNoise> = triad.axes.iter().chain([&triad.mean]).collect();
+    let row = |name: &str, unit: &str, cell: &dyn Fn(&AxisNoise) -> String| {
+        let mut row = cells![name, unit];
+        row.extend(columns.iter().map(|axis| cell(axis)));
+        row
+    };
     let mut rows = Vec::new();
     for process in Process::SLOPES.into_iter().chain([MARKOV]) {
-        let found = |axis: &&AxisNoise| of_kind(axis.found(), process).copied();
+        let found = |axis: &AxisNoise| of_kind(axis.found(), process).copied();
         let limit = |axis: &AxisNoise| axis.hidden().iter().find(|h| h.process == process).copied();
-        let is_slope = Process::SLOPES[..4].contains(&process);
-        if !is_slope && !columns.iter().any(|axis| found(axis).is_some()) {
+        let always = Process::SLOPES[..4].contains(&process);
+        if !always && !columns.iter().any(|axis| found(axis).is_some()) {
             continue;
         }
         let of = quantity(process, sensor);
-        let cell = |axis: &&AxisNoise| match (found(axis), limit(axis)) {
-            (Some(found), _) => with_sigma(found.strength / of.value, found.sigma / of.value),
-            (None, Some(hidden)) => format!("< {}", sigma(hidden.limit / of.value)),
-            (None, None) => NONE.to_owned(),
-        };
-        rows.push(row(of.name, of.unit, columns.iter().map(cell)));
+        rows.push(row(
+            of.name,
+            of.unit,
+            &|axis| match (found(axis), limit(axis)) {
+                (Some(found), _) => plus_minus(found.strength / of.value, found.sigma / of.value),
+                (None, Some(hidden)) => format!("< {}", sigma(hidden.limit / of.value)),
+                (None, None) => NONE.to_owned(),
+            },
+        ));
         if process == MARKOV {
-            let time = |axis: &&AxisNoise| found(axis).map_or(NONE.to_owned(), correlation_time);
-            rows.push(row(
-                "Gauss–Markov correlation time",
-                "s",
-                columns.iter().map(time),
-            ));
+            rows.push(row("Gauss–Markov correlation time", "s", &|axis| {
+                found(axis).map_or(NONE.to_owned(), correlation_time)
+            }));
         }
     }
     let (symbol, unit, _) = deviation_unit(sensor);
-    let lowest = columns.iter().map(|axis| match axis.minimum() {
-        _ if axis.is_constant => NONE.to_owned(),
-        Some((_, deviation)) => three_digits(deviation / unit),
-        None => "falling".to_owned(),
-    });
-    rows.push(row("lowest deviation", symbol, lowest));
-    let at = columns.iter().map(|axis| {
+    rows.push(row(
+        "lowest deviation",
+        symbol,
+        &|axis| match axis.minimum() {
+            _ if axis.is_constant => NONE.to_owned(),
+            Some((_, deviation)) => three_digits(deviation / unit),
+            None => "falling".to_owned(),
+        },
+    ));
+    rows.push(row("at a cluster time of", "s", &|axis| {
         let minimum = axis.minimum().filter(|_| !axis.is_constant);
-        minimum.map_or(NONE.to_owned(), |(tau, _)| three_digits(tau))
-    });
-    rows.push(row("at a cluster time of", "s", at));
+        or_dash(minimum.map(|(tau, _)| tau), three_digits)
+    }));
     let name = match sensor {
         Sensor::Gyro => "Gyros",
         Sensor::Accel => "Accelerometers",
     };
-    let mut headings = vec![String::new(), "unit".to_owned()];
-    headings.extend(AXES.map(String::from));
-    headings.push("triad".to_owned());
-    let mut notes = vec![
-        "± 1σ. <: its slope is not there; what it is below with 95 % probability. triad: the mean of the \
-         three variances."
-            .to_owned(),
-    ];
+    let axes = AXES.map(String::from);
+    let headings = cells!["", "unit"]
+        .into_iter()
+        .chain(axes)
+        .chain(["triad".to_owned()]);
+    let table = Table::new(name, headings).section(rows).note(
+        "± 1σ. <: its slope is not detected; 95 % upper limit. triad: the mean of the three variances.",
+    );
     let pulse = *analysis.pulse.get(sensor);
-    if pulse > 0.0 {
-        let of = quantity(Process::Quantisation, sensor);
-        notes.push(format!(
-            "One pulse makes Q = {} {}, where noise is more than a pulse.",
-            three_digits(pulse / 12f64.sqrt() / of.value),
-            of.unit
-        ));
+    if pulse <= 0.0 {
+        return table;
     }
-    Table {
-        title: name,
-        headings,
-        sections: vec![rows],
-        notes,
-    }
-}
-
-fn row(name: &str, unit: &str, cells: impl Iterator<Item = String>) -> Vec<String> {
-    let first = [name.to_owned(), unit.to_owned()];
-    first.into_iter().chain(cells).collect()
-}
-
-fn with_sigma(number: f64, of: f64) -> String {
-    format!("{} ± {}", value(number, of), sigma(of))
+    let of = quantity(Process::Quantisation, sensor);
+    table.note(format!(
+        "One pulse makes Q = {} {}, where noise is more than a pulse.",
+        three_digits(pulse / 12f64.sqrt() / of.value),
+        of.unit
+    ))
 }
 
 fn correlation_time(found: Found) -> String {
@@ -104,49 +96,45 @@ fn correlation_time(found: Found) -> String {
                 three_digits(of.exp())
             )
         }
-        Some(of) => with_sigma(correlation_time, of * correlation_time),
+        Some(of) => plus_minus(correlation_time, of * correlation_time),
         None => three_digits(correlation_time),
     }
 }
 
 /// Allan deviations of all axes at every so-manieth cluster time.
 pub(super) fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
-    let PerSensor { gyro, accel } = &analysis.triads;
-    let mut headings = vec!["τ, s".to_owned()];
-    for sensor in Sensor::ALL {
-        let symbol = deviation_unit(sensor).0;
-        headings.extend(AXES.map(|axis| format!("{} {axis}, {symbol}", sensor.name())));
-    }
-    headings.push("degrees of freedom".to_owned());
     let freedom = |triad: &TriadNoise, point: usize| {
         let of = |axis: &AxisNoise| Some(*axis.identified.as_ref()?.freedom.get(point)?);
         triad.axes.iter().filter_map(of).fold(f64::NAN, f64::min)
     };
-    let taus = gyro.mean.curve.tau.iter().enumerate();
-    let rows = taus.step_by(every).map(|(point, tau)| {
+    let triads = &analysis.triads;
+    let row = |(point, tau): (usize, &f64)| {
         let mut row = vec![three_digits(*tau)];
         for sensor in Sensor::ALL {
             let unit = deviation_unit(sensor).1;
-            for axis in &analysis.triads.get(sensor).axes {
+            for axis in &triads.get(sensor).axes {
                 let variance = axis.curve.variance.get(point).copied();
                 row.push(three_digits(variance.unwrap_or(f64::NAN).sqrt() / unit));
             }
         }
-        let least = freedom(gyro, point).min(freedom(accel, point));
-        row.push(if least.is_finite() {
-            count(least.round() as usize)
-        } else {
-            NONE.to_owned()
-        });
+        let least = freedom(&triads.gyro, point).min(freedom(&triads.accel, point));
+        let least = Some(least).filter(|least| least.is_finite());
+        row.push(or_dash(least, |least| count(least.round() as usize)));
         row
+    };
+    let axes = Sensor::ALL.into_iter().flat_map(|sensor| {
+        let symbol = deviation_unit(sensor).0;
+        AXES.map(|axis| format!("{} {axis}, {symbol}", sensor.name()))
     });
-    Table {
-        title: "Overlapping Allan deviation",
-        headings,
-        sections: vec![rows.collect()],
-        notes: vec![format!(
+    let columns = std::iter::once("τ, s".to_owned()).chain(axes);
+    let columns = columns.chain(["degrees of freedom".to_owned()]);
+    let taus = triads.gyro.mean.curve.tau.iter().enumerate();
+    let mut table = Table::new("Overlapping Allan deviation", columns)
+        .section(taus.step_by(every).map(row))
+        .note(format!(
             "Degrees of freedom: the fewest of the six. {}",
             words::INTERVALS
-        )],
-    }
+        ));
+    table.optional = vec![7];
+    table
 }

@@ -19,14 +19,14 @@ pub(super) const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP
     covariance that the points have under those very processes, from their generalised \
     autocovariances (Greenhall, Riley 2003), which also gives the equivalent degrees of freedom. Of all \
     combinations the most likely one is taken, where each process must raise twice the logarithm of the \
-    likelihood by 9 (3σ), and a correlation time by 4 more. Bias gauss_markov B is the coefficient of flicker noise, whose floor is 0.664 B.";
+    likelihood by 9 (3σ), and a correlation time by 4 more. Bias instability B is the coefficient of flicker noise, whose floor is 0.664 B.";
 
 /// What forbids to trust the figures, or to use them without thought.
 pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
     if !analysis.stretch.stands {
         warnings.push(format!(
-            "The instrument does not stand all through {}: these are figures of its motion and its noise \
+            "The instrument is not stationary all through {}: these are figures of its motion and its noise \
              together.",
             analysis.stretch.name
         ));

@@ -1,9 +1,9 @@
 //! What has to be said of a run before it is calibrated.
 
 use super::super::number::{count, three_digits, value};
-use super::CheckReport;
 use crate::imu::AXES;
 use crate::recording::LabelledMotion;
+use crate::run::Run;
 use crate::survey::{APART, LabelCheck, Survey, Turn, Verdict};
 use crate::units::DEGREE;
 
@@ -52,10 +52,9 @@ pub(super) fn signed(angle: f64) -> String {
 }
 
 /// The log in a sentence or two.
-pub(super) fn log(report: &CheckReport) -> String {
-    let (run, survey) = (report.run, report.survey);
+pub(super) fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
-        "Stands for {} s in all, at most {} s at a time; {}.",
+        "Stationary for {} s in all, at most {} s at a time; {}.",
         three_digits(survey.standing.total),
         three_digits(survey.standing.longest),
         match (&run.recording.table, run.recording.segments.len()) {
@@ -84,18 +83,17 @@ pub(super) fn log(report: &CheckReport) -> String {
 }
 
 /// What to look at and what to change, a sentence or two each.
-pub(super) fn findings(report: &CheckReport) -> Vec<String> {
-    let mut findings = report.run.recording.notes.clone();
-    findings.extend(of_units(report));
-    findings.extend(report.survey.labels.iter().filter_map(of_label));
-    findings.extend(of_motion(report));
-    findings.extend(of_methods(report.survey));
+pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
+    let mut findings = run.recording.notes.clone();
+    findings.extend(of_units(run, survey));
+    findings.extend(survey.labels.iter().filter_map(of_label));
+    findings.extend(of_motion(survey));
+    findings.extend(of_methods(survey));
     findings
 }
 
 /// Signs of a wrong unit, scale or frame.
-fn of_units(report: &CheckReport) -> Vec<String> {
-    let (run, survey) = (report.run, report.survey);
+fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     let rests = &survey.rests;
     let mut findings = Vec::new();
     let wrong = |force: f64| (force / run.site.gravity - 1.0).abs() > WRONG_FORCE;
@@ -116,7 +114,7 @@ fn of_units(report: &CheckReport) -> Vec<String> {
     );
     if !tilted.is_empty() {
         findings.push(format!(
-            "In {} the accelerometers see another axis up than the table's log: check body_axes, the order of \
+            "In {} the accelerometers observe another axis up than the table's log: check body_axes, the order of \
              quaternion or angles, and that the table's zero is as C_b_n = I has it.",
             dwells(&tilted)
         ));
@@ -197,7 +195,8 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
             value(*moving, 1.0)
         ),
         (Verdict::Turn { cut: true, .. }, _) => {
-            "begins or ends within the turn: draw its borders wider, to where it stands".to_owned()
+            "begins or ends within the turn: draw its borders wider, to where it is stationary"
+                .to_owned()
         }
         (Verdict::Turn { angle, .. }, Some(LabelledMotion::Turns { angle: said, .. })) => format!(
             "turns by {}° about its axis, not {}°: correct axis, sign or angle of the label, or the gyros' scale",
@@ -210,12 +209,11 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
 }
 
 /// What positions and turns lack.
-fn of_motion(report: &CheckReport) -> Vec<String> {
-    let survey = report.survey;
+fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
         findings.push(
-            "There are fewer than two dwells: let the instrument stand for a second or more between turns; if it does, \
+            "There are fewer than two dwells: leave the instrument stationary for a second or more between turns; if it was, \
              check bias_sigma of the gyros and the noise figures."
                 .to_owned(),
         );

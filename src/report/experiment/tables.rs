@@ -1,17 +1,16 @@
-//! The tables, for terminal and page alike.
+//! The tables, alike for terminal and page.
 
-use super::super::number::{ratio, three_digits, value};
-use super::super::side_by_side::Table;
-use super::{PAPER_HOURS, estimator_name, hours, in_general, method_name, miles, navigated};
+use super::super::document::{NONE, Table, cells};
+use super::super::number::{or_dash, three_digits, value, with_interval};
+use super::names::{
+    PAPER_HOURS, estimator_name, hours, in_general, method_name, miles, navigated, situation_name,
+};
 use crate::calibration::Group;
 use crate::imu::{InstallationForm, Sensor};
 use crate::study::Experiment;
-use crate::study::experiment::{Estimator, Method, Navigated, Situation, Spread, Worth};
+use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
 
-pub(super) const NONE: &str = "–";
-
-/// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3,
-/// Figure 10).
+/// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
 pub(super) const PAPER: [(Sensor, InstallationForm, f64); 4] = [
     (Sensor::Gyro, InstallationForm::SixAngle, 6.10),
     (Sensor::Accel, InstallationForm::SixAngle, 4.16),
@@ -20,160 +19,112 @@ pub(super) const PAPER: [(Sensor, InstallationForm, f64); 4] = [
 ];
 
 pub(super) fn tables(experiment: &Experiment) -> Vec<Table> {
-    let mut tables: Vec<Table> = experiment
+    use Situation::{Aligned, Moving, SelfAligned};
+    let with = |table: fn(&Experiment, &Navigated) -> Table, situation| {
+        Some(table(experiment, navigated(experiment, situation)?))
+    };
+    let errors = experiment
         .navigations
         .iter()
-        .map(|navigated| errors(experiment, navigated))
-        .collect();
-    if let Some(standing) = navigated(experiment, Situation::SelfAligned) {
-        tables.push(paper(
-            experiment,
-            standing,
-            "Beside the paper: one triad's errors alone, aligned by itself",
-        ));
-        tables.push(budget(
-            experiment,
-            standing,
-            "Error budget, standing, aligned by itself",
-        ));
-    }
-    if let Some(standing) = navigated(experiment, Situation::Aligned) {
-        tables.push(paper(
-            experiment,
-            standing,
-            "Beside the paper: one triad's errors alone, alignment given",
-        ));
-    }
-    if let Some(moving) = navigated(experiment, Situation::Moving) {
-        tables.push(budget(experiment, moving, "Error budget, moving"));
-    }
-    tables
+        .map(|navigated| errors(experiment, navigated));
+    let others = [
+        with(paper, SelfAligned),
+        with(budget, SelfAligned),
+        with(paper, Aligned),
+        with(budget, Moving),
+    ];
+    errors.chain(others.into_iter().flatten()).collect()
 }
 
 pub(super) fn nmile(metres: f64) -> String {
     three_digits(miles(metres))
 }
 
-/// An interval in nmile.
-pub(super) fn nmile_interval((low, high): (f64, f64)) -> String {
-    format!("{}…{}", nmile(low), nmile(high))
-}
-
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
-    let headings = [
+    let columns = [
         "nmile",
         "median",
         "99 % interval",
         "mean",
         "68 % below",
         "95 % below",
-        "largest,\nmedian",
-        "largest,\n95 % below",
-        "closed form\n: EKF",
+        "largest, median",
+        "largest, 95 % below",
+        "closed form : EKF",
         "99 % interval",
     ];
     let row = |worth: &Worth| {
-        let mut row = vec![
+        let (at_end, largest) = (&worth.at_end, &worth.largest);
+        let (low, high) = worth.median_interval;
+        let mut row = cells![
             method_name(experiment, worth.method),
-            nmile(worth.at_end.median),
-            nmile_interval(worth.median_interval),
+            nmile(at_end.median),
+            format!("{}…{}", nmile(low), nmile(high)),
         ];
-        let at_end = &worth.at_end;
         row.extend([at_end.mean, at_end.below_68, at_end.below_95].map(nmile));
-        row.extend([worth.largest.median, worth.largest.below_95].map(nmile));
-        row.extend(match &worth.gain {
-            Some(gain) => ratio(gain),
-            None => [NONE; 2].map(str::to_owned),
-        });
+        row.extend([largest.median, largest.below_95].map(nmile));
+        let gain = worth
+            .gain
+            .as_ref()
+            .map(|gain| with_interval(gain.value, gain.interval));
+        row.extend(gain.unwrap_or([NONE; 2].map(str::to_owned)));
         row
     };
-    let forms = InstallationForm::ALL.len();
-    let mut sections: Vec<Vec<Vec<String>>> = navigated
-        .methods
-        .chunks(forms)
-        .map(|of_estimator| of_estimator.iter().map(row).collect())
-        .collect();
     let noise = &navigated.noise;
-    let mut last = vec![
-        "noise alone".to_owned(),
-        nmile(noise.median),
-        NONE.to_owned(),
-    ];
+    let mut last = cells!["noise alone", nmile(noise.median), NONE];
     last.extend([noise.mean, noise.below_68, noise.below_95].map(nmile));
-    last.resize(headings.len(), NONE.to_owned());
-    sections.push(vec![last]);
-    Table {
-        title: match navigated.situation {
-            Situation::SelfAligned => "Position error at the end, standing, aligned by itself",
-            Situation::Aligned => "Position error at the end, standing, alignment given",
-            Situation::Moving => "Position error at the end, moving, alignment given",
-        },
-        headings: headings.map(str::to_owned).to_vec(),
-        sections,
-        notes: vec![
-            "Over all instruments. Largest: of all minutes. Closed form : EKF: ratio of the medians in \
-             the same installation form, above 1 where the EKF is better; intervals by bootstrap."
-                .to_owned(),
-        ],
-    }
+    last.resize(columns.len(), NONE.to_owned());
+    let by_estimator = navigated.methods.chunks(InstallationForm::ALL.len());
+    let situation = situation_name(navigated.situation);
+    Table::new(format!("Position error at the end, {situation}"), columns)
+        .sections(by_estimator.map(|of_estimator| of_estimator.iter().map(row)))
+        .section([last])
+        .note(
+            "Over all instruments. Largest: of all minutes. Closed form : EKF: ratio of the medians in the same \
+             installation form, above 1 where the EKF is better; intervals by bootstrap.",
+        )
 }
 
-fn paper(experiment: &Experiment, standing: &Navigated, title: &'static str) -> Table {
-    let of = |estimator, form, sensor| {
-        let method = Method { estimator, form };
-        let worth = standing.methods.iter().find(|w| w.method == method);
-        worth.map(|worth| *worth.by_one.get(sensor))
-    };
-    let mut headings = vec!["nmile".to_owned()];
+fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
+    let mut columns = vec!["nmile".to_owned()];
     for estimator in Estimator::ALL {
         let name = estimator_name(experiment, estimator);
-        headings.extend([format!("{name}\nmedian"), "\n95 % below".to_owned()]);
+        columns.extend([format!("{name}: median"), "95 % below".to_owned()]);
     }
-    headings.push("paper".to_owned());
+    columns.push("paper".to_owned());
     let row = |sensor: Sensor, form: InstallationForm, paper: Option<f64>| {
         let mut row = vec![format!("errors of {}s, {}", sensor.name(), form.name())];
         for estimator in Estimator::ALL {
-            row.extend(match of(estimator, form, sensor) {
-                Some(Spread {
-                    median, below_95, ..
-                }) => [median, below_95].map(nmile),
-                None => [NONE; 2].map(str::to_owned),
-            });
+            let method = Method { estimator, form };
+            let worth = navigated.methods.iter().find(|w| w.method == method);
+            let spread = worth.map(|worth| worth.by_one.get(sensor));
+            row.push(or_dash(spread.map(|of| of.median), nmile));
+            row.push(or_dash(spread.map(|of| of.below_95), nmile));
         }
-        row.push(paper.map_or(NONE.to_owned(), three_digits));
+        row.push(or_dash(paper, three_digits));
         row
     };
-    let mut sections = vec![
-        Sensor::ALL
-            .map(|sensor| row(sensor, InstallationForm::General, None))
-            .to_vec(),
-    ];
-    for pair in PAPER.chunks(Sensor::ALL.len()) {
-        let rows = pair
-            .iter()
-            .map(|&(sensor, form, paper)| row(sensor, form, Some(paper)));
-        sections.push(rows.collect());
-    }
-    let mut notes = vec![
-        "Standing, position error at the end; the other triad is exact. Paper: one instrument on one \
-         table, closed form (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated."
-            .to_owned(),
-    ];
-    if hours(experiment) != PAPER_HOURS {
-        notes.push(format!(
+    let general = Sensor::ALL.map(|sensor| row(sensor, InstallationForm::General, None));
+    let of_paper = PAPER.chunks(Sensor::ALL.len()).map(|pair| {
+        pair.iter()
+            .map(|&(sensor, form, paper)| row(sensor, form, Some(paper)))
+    });
+    let situation = situation_name(navigated.situation);
+    let title = format!("Beside the paper: one triad's errors alone, {situation}");
+    let table = Table::new(title, columns).section(general).sections(of_paper).note(
+        "Position error at the end; the other triad is exact. Paper: one instrument on one table, closed form \
+         (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated.",
+    );
+    match hours(experiment) {
+        PAPER_HOURS => table,
+        hours => table.note(format!(
             "The paper's are of {PAPER_HOURS} h, these of {} h.",
-            three_digits(hours(experiment))
-        ));
-    }
-    Table {
-        title,
-        headings,
-        sections,
-        notes,
+            three_digits(hours)
+        )),
     }
 }
 
-fn budget(experiment: &Experiment, navigated: &Navigated, title: &'static str) -> Table {
+fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
     let worths: Vec<(String, &Worth)> = Estimator::ALL
         .into_iter()
         .filter_map(|estimator| {
@@ -181,20 +132,17 @@ fn budget(experiment: &Experiment, navigated: &Navigated, title: &'static str) -
             Some((estimator_name(experiment, estimator), worth))
         })
         .collect();
-    let mut headings = vec!["nmile, RMS".to_owned()];
+    let mut columns = vec!["nmile, RMS".to_owned()];
     for (name, _) in &worths {
-        headings.extend([format!("{name}\nalone"), "\nshare".to_owned()]);
+        columns.extend([format!("{name}: alone"), "share".to_owned()]);
     }
-    let row = |place: usize, group: Group| {
+    let row = |(place, group): (usize, Group)| {
         let mut row = vec![group.title()];
         for (_, worth) in &worths {
-            row.extend(match worth.budget.parts.get(place) {
-                Some(part) => [
-                    nmile(part.alone),
-                    format!("{} %", value(100.0 * part.share, 10.0)),
-                ],
-                None => [NONE; 2].map(str::to_owned),
-            });
+            let part = worth.budget.parts.get(place);
+            row.push(or_dash(part.map(|part| part.alone), nmile));
+            let share = part.map(|part| 100.0 * part.share);
+            row.push(or_dash(share, |share| format!("{} %", value(share, 10.0))));
         }
         row
     };
@@ -205,24 +153,16 @@ fn budget(experiment: &Experiment, navigated: &Navigated, title: &'static str) -
         }
         row
     };
-    Table {
-        title,
-        headings,
-        sections: vec![
-            Group::all()
-                .enumerate()
-                .map(|(place, group)| row(place, group))
-                .collect(),
-            vec![
-                total("all, claimed", &|w| w.budget.claimed),
-                total("all, actual", &|w| w.budget.actual),
-            ],
-        ],
-        notes: vec![
-            "General form, from the claimed covariance averaged over all instruments. Alone: what the \
-             group would make by itself. Share: of the variance, what two groups make together going \
-             half to each; below zero where a group makes up for another."
-                .to_owned(),
-        ],
-    }
+    let situation = situation_name(navigated.situation);
+    Table::new(format!("Error budget, {situation}"), columns)
+        .section(Group::all().enumerate().map(row))
+        .section([
+            total("all, claimed", &|w| w.budget.claimed),
+            total("all, actual", &|w| w.budget.actual),
+        ])
+        .note(
+            "General form, from the claimed covariance averaged over all instruments. Alone: what the group would \
+             make by itself. Share: of the variance, what two groups make together going half to each; below zero \
+             where a group makes up for another.",
+        )
 }

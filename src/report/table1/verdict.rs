@@ -1,8 +1,8 @@
 //! What can be said of the paper's figures, in words.
 
-use super::tables::title;
-use crate::imu::InstallationForm;
+use crate::imu::{InstallationForm, Sensor};
 use crate::study::Table1;
+use crate::study::table1::paper::Published;
 use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
 
 /// A verdict in a few words.
@@ -87,5 +87,17 @@ pub(super) fn sentence(column: &Column) -> String {
             }
             text
         }
+    }
+}
+
+/// A column of the paper's in words.
+pub(super) fn title(published: &Published) -> &'static str {
+    match (published.sensor, published.form) {
+        (Sensor::Gyro, InstallationForm::ThreeAngle) => "Gyros, three-angle form (Eq. 10)",
+        (Sensor::Gyro, _) => "Gyros, six-angle form (Eq. 8)",
+        (Sensor::Accel, InstallationForm::ThreeAngle) => {
+            "Accelerometers, three-angle form (Eq. 10)"
+        }
+        (Sensor::Accel, _) => "Accelerometers, six-angle form (Eq. 8)",
     }
 }

@@ -27,7 +27,7 @@ pub enum Journey {
     Flight,
 }
 
-/// Horizontal position errors, computed less true, east and north in m, at the end of a mission.
+/// Horizontal position errors, computed minus true, east and north in m, at the end of a mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Position {
     /// Of the filter, with the covariance that it predicts.
@@ -154,7 +154,7 @@ impl Way {
         }
     }
 
-    /// From parameter errors, estimate less truth; the linear model has them the other way round.
+    /// From parameter errors, estimate minus truth; the linear model has them the other way round.
     fn position(&self, error: &ParameterVector) -> Vector2<f64> {
         -self.by_parameter * error
     }

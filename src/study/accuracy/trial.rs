@@ -15,7 +15,7 @@ use crate::imu::BodyFrame;
 use crate::imu::{InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 
-/// One run. Errors are estimate less truth; everything is in the general form.
+/// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone)]
 pub struct Trial {
     /// Its number, the stream of its random numbers.
@@ -31,8 +31,8 @@ pub struct Trial {
     /// σ of the bound at each of the [`moments`].
     pub(super) bound_track: Vec<ParameterVector>,
     /// σ of the bound of constants beside the parameters, zero where they are none.
-    pub further_bound: AuxiliaryVector,
-    /// What the blocks of states did to the filter; of the first run only.
+    pub auxiliary_bound: AuxiliaryVector,
+    /// What the error terms did to the filter; of the first run only.
     pub effects: Vec<ErrorTermTest>,
     /// Error of the closed form for each part of its dwells; none where it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,
@@ -48,9 +48,9 @@ pub struct Filtered {
     /// Covariance that it claims.
     pub(super) covariance: ParameterMatrix,
     /// Error of each constant beside the parameters that was estimated, zero for others.
-    pub further_error: AuxiliaryVector,
+    pub auxiliary_error: AuxiliaryVector,
     /// σ that it claims of them.
-    pub term_sigma: AuxiliaryVector,
+    pub auxiliary_sigma: AuxiliaryVector,
     /// NEES/n of the parameters and the constants beside them.
     pub nees: Option<Nees>,
     /// Number of passes.
@@ -101,7 +101,7 @@ impl AccuracyStudy {
             Ok(outcome) if run == 0 => test_error_terms(&problem, outcome).unwrap_or_default(),
             _ => Vec::new(),
         };
-        let further = auxiliary_vector(&simulated.geometry, &simulated.terms);
+        let auxiliary = auxiliary_vector(&simulated.geometry, &simulated.terms);
         let attained = bound.estimate.in_general_form();
         Ok(Trial {
             run,
@@ -111,9 +111,9 @@ impl AccuracyStudy {
             },
             filtered: outcome
                 .ok()
-                .map(|outcome| Filtered::new(&outcome, &truth, &further, duration)),
+                .map(|outcome| Filtered::new(&outcome, &truth, &auxiliary, duration)),
             effects,
-            further_bound: bound.auxiliary.sigma(),
+            auxiliary_bound: bound.auxiliary.sigma(),
             bound: attained.sigma(),
             bound_covariance: attained.covariance,
             bound_track: track(&bound.history, form, duration)
@@ -137,25 +137,25 @@ impl Filtered {
     fn new(
         outcome: &Outcome,
         truth: &PerSensor<Triad>,
-        further: &AuxiliaryVector,
+        auxiliary: &AuxiliaryVector,
         duration: f64,
     ) -> Self {
         let truth = to_vector(&in_general_form(truth));
         let form = outcome.estimate.form();
         let estimate = outcome.estimate.in_general_form();
         let error = estimate.vector() - truth;
-        let term_sigma = outcome.auxiliary.sigma();
-        let further_error =
-            (outcome.auxiliary.values - further).zip_map(&term_sigma, |error, sigma| {
+        let auxiliary_sigma = outcome.auxiliary.sigma();
+        let auxiliary_error =
+            (outcome.auxiliary.values - auxiliary).zip_map(&auxiliary_sigma, |error, sigma| {
                 if sigma > 0.0 { error } else { 0.0 }
             });
         Self {
             error,
             sigma: estimate.sigma(),
             covariance: estimate.covariance,
-            nees: whole_nees(outcome, &estimate, &error, &further_error),
-            further_error,
-            term_sigma,
+            nees: whole_nees(outcome, &estimate, &error, &auxiliary_error),
+            auxiliary_error,
+            auxiliary_sigma,
             passes: outcome.passes.len(),
             velocity: outcome.consistency.velocity,
             table: outcome.consistency.table,
@@ -173,18 +173,18 @@ fn whole_nees(
     outcome: &Outcome,
     estimate: &Estimate,
     error: &ParameterVector,
-    further_error: &AuxiliaryVector,
+    auxiliary_error: &AuxiliaryVector,
 ) -> Option<Nees> {
     const ALL: usize = PARAMETERS + AUXILIARY;
-    let further = &outcome.auxiliary;
-    let cross = outcome.estimate.to_general_form() * further.cross;
+    let auxiliary = &outcome.auxiliary;
+    let cross = outcome.estimate.to_general_form() * auxiliary.cross;
     let mut covariance = SMatrix::<f64, ALL, ALL>::zeros();
     covariance
         .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
         .copy_from(&estimate.covariance);
     covariance
         .fixed_view_mut::<AUXILIARY, AUXILIARY>(PARAMETERS, PARAMETERS)
-        .copy_from(&further.covariance);
+        .copy_from(&auxiliary.covariance);
     covariance
         .fixed_view_mut::<PARAMETERS, AUXILIARY>(0, PARAMETERS)
         .copy_from(&cross);
@@ -195,7 +195,7 @@ fn whole_nees(
     difference.fixed_rows_mut::<PARAMETERS>(0).copy_from(error);
     difference
         .fixed_rows_mut::<AUXILIARY>(PARAMETERS)
-        .copy_from(further_error);
+        .copy_from(auxiliary_error);
     let all: Vec<usize> = (0..ALL).collect();
     nees(&difference, &covariance, &all)
 }

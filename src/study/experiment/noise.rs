@@ -24,19 +24,19 @@ const DRAWS: usize = 20_000;
 type Inputs = SVector<f64, INPUTS>;
 type InputCovariance = SMatrix<f64, INPUTS, INPUTS>;
 
-/// Covariance of navigation errors, of the wandering biases, and between them.
+/// Covariance of navigation errors, of the Gauss–Markov biases, and between them.
 struct Covariance {
     errors: ErrorMatrix,
     between: InputMatrix,
-    wander: InputCovariance,
+    bias: InputCovariance,
 }
 
 /// Variances of the noise of the sensed rate and force.
 struct Variances {
     /// Of the integral over a second.
     white: Inputs,
-    /// Of the wandering bias.
-    wander: Inputs,
+    /// Of the Gauss–Markov bias.
+    bias: Inputs,
     correlation_time: Inputs,
 }
 
@@ -47,7 +47,7 @@ impl Variances {
         };
         Self {
             white: each(&|n| n.random_walk.powi(2)),
-            wander: each(&|n| n.gauss_markov.map_or(0.0, |i| i.sigma.powi(2))),
+            bias: each(&|n| n.gauss_markov.map_or(0.0, |i| i.sigma.powi(2))),
             correlation_time: each(&|n| {
                 n.gauss_markov.map_or(f64::INFINITY, |i| i.correlation_time)
             }),
@@ -63,13 +63,13 @@ pub(super) fn position(
     noise: &PerSensor<Noise>,
 ) -> Result<Matrix2<f64>, NavigationStudyError> {
     let variances = Variances::of(noise);
-    let wander = InputCovariance::from_diagonal(&variances.wander);
+    let bias = InputCovariance::from_diagonal(&variances.bias);
     let aligned = aligned.unwrap_or_default();
-    let mean = wander + InputCovariance::from_diagonal(&(variances.white / ALIGNMENT_TIME));
+    let mean = bias + InputCovariance::from_diagonal(&(variances.white / ALIGNMENT_TIME));
     let mut covariance = Covariance {
         errors: aligned * mean * aligned.transpose(),
-        between: aligned * wander,
-        wander,
+        between: aligned * bias,
+        bias,
     };
     let duration = f64::from(mission.intervals) * INTERVAL;
     let end = match &mission.motion {
@@ -103,7 +103,7 @@ struct Step {
     input: InputMatrix,
     added: ErrorMatrix,
     keep: Inputs,
-    wander_added: Inputs,
+    bias_added: Inputs,
 }
 
 impl Step {
@@ -122,7 +122,7 @@ impl Step {
             added: transition.input * white * transition.input.transpose(),
             errors: transition.errors,
             input: transition.input,
-            wander_added: variances.wander.zip_map(&keep, |v, k| v * (1.0 - k * k)),
+            bias_added: variances.bias.zip_map(&keep, |v, k| v * (1.0 - k * k)),
             keep,
         }
     }
@@ -135,12 +135,11 @@ impl Covariance {
         self.errors = a * self.errors * a.transpose()
             + crossed
             + crossed.transpose()
-            + g * self.wander * g.transpose()
+            + g * self.bias * g.transpose()
             + step.added;
         let keep = InputCovariance::from_diagonal(&step.keep);
-        self.between = (a * self.between + g * self.wander) * keep;
-        self.wander =
-            keep * self.wander * keep + InputCovariance::from_diagonal(&step.wander_added);
+        self.between = (a * self.between + g * self.bias) * keep;
+        self.bias = keep * self.bias * keep + InputCovariance::from_diagonal(&step.bias_added);
     }
 }
 

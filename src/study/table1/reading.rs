@@ -53,7 +53,7 @@ impl Reading {
         }
     }
 
-    /// The closed form from six noise-free positions with inputs of this size (rad/s or m/s²); `None`
+    /// The closed form from six noise-free positions with inputs of this magnitude (rad/s or m/s²); `None`
     /// if they leave the triad undetermined.
     pub(super) fn calibrated(
         &self,

@@ -75,7 +75,7 @@ fn plain(_: usize, row: [f64; 7]) -> String {
 fn other_body_axes_describe_the_same_run() {
     let mut expected = made_run("made");
     // Labels name the file's axes: x is front in both.
-    expected.segments[0].motion = Some(LabelledMotion::Turns {
+    expected.recording.segments[0].motion = Some(LabelledMotion::Turns {
         axis: Vector3::y(),
         angle: 360.0 * DEGREE,
     });
@@ -115,7 +115,7 @@ fn other_body_axes_describe_the_same_run() {
                 _ => format!("{t},{gy},{},{gz},{ay},{},{az}", -gx, -ax),
             },
         );
-        expected.name.clone_from(&run.recording.name);
+        expected.recording.name.clone_from(&run.recording.name);
         assert_same(&expected, &run);
     }
 }

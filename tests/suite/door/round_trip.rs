@@ -3,12 +3,12 @@
 use std::fs;
 
 use nalgebra::Vector3;
-use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{
-    Aiding, BodyFrame, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
+    Calibration, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
 };
 use turncal::formats::write_run;
-use turncal::imu::{InstallationForm, Nominal, Output, PerSensor};
+use turncal::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor};
+use turncal::run::Aiding;
 use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
 
 use super::made::{assert_same, made_run};
@@ -98,7 +98,7 @@ fn a_calibration_comes_back_as_it_went() {
     record.installation_form = Some(InstallationForm::ThreeAngle);
     record.aiding = Some(Aiding::Velocity);
     record.body_frame = BodyFrame::Accelerometer;
-    record.instrument.unit = Some(PerSensor {
+    record.unit = Some(PerSensor {
         gyro: "count".to_owned(),
         accel: "count".to_owned(),
     });
@@ -135,10 +135,7 @@ fn a_calibration_comes_back_as_it_went() {
         raw: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
         calibrated: [0.1; 6],
     }];
-    record
-        .recording
-        .meta
-        .insert("serial".to_owned(), "7".to_owned());
+    record.meta.insert("serial".to_owned(), "7".to_owned());
 
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.json");

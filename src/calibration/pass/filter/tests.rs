@@ -24,7 +24,7 @@ fn filter() -> Filter {
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, true);
+    filter.begin(&start, 5e-6, true, None);
     assert_eq!(filter.layout.size(), STATES);
     filter
 }
@@ -132,7 +132,7 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, true);
+    filter.begin(&start, 5e-6, true, None);
     let varying: Vec<usize> = filter.layout.varying_biases().map(|(s, ..)| s).collect();
     assert_eq!(varying.len(), 6);
     for k in 0..5 {

@@ -1,0 +1,141 @@
+//! What a pass gives.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::filter::Filter;
+use super::initial_attitude::InitialAttitude;
+use crate::attitude::from_tilt_and_heading;
+use crate::calibration::auxiliary::{Auxiliary, AuxiliaryVector};
+use crate::calibration::innovation::Innovation;
+use crate::calibration::layout::Layout;
+use crate::calibration::linearisation::Linearisation;
+use crate::calibration::observability::AttitudeCovariance;
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector, from_vector, to_vector};
+use crate::imu::TermVector;
+use crate::turntable::TABLE_GEOMETRY;
+
+/// Estimate and σ at one time of a pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Epoch {
+    /// Time, s.
+    pub time: f64,
+    /// Parameters of both triads.
+    pub estimate: ParameterVector,
+    /// 1σ of each.
+    pub sigma: ParameterVector,
+}
+
+/// What a pass gives.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct PassResult {
+    /// Where it linearised; in a pass with feedback, at its end.
+    pub at: Linearisation,
+    /// The estimate: where the next pass linearises.
+    pub estimate: Linearisation,
+    pub covariance: ParameterMatrix,
+    /// Parameters of error terms and table.
+    pub auxiliary: Auxiliary,
+    /// Mean and 1σ of the error of gravity, true − stated, m/s².
+    pub gravity: (f64, f64),
+    /// Of the initial attitude of the last stretch.
+    pub attitude_covariance: AttitudeCovariance,
+    /// 1σ of the initial attitude of the last stretch, East, North and Up.
+    pub attitude_sigma: Vector3<f64>,
+    /// Cost: whitened innovations squared, summed; the prior is in it, since the filter starts from it.
+    /// A rejected observation counts as much as the gate lets pass.
+    pub cost: f64,
+    /// Logarithm of the determinant of the covariance of all innovations let in: with the cost, −2 ln
+    /// of the likelihood.
+    pub log_determinant: f64,
+    pub innovations: Vec<Innovation>,
+    pub history: Vec<Epoch>,
+}
+
+/// What a pass has come to so far.
+#[derive(Debug, Clone)]
+pub(super) struct Sums {
+    pub at: Linearisation,
+    pub filter: Filter,
+    pub innovations: Vec<Innovation>,
+    pub history: Vec<Epoch>,
+    pub cost: f64,
+    pub log_determinant: f64,
+}
+
+impl Sums {
+    pub fn epoch(&self, time: f64) -> Epoch {
+        Epoch {
+            time,
+            estimate: to_vector(&self.at.triads) + self.filter.parameters(),
+            sigma: self.filter.parameter_sigma(),
+        }
+    }
+
+    pub fn result(self, prior_sigma: AuxiliaryVector, earlier: &[InitialAttitude]) -> PassResult {
+        let filter = &self.filter;
+        let form = self.at.triads.gyro.form;
+        let errors = earlier.iter().map(|attitude| attitude.smoothed(filter));
+        let errors = errors.chain([filter.initial_attitude()]);
+        let attitudes = self.at.initial_attitudes.iter().zip(errors);
+        let estimate = Linearisation {
+            triads: from_vector(form, &(to_vector(&self.at.triads) + filter.parameters())),
+            terms: self.at.terms + filter.terms(),
+            initial_attitudes: attitudes
+                .map(|(at, error): (&Matrix3<f64>, _)| from_tilt_and_heading(&error) * at)
+                .collect(),
+        };
+        let initial = filter.layout.initial_attitude();
+        let attitude_sigma = filter.initial_attitude_sigma();
+        let mut attitude_covariance = AttitudeCovariance::zeros();
+        for (state, index) in filter.layout.parameters() {
+            for axis in 0..3 {
+                attitude_covariance[(index, axis)] =
+                    filter.covariance(state, initial + axis) / attitude_sigma[axis];
+            }
+        }
+        PassResult {
+            estimate,
+            covariance: filter.parameter_covariance(),
+            auxiliary: auxiliary(filter, &self.at.terms, prior_sigma),
+            gravity: filter.gravity(),
+            attitude_covariance,
+            attitude_sigma,
+            cost: self.cost,
+            log_determinant: self.log_determinant,
+            innovations: self.innovations,
+            history: self.history,
+            at: self.at,
+        }
+    }
+}
+
+/// Estimates of error terms and table, those of terms off `at` where the pass linearises.
+fn auxiliary(filter: &Filter, at: &TermVector, prior_sigma: AuxiliaryVector) -> Auxiliary {
+    let layout = &filter.layout;
+    let mut auxiliary = Auxiliary {
+        prior_sigma,
+        ..Auxiliary::default()
+    };
+    let states = auxiliary_states(layout);
+    for &(state, k) in &states {
+        auxiliary.values[k] =
+            filter.mean(state) + Auxiliary::of_terms(k).map_or(0.0, |term| at[term]);
+        for &(other, j) in &states {
+            auxiliary.covariance[(k, j)] = filter.covariance(state, other);
+        }
+        for (parameter, index) in layout.parameters() {
+            auxiliary.cross[(index, k)] = filter.covariance(parameter, state);
+        }
+    }
+    auxiliary
+}
+
+/// State and index among the auxiliary parameters of each that is on.
+fn auxiliary_states(layout: &Layout) -> Vec<(usize, usize)> {
+    let base = layout.table_base().into_iter();
+    let base = base.flat_map(|first| (0..3).map(move |axis| (first + axis, axis)));
+    let tilts = layout.table_tilts().map(|(state, k)| (state, 3 + k));
+    let terms = layout.terms();
+    let terms = terms.map(|(state, k)| (state, TABLE_GEOMETRY + k));
+    base.chain(tilts).chain(terms).collect()
+}

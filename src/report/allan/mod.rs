@@ -1,0 +1,65 @@
+//! The report of an instrument's noise: Allan deviations, what they show, and the figures for a run.
+
+mod data;
+mod figure;
+mod quantity;
+mod run_toml;
+mod tables;
+mod words;
+
+use super::document::{Block, Document, List};
+use super::number::{count, three_digits};
+use crate::imu::Sensor;
+use crate::noise::NoiseAnalysis;
+
+/// Of the deviations a terminal shows every so-manieth.
+const EVERY: usize = 2;
+
+/// Everything that is said of the noise of a run of this name.
+pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
+    let NoiseAnalysis {
+        stretch, period, ..
+    } = analysis;
+    let mut document = Document::new(format!(
+        "Noise of {run}: {}, {}, {} samples at {} Hz",
+        stretch.name,
+        words::duration(analysis.duration()),
+        count(stretch.samples.len()),
+        three_digits(period.recip())
+    ));
+    document.warnings.items = words::warnings(analysis);
+    for sensor in Sensor::ALL {
+        document.page(figure::figure(analysis, sensor));
+    }
+    for sensor in Sensor::ALL {
+        document.both(tables::coefficients(analysis, sensor));
+    }
+    document.terminal(tables::deviations(analysis, EVERY));
+    document.page(tables::deviations(analysis, 1));
+    document.both(List::new("Not found", words::advice(analysis)));
+    let toml = run_toml::noise_table(analysis);
+    document.both(Block::Code("For run.toml".to_owned(), toml));
+    document.page(Block::Text("Method".to_owned(), words::METHOD.to_owned()));
+    document.data = data::data(run, analysis);
+    document
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{svg, terminal};
+    use super::*;
+    use crate::noise::Stretch;
+    use crate::simulation::Scenario;
+
+    #[test]
+    fn the_noise_of_a_simulated_instrument_is_shown() {
+        let mut scenario = Scenario::load("demo-six-position").unwrap();
+        scenario.integrator.period = 0.1;
+        let run = scenario.simulate(1, 0).unwrap().run;
+        let stretch = Stretch::find(&run, None).unwrap();
+        let document = document("made-up", &NoiseAnalysis::new(&run, stretch));
+        insta::assert_snapshot!(terminal::text(&document, Some(100)));
+        let drawn = svg::drawn(document.plots());
+        assert!(drawn[0].contains("cluster time") && drawn[1].contains("accel z, µg"));
+    }
+}

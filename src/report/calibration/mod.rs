@@ -1,0 +1,90 @@
+//! The report of a calibration, and of both methods side by side.
+
+mod facts;
+mod figures;
+mod methods;
+mod path;
+mod report;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+use super::document::{Document, Table};
+use super::number::{count, three_digits, value};
+use super::{effects, outlook};
+
+pub use super::outlook::Navigated;
+pub use report::{ClosedForm, Report};
+
+impl Report<'_> {
+    /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
+    pub fn document(&self) -> Document {
+        let mut document = Document::new(self.title);
+        document.lead = self.lead();
+        document.warnings.items = self.warnings();
+        if let Some(estimate) = self.estimate() {
+            document.both(self.parameters(estimate));
+        }
+        document.both(self.groups());
+        document.both(
+            self.quality
+                .map_or_else(Table::default, |of| tables::residuals(of, self.table())),
+        );
+        if let Some(outcome) = self.outcome {
+            document.page(tables::consistency(outcome));
+            document.page(tables::passes(outcome));
+            document.both(effects::costs(self.effects));
+            document.both(effects::explained(self.effects));
+        }
+        outlook::add(&mut document, self.navigation);
+        for plot in self.figures() {
+            document.page(plot);
+        }
+        if let Some(outcome) = self.outcome {
+            document.page(tables::weakest(outcome));
+        }
+        document.page(self.model());
+        document.page(facts::run(self));
+        document
+    }
+
+    /// What must be known before the figures are used.
+    fn warnings(&self) -> Vec<String> {
+        self.findings.iter().map(ToString::to_string).collect()
+    }
+
+    /// What ran on what.
+    fn lead(&self) -> Vec<String> {
+        let imu = &self.run.recording.imu;
+        let mut run = format!(
+            "Run {}: {} s, {} samples at {} Hz, {} dwells; body frame: {}",
+            self.run.recording.name,
+            value(imu.duration(), 10.0),
+            count(imu.len()),
+            three_digits(1.0 / imu.period),
+            self.dwells.len(),
+            self.body_frame.words(),
+        );
+        if let Some(estimate) = self.estimate() {
+            run += &format!("; installation: {}", estimate.form().name());
+        }
+        let mut lead = vec![run + "."];
+        lead.extend(self.outcome.map(|outcome| {
+            format!(
+                "EKF {} after {} passes; NIS with its 95 % interval: {}.",
+                if outcome.converged {
+                    "converged"
+                } else {
+                    "NOT CONVERGED"
+                },
+                outcome.passes.len(),
+                tables::nis(outcome).join(", "),
+            )
+        }));
+        lead.extend(
+            self.closed_form
+                .map(|closed| format!("Closed form: {}.", closed.note)),
+        );
+        lead
+    }
+}

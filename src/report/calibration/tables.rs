@@ -1,0 +1,264 @@
+//! The tables, alike for terminal and page.
+
+use super::super::document::{NONE, Table, cells};
+use super::super::group::Group;
+use super::super::number::{self, count, plus_minus, sigma, three_digits, value};
+use super::super::terms::{self, improvement};
+use super::report::Report;
+use crate::calibration::{Estimate, Nis, Outcome, parameter_name};
+use crate::calibration::{Measures, Quality, Spread};
+use crate::imu::ParameterKind;
+use crate::recording::TableLog;
+use crate::units::{ARCSEC, DEGREE, MICRO_G, MILLI_G};
+
+/// How many of the directions that were observed are shown.
+const WEAKEST: usize = 3;
+
+impl Report<'_> {
+    /// Every parameter with its accuracy, and its error where the truth is known.
+    pub(super) fn parameters(&self, estimate: &Estimate) -> Table {
+        let prior = self.outcome.map(|outcome| outcome.prior_sigma);
+        let truth = self.truth_vector();
+        let (form, posterior, values) = (estimate.form(), estimate.sigma(), estimate.vector());
+        let row = |group: Group, i: usize| {
+            let (unit, fixed) = (group.unit_value(), posterior[i] <= 0.0);
+            let (shown, s) = (group.shown(values[i]), posterior[i] / unit);
+            let mut row = vec![
+                parameter_name(form, i)?,
+                match fixed {
+                    true => format!("{} (fixed)", value(shown, s)),
+                    false => plus_minus(shown, s),
+                },
+                group.unit().to_owned(),
+            ];
+            row.extend(prior.iter().flat_map(|prior| match fixed {
+                true => [NONE; 2].map(str::to_owned),
+                false => [
+                    three_digits(prior[i] / unit),
+                    improvement(prior[i], posterior[i]),
+                ],
+            }));
+            row.extend(truth.iter().flat_map(|truth| {
+                let error = (values[i] - truth[i]) / unit;
+                let in_sigma = (!fixed).then(|| error / s);
+                [
+                    value(error, s),
+                    number::or_dash(in_sigma, |z| value(z, 0.1)),
+                ]
+            }));
+            Some(row)
+        };
+        let mut columns = vec!["parameter", "value ± 1σ", "unit"];
+        let mut optional = Vec::new();
+        if prior.is_some() {
+            optional.push(columns.len());
+            columns.extend(["prior σ", "prior : σ"]);
+        }
+        if truth.is_some() {
+            columns.extend(["error", "error/σ"]);
+        }
+        let mut table = Table::new("Parameters", columns).sections(Group::all().map(|group| {
+            let rows = group.parameters(form).into_iter();
+            rows.filter_map(move |i| row(group, i)).collect::<Vec<_>>()
+        }));
+        if let Some(outcome) = self.outcome {
+            table = table.section(terms::rows(
+                &outcome.auxiliary,
+                self.true_terms,
+                truth.is_some(),
+            ));
+        }
+        table.optional = optional;
+        table
+    }
+
+    /// σ and errors of each group by each method: the answer at a glance.
+    pub(super) fn groups(&self) -> Table {
+        let (methods, truth) = (self.methods(), self.truth_vector());
+        let (mut columns, mut optional) = (cells!["", "unit"], Vec::new());
+        for (name, _) in &methods {
+            columns.push(format!("{name}: RMS σ"));
+            if truth.is_some() {
+                optional.push(columns.len());
+                columns.extend(["RMS error", "largest"].map(str::to_owned));
+            }
+        }
+        let both = <[_; 2]>::try_from(methods.clone()).ok();
+        if both.is_some() {
+            columns.push("σ ratio".to_owned());
+            columns.extend(truth.is_none().then(|| "difference, RMS".to_owned()));
+        }
+        let row = |group: Group| {
+            let mut row = cells![group.title(), group.unit()];
+            for (_, estimate) in &methods {
+                let indices = group.estimated(estimate);
+                let claimed = group.spread(&estimate.sigma(), &indices);
+                row.push(number::or_dash(claimed.map(|x| x.1), sigma));
+                if let Some(truth) = &truth {
+                    let error = group.spread(&(estimate.vector() - truth), &indices);
+                    row.push(number::or_dash(error.map(|x| x.1), three_digits));
+                    row.push(number::or_dash(error.map(|x| x.0), three_digits));
+                }
+            }
+            if let Some([(_, closed), (_, filter)]) = both {
+                let rms = |of: &Estimate| Some(group.spread(&of.sigma(), &group.estimated(of))?.1);
+                let ratio = rms(closed)
+                    .zip(rms(filter))
+                    .map(|(closed, filter)| closed / filter);
+                row.push(number::or_dash(ratio, three_digits));
+                let difference = closed.vector() - filter.vector();
+                let spread = group.spread(&difference, &group.parameters(closed.form()));
+                let spread = spread.filter(|_| truth.is_none());
+                row.extend(spread.map(|x| three_digits(x.1)));
+            }
+            row
+        };
+        let rows: Vec<_> = Group::all().map(row).collect();
+        let mut table = Table::new("Accuracy of each group", columns)
+            .sections(rows.chunks(ParameterKind::ALL.len()).map(<[_]>::to_vec))
+            .note("RMS σ: root mean square of the 1σ that the method claims in the group.");
+        table.optional = optional;
+        if truth.is_some() {
+            table = table.note("Errors are estimate minus truth.");
+        }
+        match both {
+            Some(_) => table.note("σ ratio: closed form over EKF."),
+            None => table,
+        }
+    }
+}
+
+/// The directions that the data observed least: all that were not observed, and some that were.
+pub(super) fn weakest(outcome: &Outcome) -> Table {
+    let (form, observability) = (outcome.estimate.form(), &outcome.observability);
+    let shown = observability.unobserved().count() + WEAKEST;
+    let rows = observability.directions.iter().take(shown);
+    Table::new("Least observed directions", ["direction", "prior : σ"])
+        .section(rows.map(|of| vec![of.words(form), improvement(1.0, of.remaining)]))
+        .note(
+            "Combinations of parameters, each in units of its prior σ, that the data observed independently of \
+             each other. “With” joins errors of the same sign, “against” errors of opposite sign.",
+        )
+}
+
+/// The passes of the filter.
+pub(super) fn passes(outcome: &Outcome) -> Table {
+    let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
+        cells![
+            (n + 1).to_string(),
+            if pass.feedback {
+                "first, with feedback"
+            } else {
+                "Gauss–Newton"
+            },
+            three_digits(pass.largest_step),
+            number::whole(pass.cost),
+            count(pass.observations),
+            three_digits(pass.cost / pass.observations as f64),
+            count(pass.rejected),
+        ]
+    });
+    let columns = [
+        "pass",
+        "kind",
+        "largest step, σ",
+        "cost",
+        "scalars",
+        "cost / scalars",
+        "rejected",
+    ];
+    Table::new("Passes", columns).section(rows)
+}
+
+fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
+    let (velocity, table) = (outcome.consistency.velocity, outcome.consistency.table);
+    let all = [("zero velocity", velocity), ("table attitude", table)];
+    all.into_iter().filter(|(_, nis)| nis.count > 0)
+}
+
+/// NIS of each kind of observation with its interval.
+pub(super) fn nis(outcome: &Outcome) -> Vec<String> {
+    let shown = |(name, nis): (&str, Nis)| {
+        let (low, high) = nis.interval;
+        let [mean, low, high] = [nis.mean, low, high].map(|x| value(x, 0.01));
+        format!("{name} {mean} ({low} to {high})")
+    };
+    observed(outcome).map(shown).collect()
+}
+
+/// How the innovations agree with their covariance.
+pub(super) fn consistency(outcome: &Outcome) -> Table {
+    let rows = observed(outcome).map(|(name, nis)| {
+        let (low, high) = nis.interval;
+        let verdict = match nis.mean {
+            mean if mean < low => ", below",
+            mean if mean > high => ", above",
+            _ => "",
+        };
+        cells![
+            name,
+            format!("{}{verdict}", value(nis.mean, 0.01)),
+            format!("{} … {}", value(low, 0.01), value(high, 0.01)),
+            value(nis.lag_one, 0.01),
+            count(nis.count),
+        ]
+    });
+    let columns = [
+        "observation",
+        "NIS per scalar",
+        "95 % interval",
+        "lag-one correlation",
+        "scalars",
+    ];
+    Table::new("Consistency", columns).section(rows).note(
+        "A NIS within its interval and a correlation near zero say that the innovations are as large and as \
+         white as the filter claims.",
+    )
+}
+
+/// Each residual over the whole record and over what was held out; empty where there is nothing to measure.
+pub(super) fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
+    let turns = match table {
+        Some(_) => "attitude after a turn, gyros minus table",
+        None => "labelled turns, gyros minus label",
+    };
+    let named = [
+        ("|f| minus g in dwells", FORCE),
+        ("up after a turn, gyros minus accels", ANGLE),
+        (turns, ANGLE),
+    ];
+    let of = |m: &Measures| [m.gravity, m.direction, m.turns];
+    let held_out = quality.held_out.as_ref().map(of);
+    let all = named.into_iter().zip(of(&quality.all)).enumerate();
+    let rows = all.filter_map(|(k, ((name, units), all))| {
+        // The smallest unit in which the figure is below a thousand, else the largest.
+        let fits = units.iter().find(|(_, size)| all.rms < 1000.0 * size);
+        let &(unit, size) = fits.or(units.last()).filter(|_| all.count > 0)?;
+        let cells = |of: &Spread| match of.count {
+            0 => [NONE; 3].map(str::to_owned),
+            n => {
+                let [rms, largest] = [of.rms, of.largest].map(|x| three_digits(x / size));
+                [count(n), rms, largest]
+            }
+        };
+        let mut row = cells![name, unit];
+        row.extend(cells(&all));
+        row.extend(held_out.iter().flat_map(|of| cells(&of[k])));
+        Some(row)
+    });
+    let mut columns = vec!["", "unit", "number", "RMS", "largest"];
+    if quality.held_out.is_some() {
+        columns.extend(["cross-validation: number", "RMS", "largest"]);
+    }
+    let table = Table::new("Residuals at rest and after turns", columns).section(rows);
+    match quality.held_out.is_some() {
+        true => table.note(
+            "Cross-validation: in dwells whose observations a calibration did without, and over the turns that \
+             end in them.",
+        ),
+        false => table,
+    }
+}
+
+const FORCE: [(&str, f64); 2] = [("µg", MICRO_G), ("mg", MILLI_G)];
+const ANGLE: [(&str, f64); 2] = [("″", ARCSEC), ("°", DEGREE)];

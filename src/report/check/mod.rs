@@ -1,0 +1,80 @@
+//! The report of what a run holds: its log, dwells and turns, labels, and what the methods could observe.
+
+mod data;
+mod figure;
+mod tables;
+mod words;
+
+use super::document::Document;
+use super::number::{count, three_digits, value};
+use crate::run::Run;
+use crate::survey::Survey;
+
+/// Everything that is said of a run and what was found in it.
+pub fn document(run: &Run, survey: &Survey) -> Document {
+    let imu = &run.recording.imu;
+    let mut document = Document::new(format!(
+        "Check of {}: {} s, {} samples at {} Hz, {}, {}",
+        run.recording.name,
+        value(imu.duration(), 10.0),
+        count(imu.len()),
+        three_digits(imu.period.recip()),
+        several(survey.rests.len(), "dwell"),
+        several(survey.turns.len(), "turn"),
+    ));
+    document.lead = vec![words::log(run, survey)];
+    document.warnings.heading = "What to look at".to_owned();
+    document.warnings.items = words::findings(run, survey);
+    document.page(figure::figure(run, survey));
+    document.both(tables::columns(run, survey));
+    document.both(tables::faults(run));
+    document.both(tables::dwells(run, survey));
+    document.both(tables::labels(survey));
+    document.both(tables::methods(survey));
+    document.data = data::data(run, survey);
+    document
+}
+
+/// Such as `3 turns`.
+fn several(count: usize, name: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {name}{plural}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{svg, terminal};
+    use super::*;
+    use crate::simulation::Scenario;
+
+    fn checked(run: &Run) -> Document {
+        document(run, &Survey::of(run))
+    }
+
+    #[test]
+    fn a_sound_run_is_shown_with_nothing_to_change() {
+        let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        let document = checked(&run);
+        assert!(
+            document.warnings.items.is_empty(),
+            "{:?}",
+            document.warnings
+        );
+        insta::assert_snapshot!(terminal::text(&document, Some(120)));
+        let drawn = svg::drawn(document.plots());
+        assert!(drawn[0].contains("angular rate") && drawn[0].contains("z up"));
+    }
+
+    #[test]
+    fn gyros_of_the_wrong_sign_or_unit_are_found_by_table_and_gravity() {
+        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        for sample in &mut run.recording.imu.gyro {
+            sample.x = -sample.x;
+        }
+        let said = terminal::text(&checked(&run), None);
+        for said_so in ["the table's log", "gravity's direction"] {
+            let expected = format!("Gyros and {said_so} do not turn alike");
+            assert!(said.contains(&expected), "{said}");
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Position errors at the end, against time, and by group of parameters.
+
+use super::super::number::{sigma, three_digits};
+use super::super::plot::{Anchor, Axis, Color, Dash, Mark, Panel, Plot, Point, Series, Shape};
+use super::names::{HOUR, estimator_name, hours, in_general, method_name, miles, situation_name};
+use super::tables::nmile;
+use crate::calibration::Group;
+use crate::imu::InstallationForm;
+use crate::study::Experiment;
+use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
+
+/// Half the height of a box, in places of the axis.
+const HALF: f64 = 0.2;
+/// From one bar to the next, in places of the axis.
+const APART: f64 = 0.28;
+/// Below this nothing is worth a place on the axis of time, nmile.
+const LEAST: f64 = 0.01;
+
+pub(super) fn figures(experiment: &Experiment) -> [Plot; 3] {
+    [
+        distribution(experiment),
+        against_time(experiment),
+        budget(experiment),
+    ]
+}
+
+/// The colour of an estimator, the same in every figure: orange, light blue, blue.
+fn color(estimator: Estimator) -> Color {
+    let place = Estimator::ALL.iter().position(|e| *e == estimator);
+    Color::Nth([1, 3, 0][place.unwrap_or(0)])
+}
+
+fn distribution(experiment: &Experiment) -> Plot {
+    let all = experiment.navigations.iter().flat_map(|n| &n.methods);
+    let all: Vec<f64> = all
+        .flat_map(|w| w.errors.iter().map(|&e| miles(e)))
+        .collect();
+    let panel = |navigated: &Navigated| {
+        // The first method stands at the top.
+        let methods: Vec<&Worth> = navigated.methods.iter().rev().collect();
+        let names = methods
+            .iter()
+            .map(|worth| method_name(experiment, worth.method));
+        let noise = miles(navigated.noise.median);
+        let title = format!(
+            "{}: position error, nmile",
+            situation_name(navigated.situation)
+        );
+        let x = Axis::log("").including(all.iter().copied()).room(0.1, 0.1);
+        Panel::new(title, x, Axis::places(names))
+            .with(
+                Series::new(Shape::Upright(noise))
+                    .color(Color::Quiet)
+                    .dashed()
+                    .width(1.25),
+            )
+            .with(Series::words(
+                (noise, -0.5),
+                (-4.0, -3.0),
+                Anchor::AboveLeft,
+                "noise alone",
+            ))
+            .with_all(
+                methods
+                    .iter()
+                    .enumerate()
+                    .flat_map(|(k, worth)| boxed(k as f64, worth)),
+            )
+    };
+    let panels = experiment.navigations.iter().map(panel);
+    Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
+        "Horizontal position error at the end, logarithmic, the same axis for all. Dots: instruments; thick line \
+         with its value: median; box: the middle half; line beyond: 95 % are below; dashed: median of what the \
+         noise of the instrument alone makes.",
+    )
+}
+
+fn boxed(place: f64, worth: &Worth) -> Vec<Series> {
+    let color = color(worth.method.estimator);
+    let (below, above) = (place - HALF, place + HALF);
+    let at_end = &worth.at_end;
+    let [first, third] = [at_end.quartiles.0, at_end.quartiles.1].map(miles);
+    let [median, most] = [at_end.median, at_end.below_95].map(miles);
+    let upright = |x: f64| {
+        Series::line([(x, below), (x, above)])
+            .color(color)
+            .width(1.0)
+    };
+    vec![
+        Series::band(
+            vec![(first, below), (third, below)],
+            vec![(first, above), (third, above)],
+        ),
+        upright(first),
+        upright(third),
+        upright(most),
+        Series::line([(third, place), (most, place)])
+            .color(color)
+            .width(1.0),
+        Series::marks(Mark::Dot, worth.errors.iter().map(|&e| (miles(e), place)))
+            .color(color)
+            .width(0.5),
+        upright(median).color(Color::Ink).width(3.0),
+        Series::words(
+            (median, place),
+            (0.0, -8.0),
+            Anchor::Above,
+            nmile(at_end.median),
+        ),
+    ]
+}
+
+fn against_time(experiment: &Experiment) -> Plot {
+    let series = |worth: &Worth| {
+        let dash = match worth.method.form {
+            InstallationForm::General => Dash::Solid,
+            InstallationForm::SixAngle => Dash::Dashed,
+            InstallationForm::ThreeAngle => Dash::Dotted,
+        };
+        Series::line(course(worth))
+            .color(color(worth.method.estimator))
+            .dash(dash)
+            .label(method_name(experiment, worth.method))
+    };
+    let all = experiment.navigations.iter().flat_map(|n| &n.methods);
+    let all = all
+        .flat_map(course)
+        .map(|point| point.1)
+        .filter(|y| *y > LEAST);
+    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
+        (low.min(y), high.max(y))
+    });
+    let panel = |navigated: &Navigated| {
+        let title = format!(
+            "{}: median position error, nmile",
+            situation_name(navigated.situation)
+        );
+        let y = Axis::log("").between(low, high);
+        Panel::new(title, Axis::hours(hours(experiment)), y)
+            .with_all(navigated.methods.iter().map(series))
+    };
+    let panels = experiment.navigations.iter().map(panel);
+    Plot::new("time.svg", "Median position error against time", (1, 330), panels).caption(
+        "Median over all instruments of the horizontal position error, logarithmic, the same axes for all. Colour: \
+         what calibrated; solid: general form, dashed: six-angle, dotted: three-angle. The lines of general and \
+         six-angle lie upon each other where both forms give the same.",
+    )
+}
+
+/// Hours against nmile; the start, where there is no error, has no place on a logarithmic axis.
+fn course(worth: &Worth) -> Vec<Point> {
+    let points = worth.against_time.iter();
+    let points = points.map(|&(time, metres)| (time / HOUR, miles(metres)));
+    points.filter(|point| point.0 > 0.0).collect()
+}
+
+/// Which group of parameters makes how much of the position error.
+fn budget(experiment: &Experiment) -> Plot {
+    let names = Estimator::ALL.map(|estimator| estimator_name(experiment, estimator));
+    let shown = experiment
+        .navigations
+        .iter()
+        .filter(|n| n.situation != Situation::Aligned);
+    let all = shown
+        .clone()
+        .flat_map(|n| Estimator::ALL.into_iter().filter_map(|e| in_general(n, e)));
+    let all = all.flat_map(heights).filter(|y| *y > 0.0);
+    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
+        (low.min(y), high.max(y))
+    });
+    // What is a thousandth of the whole is nothing.
+    let y = Axis::log("").between(low.max(1e-3 * high) * 0.7, 1.8 * high);
+    let panel = |navigated: &Navigated| {
+        let totals = ["all, claimed", "all, actual"].map(str::to_owned);
+        let x = Axis::places(Group::all().map(Group::title).chain(totals));
+        let title = format!(
+            "{}: position error alone, RMS, nmile",
+            situation_name(navigated.situation)
+        );
+        let bars = Estimator::ALL
+            .into_iter()
+            .enumerate()
+            .filter_map(|(n, estimator)| {
+                let heights = heights(in_general(navigated, estimator)?);
+                let x = |place: usize| place as f64 + APART * (n as f64 - 1.0);
+                let tops: Vec<Point> = heights
+                    .iter()
+                    .enumerate()
+                    .map(|(k, &h)| (x(k), h))
+                    .collect();
+                let words = tops
+                    .clone()
+                    .into_iter()
+                    .filter(|top| top.1 >= 1e-3 * high)
+                    .map(|top| {
+                        // Three digits of a small number would not fit above its bar.
+                        let number = if top.1 < 1.0 {
+                            sigma(top.1)
+                        } else {
+                            three_digits(top.1)
+                        };
+                        Series::words(top, (0.0, -3.0), Anchor::Above, number)
+                    });
+                let bars = Shape::Bars {
+                    tops,
+                    half: 0.12,
+                    base: None,
+                    filled: true,
+                };
+                let bars = Series::new(bars)
+                    .color(color(estimator))
+                    .key(names[n].clone());
+                Some(std::iter::once(bars).chain(words.collect::<Vec<_>>()))
+            });
+        Panel::new(title, x, y.clone()).with_all(bars.flatten())
+    };
+    Plot::new("budget.svg", "Error budget", (1, 360), shown.map(panel)).caption(format!(
+        "Root mean square of the position error at the end that each group would make alone, and of all together, \
+         from the claimed covariance in the general form, and of the errors there were; logarithmic, the same axis \
+         for both. Bars from left to right: {}; one without a number is less than the axis shows.",
+        names.join(", ")
+    ))
+}
+
+/// Of each group alone, of all as claimed and as they were, nmile.
+fn heights(worth: &Worth) -> Vec<f64> {
+    let budget = &worth.budget;
+    let alone = budget.parts.iter().map(|part| part.alone);
+    alone
+        .chain([budget.claimed, budget.actual])
+        .map(miles)
+        .collect()
+}

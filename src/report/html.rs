@@ -1,0 +1,100 @@
+//! A document as a page that needs nothing else.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::document::{Block, Document, Facts, List, Medium, Table};
+use super::plot::Plot;
+
+/// The style of every page.
+const STYLE: &str = include_str!("style.css");
+
+/// The page: warnings first, then what the figures show, then all else in its order. `drawn` gives the SVG
+/// document of each plot in order.
+pub fn page(document: &Document, drawn: &[String]) -> String {
+    let mut drawn = drawn.iter();
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (document.title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header { h1 { (document.title) } @for p in &document.lead { p { (p) } } }
+                @if !document.warnings.items.is_empty() {
+                    section.warnings { (list(&document.warnings)) }
+                }
+                @if !document.conclusions.items.is_empty() {
+                    section { (list(&document.conclusions)) }
+                }
+                @for (medium, block) in &document.blocks {
+                    @if *medium != Medium::Terminal { (of_block(block, &mut drawn)) }
+                }
+                footer { "turncal " (env!("CARGO_PKG_VERSION")) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+fn of_block<'a>(block: &Block, drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+    match block {
+        Block::Facts(of) => html! { section { h2 { (of.heading) } (facts(of)) } },
+        Block::Table(of) => table(of),
+        Block::List(of) => html! { section { (list(of)) } },
+        Block::Plot(of) => drawn.next().map_or_else(|| html! {}, |svg| plot(of, svg)),
+        Block::Text(heading, text) => html! {
+            section { @if !heading.is_empty() { h2 { (heading) } } p.note { (text) } }
+        },
+        Block::Code(heading, code) => html! { section { h2 { (heading) } pre { (code) } } },
+    }
+}
+
+fn list(of: &List) -> Markup {
+    html! { h2 { (of.heading) } ul { @for item in &of.items { li { (item) } } } }
+}
+
+fn facts(of: &Facts) -> Markup {
+    html! { dl { @for (name, value) in &of.rows { div { dt { (name) } dd { (value) } } } } }
+}
+
+fn table(of: &Table) -> Markup {
+    html! {
+        section {
+            h2 { (of.heading) }
+            div.wide {
+                table {
+                    thead { tr { @for heading in &of.columns { th scope="col" { (heading) } } } }
+                    @for section in &of.sections {
+                        tbody { @for row in section { (row_of(row)) } }
+                    }
+                }
+            }
+            @if !of.notes.is_empty() { p.note { (of.notes.join(" ")) } }
+        }
+    }
+}
+
+fn row_of(row: &[String]) -> Markup {
+    html! {
+        tr {
+            @for (place, cell) in row.iter().enumerate() {
+                @if place == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+            }
+        }
+    }
+}
+
+fn plot(of: &Plot, svg: &str) -> Markup {
+    // The namespace is needed in a file of its own only.
+    let svg = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
+    html! {
+        figure {
+            h2 { (of.heading) }
+            div role="img" aria-label=(of.heading) { (PreEscaped(svg)) }
+            figcaption { (of.caption) " (" code { (of.file) } ")" }
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! What the calibrations of one run are worth: their navigation errors side by side, or where the truth is not
+//! known their predicted σ alone.
+
+use super::document::{Block, Document, Table};
+use super::number::{self, three_digits};
+use super::plot::{Panel, Plot, Point, Series};
+use super::quantity::Quantity;
+use crate::study::navigation::{NavigationStudyError, Outlook};
+
+const HOUR: f64 = 3600.0;
+const HEADING: &str = "Navigation with this calibration";
+
+/// The navigation errors that one method's calibration leads to, stationary and level at the run's site.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Navigated {
+    /// `EKF` or `closed form`.
+    pub method: &'static str,
+    /// The errors, as far as they are known.
+    pub outlook: Vec<Outlook>,
+}
+
+/// Adds the table, and for a terminal its position error in a line.
+pub(super) fn add(
+    document: &mut Document,
+    navigation: Result<&[Navigated], &NavigationStudyError>,
+) {
+    match navigation {
+        Err(reason) => {
+            let text = format!("Not navigated from the site of the run: {reason}.");
+            document.page(Block::Text(HEADING.to_owned(), text));
+        }
+        Ok([]) => {}
+        Ok(navigated) => {
+            document.terminal(Block::Text(String::new(), line(navigated)));
+            document.page(table(navigated));
+        }
+    }
+}
+
+fn is_known(navigated: &[Navigated]) -> bool {
+    let mut moments = navigated.iter().flat_map(|of| &of.outlook);
+    moments.any(|moment| moment.error.is_some())
+}
+
+/// Duration.
+fn hours(navigated: &[Navigated]) -> f64 {
+    let ends = navigated.iter().filter_map(|of| of.outlook.last());
+    ends.map(|end| end.time / HOUR).fold(0.0, f64::max)
+}
+
+/// Error and its σ in the usual unit.
+fn both(quantity: Quantity, moment: &Outlook) -> (Option<f64>, f64) {
+    let error = moment.error.as_ref().map(|error| quantity.error(error));
+    (error, quantity.of_sigma(&moment.sigma))
+}
+
+/// The position at the end in one line.
+fn line(navigated: &[Navigated]) -> String {
+    let [.., horizontal] = Quantity::ALL;
+    let ends = navigated.iter().filter_map(|of| {
+        let (error, sigma) = both(horizontal, of.outlook.last()?);
+        let sigma = three_digits(sigma);
+        Some(match error {
+            Some(error) => format!("{} {} nmile (σ {sigma})", of.method, three_digits(error)),
+            None => format!("{} σ {sigma} nmile", of.method),
+        })
+    });
+    format!(
+        "Position error after {} h of navigation, stationary and level: {}",
+        number::value(hours(navigated), 10.0),
+        ends.collect::<Vec<_>>().join(", ")
+    )
+}
+
+/// What a row shows.
+#[derive(Clone, Copy)]
+enum Of {
+    /// The error at the end.
+    End,
+    /// The largest of all times.
+    Largest,
+    /// The error at the end over the time.
+    Drift,
+}
+
+fn table(navigated: &[Navigated]) -> Table {
+    let known = is_known(navigated);
+    let mut columns = vec![String::new(), "unit".to_owned()];
+    for of in navigated {
+        columns.extend(known.then(|| format!("{}: error", of.method)));
+        columns.push(format!("{}: σ", of.method));
+    }
+    let [pitch, roll, heading, _, _, _, east, north, horizontal] = Quantity::ALL;
+    let mut position = [east, north, horizontal]
+        .map(|of| row(navigated, of, Of::End))
+        .to_vec();
+    position.extend(known.then(|| row(navigated, horizontal, Of::Largest)));
+    position.push(row(navigated, horizontal, Of::Drift));
+    let attitude = [pitch, roll, heading].map(|angle| row(navigated, angle, Of::End));
+    let table = Table::new(HEADING, columns)
+        .section(position)
+        .section(attitude)
+        .note(format!(
+            "{} h stationary and level at the site of the run, heading North, from perfect alignment, height \
+             held. σ: predicted from the covariance of the calibration by the linear error model; of horizontal \
+             errors the root of the mean square.",
+            number::value(hours(navigated), 10.0)
+        ));
+    table.note(match known {
+        true => "Errors are computed minus true. Drift: position error at the end over the time.",
+        false => "The truth is not known, so no error is shown.",
+    })
+}
+
+fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
+    let hours = hours(navigated);
+    let numbers: Vec<(Option<f64>, Option<f64>)> = navigated
+        .iter()
+        .map(|navigated| {
+            let end = navigated.outlook.last().map(|end| both(quantity, end));
+            let (error, sigma) = end.map_or((None, None), |(error, sigma)| (error, Some(sigma)));
+            match of {
+                Of::End => (error, sigma),
+                Of::Largest => {
+                    let errors = navigated.outlook.iter().filter_map(|m| both(quantity, m).0);
+                    (errors.max_by(|a, b| a.abs().total_cmp(&b.abs())), None)
+                }
+                Of::Drift => (error.map(|x| x / hours), sigma.map(|x| x / hours)),
+            }
+        })
+        .collect();
+    let all = numbers.iter().flat_map(|&(error, sigma)| [error, sigma]);
+    let largest = all.flatten().map(f64::abs).fold(0.0, f64::max);
+    let (unit, scale) = quantity.readable_unit(largest);
+    let (name, unit, scale) = match of {
+        Of::End => (
+            format!("{} at the end", quantity.name()),
+            unit.to_owned(),
+            scale,
+        ),
+        Of::Largest => (
+            format!("{}, largest", quantity.name()),
+            unit.to_owned(),
+            scale,
+        ),
+        // In nautical miles others need no second look.
+        Of::Drift => ("drift".to_owned(), format!("{}/h", quantity.unit()), 1.0),
+    };
+    let shown = |x: Option<f64>| number::or_dash(x, |x| three_digits(x * scale));
+    let mut row = vec![name, unit];
+    for (error, sigma) in numbers {
+        row.extend(is_known(navigated).then(|| shown(error)));
+        row.push(shown(sigma));
+    }
+    row
+}
+
+/// Position error east and north against time; none if nothing was navigated.
+pub(super) fn figure(navigated: &[Navigated]) -> Option<Plot> {
+    let last = navigated.last()?;
+    let (heading, mut caption) = match is_known(navigated) {
+        true => (
+            "Position error in navigation",
+            format!(
+                "Computed minus true, by full navigation from perfect alignment, stationary and level, height \
+                 held. Band: ±1σ of the {} predicted from its covariance.",
+                last.method
+            ),
+        ),
+        false => (
+            "Predicted position error in navigation",
+            "±1σ of the error predicted from the covariance of the calibration, from perfect alignment, \
+             stationary and level, height held."
+                .to_owned(),
+        ),
+    };
+    if navigated.len() > 1 {
+        caption += " Solid: EKF; dashed: closed form.";
+    }
+    let panels = [Quantity::EAST, Quantity::NORTH].map(|quantity| panel(quantity, navigated));
+    Some(Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption))
+}
+
+fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
+    let known = is_known(navigated);
+    let sigma = |of: &Navigated, sign: f64| -> Vec<Point> {
+        let moments = of.outlook.iter();
+        let points = moments.map(|m| (m.time / HOUR, sign * both(quantity, m).1));
+        points.collect()
+    };
+    let lines = navigated.iter().flat_map(|of| {
+        let errors = of.outlook.iter();
+        let errors = errors.filter_map(|m| Some((m.time / HOUR, both(quantity, m).0?)));
+        let lines = match known {
+            true => vec![Series::line(errors).label(of.method)],
+            false => {
+                let name = format!("σ of {}", of.method);
+                vec![
+                    Series::line(sigma(of, 1.0)).label(name),
+                    Series::line(sigma(of, -1.0)),
+                ]
+            }
+        };
+        let styled = |line: Series| match of.method {
+            "EKF" => line,
+            _ => line.nth(1).dashed(),
+        };
+        lines.into_iter().map(styled)
+    });
+    let band = navigated.last().map_or_else(Vec::new, |of| sigma(of, 1.0));
+    quantity.panel(hours(navigated), &band, lines.collect())
+}

@@ -1,0 +1,299 @@
+//! Axes: what is asked of them, and the scale with ticks that comes of it and of the data.
+
+use super::super::number;
+
+/// The most decades of a logarithmic axis; what lies lower is drawn at its foot.
+const DECADES: i32 = 10;
+/// Fewer decades than this have ticks at 1, 2 and 5 of each, and end near the data.
+const FEW_DECADES: f64 = 2.5;
+
+/// How numbers are laid along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Kind {
+    /// Evenly.
+    #[default]
+    Linear,
+    /// By their logarithm.
+    Log,
+    /// Linear to both sides of zero up to this magnitude, logarithmic beyond.
+    Symlog(f64),
+}
+
+/// What is asked of an axis. Its ends are those of the data unless they are given.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Axis {
+    /// Its title; the vertical one is titled by its panel.
+    pub title: String,
+    /// How numbers are laid along it.
+    pub kind: Kind,
+    /// Ends that do not depend on the data.
+    pub ends: Option<(f64, f64)>,
+    /// Numbers that it holds beside the data.
+    pub including: Vec<f64>,
+    /// Distance of ticks, if it matters.
+    pub step: Option<f64>,
+    /// Left free below and above the data: parts of their span, or of a logarithmic axis parts of the ends.
+    pub room: (f64, f64),
+    /// Names at 0, 1, 2 … in the place of numbers.
+    pub places: Vec<String>,
+}
+
+impl Axis {
+    /// A linear axis.
+    pub fn linear(title: &str) -> Self {
+        Self::of(title, Kind::Linear)
+    }
+
+    /// A logarithmic axis.
+    pub fn log(title: &str) -> Self {
+        Self::of(title, Kind::Log)
+    }
+
+    /// An axis that is linear up to this magnitude and logarithmic beyond, alike to both sides.
+    pub fn symlog(linear: f64) -> Self {
+        Self::of("", Kind::Symlog(linear))
+    }
+
+    /// An axis with a place for each name.
+    pub fn places(names: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            places: names.into_iter().collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Hours from zero on, with ticks at whole ones or even parts.
+    pub fn hours(hours: f64) -> Self {
+        let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0, 48.0, 96.0];
+        let step = steps.into_iter().find(|step| hours / step <= 12.0);
+        Self {
+            step: step.filter(|_| hours > 0.0),
+            ..Self::linear("time, h").between(0.0, hours)
+        }
+    }
+
+    fn of(title: &str, kind: Kind) -> Self {
+        Self {
+            title: title.to_owned(),
+            kind,
+            ..Self::default()
+        }
+    }
+
+    /// Ends that do not depend on the data.
+    pub fn between(mut self, low: f64, high: f64) -> Self {
+        self.ends = Some((low, high));
+        self
+    }
+
+    /// Holds these, too.
+    pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
+        self.including.extend(values);
+        self
+    }
+
+    /// A tick every `step`.
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// Leaves parts of the span free below and above the data.
+    pub fn room(mut self, below: f64, above: f64) -> Self {
+        self.room = (below, above);
+        self
+    }
+
+    /// The scale that holds these values.
+    pub fn scale(&self, values: impl IntoIterator<Item = f64>) -> Scale {
+        if !self.places.is_empty() {
+            return Scale::places(&self.places);
+        }
+        let values = values.into_iter().chain(self.including.iter().copied());
+        let values = values.filter(|v| v.is_finite() && (*v > 0.0 || self.kind != Kind::Log));
+        let (low, high) = self.ends.unwrap_or_else(|| {
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(v), high.max(v))
+            })
+        });
+        let (below, above) = self.room;
+        match self.kind {
+            Kind::Linear => {
+                let span = high - low;
+                Scale::linear(low - below * span, high + above * span, self.step)
+            }
+            Kind::Log => Scale::log(
+                low * (1.0 - below),
+                high * (1.0 + above),
+                self.ends.is_some(),
+            ),
+            Kind::Symlog(linear) => {
+                Scale::symlog(linear, low.abs().max(high.abs()) * (1.0 + above))
+            }
+        }
+    }
+}
+
+/// An axis with ends and ticks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    kind: Kind,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+    /// Values and their labels, the most important first.
+    pub ticks: Vec<(f64, String)>,
+}
+
+impl Scale {
+    fn linear(low: f64, high: f64, step: Option<f64>) -> Self {
+        let (low, high) = widened(low, high);
+        let raw = (high - low) / 6.0;
+        let power = 10f64.powf(raw.log10().floor());
+        let round = [1.0, 2.0, 5.0].into_iter().find(|m| m * power >= raw);
+        let step = step.unwrap_or(power * round.unwrap_or(10.0));
+        let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+        let values = (first..=last).map(|k| k as f64 * step);
+        Self {
+            kind: Kind::Linear,
+            low,
+            high,
+            ticks: values.map(|x| (x, number::tick(x, step))).collect(),
+        }
+    }
+
+    fn log(low: f64, high: f64, fixed: bool) -> Self {
+        let (low, high) = match low > 0.0 && high.is_finite() && high >= low {
+            true => (low.max(high * 10f64.powi(-DECADES)), high),
+            false => (0.1, 10.0),
+        };
+        if (high / low).log10() < FEW_DECADES {
+            // Space that keeps a single value off the ends.
+            let free = if fixed && high > low { 1.0 } else { 1.15 };
+            let (low, high) = (low / free, high * free);
+            let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
+            let ticks = decades.flat_map(|k| [1.0, 2.0, 5.0].map(|m| (m, 10f64.powi(k))));
+            let ticks = ticks.filter(|(m, decade)| (low..=high).contains(&(m * decade)));
+            return Self {
+                kind: Kind::Log,
+                low,
+                high,
+                ticks: ticks
+                    .map(|(m, decade)| (m * decade, number::tick(m * decade, decade)))
+                    .collect(),
+            };
+        }
+        let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
+        Self {
+            kind: Kind::Log,
+            low: 10f64.powi(first),
+            high: 10f64.powi(last),
+            ticks: decades(first, last)
+                .map(|k| (10f64.powi(k), number::power_of_ten(k)))
+                .collect(),
+        }
+    }
+
+    fn symlog(linear: f64, extent: f64) -> Self {
+        let linear = if linear.is_finite() && linear > 0.0 {
+            linear
+        } else {
+            1.0
+        };
+        let extent = if extent.is_finite() { extent } else { 0.0 }.max(4.0 * linear);
+        let mut ticks = vec![(0.0, "0".to_owned())];
+        for k in decades(linear.log10().ceil() as i32, extent.log10().floor() as i32) {
+            let label = number::power_of_ten(k);
+            ticks.push((-(10f64.powi(k)), format!("−{label}")));
+            ticks.push((10f64.powi(k), label));
+        }
+        Self {
+            kind: Kind::Symlog(linear),
+            low: -extent,
+            high: extent,
+            ticks,
+        }
+    }
+
+    fn places(names: &[String]) -> Self {
+        let ticks = names.iter().enumerate();
+        Self {
+            kind: Kind::Linear,
+            low: -0.5,
+            high: names.len() as f64 - 0.5,
+            ticks: ticks.map(|(k, name)| (k as f64, name.clone())).collect(),
+        }
+    }
+
+    /// Where a value lies, from 0 at the low to 1 at the high end; what lies beyond is at the end.
+    pub fn part(&self, value: f64) -> f64 {
+        let straight = |value: f64| match self.kind {
+            Kind::Linear => value,
+            Kind::Log => value.max(self.low).ln(),
+            Kind::Symlog(linear) => (value / linear).asinh(),
+        };
+        let (low, high) = (straight(self.low), straight(self.high));
+        ((straight(value) - low) / (high - low)).clamp(0.0, 1.0)
+    }
+}
+
+/// Every decade, or every second or third where they are many.
+fn decades(first: i32, last: i32) -> impl Iterator<Item = i32> {
+    (first..=last).step_by(((last - first) / 5).max(1) as usize)
+}
+
+/// Ends that a linear axis can be made of.
+fn widened(low: f64, high: f64) -> (f64, f64) {
+    if !(low.is_finite() && high.is_finite()) {
+        (0.0, 1.0)
+    } else if high - low > 1e-9 * low.abs().max(high.abs()) {
+        (low, high)
+    } else {
+        (low - 0.5, low + 0.5)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_symlog_axis_is_odd_and_keeps_small_values_apart() {
+        let scale = Axis::symlog(0.3).scale([7000.0]);
+        assert_eq!((scale.part(0.0), scale.part(-7000.0)), (0.5, 0.0));
+        assert!((scale.part(0.9) + scale.part(-0.9) - 1.0).abs() < 1e-12);
+        assert!(scale.part(0.9) > 0.55);
+    }
+
+    #[test]
+    fn a_log_axis_holds_every_value_and_its_lowest_decade() {
+        let scale = Axis::log("").scale([0.02, 4000.0, 0.0, f64::NAN]);
+        assert_eq!((scale.low, scale.high), (0.01, 10_000.0));
+        assert_eq!((scale.part(0.01), scale.part(0.0)), (0.0, 0.0));
+        assert!(scale.ticks.iter().any(|(_, label)| label == "0.01"));
+        let narrow = Axis::log("").scale([0.3, 4.0]);
+        assert!(narrow.low < 0.3 && narrow.high > 4.0);
+        assert!(narrow.ticks.iter().any(|(_, label)| label == "0.5"));
+    }
+
+    #[test]
+    fn axes_of_nothing_are_still_axes() {
+        let log = Axis::log("");
+        for (axis, values) in [
+            (Axis::linear(""), vec![3.0]),
+            (Axis::linear(""), vec![f64::INFINITY, f64::NAN]),
+            (log.clone(), vec![]),
+            (log.clone(), vec![3.0]),
+            (log.between(f64::INFINITY, 0.0), vec![]),
+            (Axis::symlog(0.0), vec![f64::NAN]),
+            (Axis::hours(0.0), vec![]),
+        ] {
+            let scale = axis.scale(values);
+            assert!(
+                scale.high > scale.low && scale.part(1.0).is_finite(),
+                "{scale:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! A plot as a value: panels with axes and series, or a matrix. It knows nothing of where it is drawn.
+
+mod axis;
+mod series;
+
+use std::ops::Range;
+
+pub use axis::{Axis, Kind, Scale};
+pub use series::{Anchor, Color, Dash, Mark, Pen, Point, Series, Shape};
+
+/// A figure with its file, heading and caption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    /// Name of its file, such as `sigma.svg`.
+    pub file: String,
+    /// Its heading.
+    pub heading: String,
+    /// How to read it, a sentence or two.
+    pub caption: String,
+    /// What is drawn.
+    pub body: Body,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Body {
+    /// Panels row by row.
+    Panels(Grid),
+    /// A correlation matrix.
+    Matrix(Matrix),
+}
+
+/// Panels of one size in rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Panels in a row.
+    pub columns: usize,
+    /// Height of a panel in pixels; the width of the figure is fixed.
+    pub height: u32,
+    /// The panels; a row may be closed by [`Panel::blank`].
+    pub panels: Vec<Panel>,
+}
+
+/// Coefficients between −1 and 1, symmetric.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    /// A name for each row and column.
+    pub names: Vec<String>,
+    /// Rows before which a new group begins.
+    pub groups: Vec<usize>,
+    /// Row by row.
+    pub values: Vec<Vec<f64>>,
+    /// Coefficients of at least this magnitude are written out.
+    pub written: f64,
+}
+
+/// Axes with a title, and what is drawn into them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Panel {
+    /// What is on the vertical axis, with its unit.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// From the back to the front.
+    pub series: Vec<Series>,
+    /// Stretches of the horizontal axis that are shaded.
+    pub shading: Vec<Range<f64>>,
+    /// Short texts above the curves where there is room for them.
+    pub tags: Vec<(f64, String)>,
+    /// In so many lines.
+    pub tag_lines: usize,
+    /// Lines of text in an upper corner.
+    pub notes: Vec<String>,
+    /// Whether they stand in the left corner instead of the right one.
+    pub notes_left: bool,
+    /// Whether both axes have the same length.
+    pub square: bool,
+    /// Whether only the title is drawn.
+    pub blank: bool,
+}
+
+impl Plot {
+    /// Panels in rows of `columns`, each `height` pixels high.
+    pub fn new(
+        file: &str,
+        heading: &str,
+        (columns, height): (usize, u32),
+        panels: impl IntoIterator<Item = Panel>,
+    ) -> Self {
+        let grid = Grid {
+            columns: columns.max(1),
+            height,
+            panels: panels.into_iter().collect(),
+        };
+        Self::of(file, heading, Body::Panels(grid))
+    }
+
+    /// A matrix.
+    pub fn matrix(file: &str, heading: &str, matrix: Matrix) -> Self {
+        Self::of(file, heading, Body::Matrix(matrix))
+    }
+
+    fn of(file: &str, heading: &str, body: Body) -> Self {
+        Self {
+            file: file.to_owned(),
+            heading: heading.to_owned(),
+            caption: String::new(),
+            body,
+        }
+    }
+
+    /// How to read it.
+    pub fn caption(mut self, caption: impl Into<String>) -> Self {
+        self.caption = caption.into();
+        self
+    }
+}
+
+impl Panel {
+    /// Empty axes.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
+        Self {
+            title: title.into(),
+            x,
+            y,
+            ..Self::default()
+        }
+    }
+
+    /// A title alone, in the place of a panel that has nothing to show.
+    pub fn blank(title: impl Into<String>) -> Self {
+        Self {
+            blank: true,
+            ..Self::new(title, Axis::default(), Axis::default())
+        }
+    }
+
+    /// Draws one more series in front of the others.
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// The same for several.
+    pub fn with_all(mut self, series: impl IntoIterator<Item = Series>) -> Self {
+        self.series.extend(series);
+        self
+    }
+
+    /// Shades stretches of the horizontal axis.
+    pub fn shaded(mut self, stretches: &[Range<f64>]) -> Self {
+        self.shading = stretches.to_vec();
+        self
+    }
+
+    /// Short texts above the curves in up to so many lines.
+    pub fn tagged(mut self, lines: usize, tags: impl IntoIterator<Item = (f64, String)>) -> Self {
+        self.tag_lines = lines;
+        self.tags = tags.into_iter().collect();
+        self
+    }
+
+    /// Lines of text in the upper right corner.
+    pub fn noted(mut self, notes: impl IntoIterator<Item = String>) -> Self {
+        self.notes = notes.into_iter().collect();
+        self
+    }
+
+    /// Ordinates of all that the vertical axis has to hold.
+    pub(super) fn heights(&self) -> impl Iterator<Item = f64> {
+        self.series
+            .iter()
+            .flat_map(|series| series.shape.extent().1)
+    }
+
+    /// The same for the horizontal axis.
+    pub(super) fn widths(&self) -> impl Iterator<Item = f64> {
+        self.series
+            .iter()
+            .flat_map(|series| series.shape.extent().0)
+    }
+}

@@ -1,0 +1,188 @@
+//! A fine canvas with its colours, pens and letters.
+//!
+//! Plotters rounds every coordinate to a whole pixel, so a figure is drawn [`FINE`] times larger and shown at
+//! its size. Sizes here are in shown pixels.
+
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::Color as _;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::super::plot::{Color, Dash, Pen, Point};
+
+/// Width of every figure.
+pub(super) const WIDTH: u32 = 1200;
+/// Drawn pixels in one shown pixel.
+const FINE: f64 = 8.0;
+/// Size of the letters.
+pub(super) const LETTER: f64 = 14.0;
+/// Of ticks, labels and notes.
+pub(super) const SMALL: f64 = 0.95;
+/// What plotters divides a font's size by when it writes SVG.
+const FONT_RATIO: f64 = 1.24;
+
+/// Text and axes.
+pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
+/// What must not distract.
+pub(super) const QUIET: RGBColor = RGBColor(110, 110, 110);
+/// Grid lines.
+pub(super) const GRID: RGBColor = RGBColor(218, 218, 214);
+/// The time of a dwell.
+pub(super) const SHADE: RGBColor = RGBColor(243, 243, 238);
+/// Bands and filled bars.
+pub(super) const BAND: RGBColor = RGBColor(196, 214, 228);
+
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 84, 147),
+    RGBColor(200, 80, 0),
+    RGBColor(0, 128, 96),
+    RGBColor(86, 160, 211),
+    RGBColor(150, 60, 110),
+    RGBColor(140, 120, 20),
+];
+
+/// What can go wrong while drawing.
+pub(super) type DrawError = DrawingAreaErrorKind<std::io::Error>;
+
+/// The colour of a pen.
+pub(super) fn rgb(color: Color) -> RGBColor {
+    match color {
+        Color::Ink => INK,
+        Color::Quiet => QUIET,
+        Color::Nth(n) => COLORS[n % COLORS.len()],
+    }
+}
+
+/// About how wide a text is in shown pixels; fonts differ, this is one of the wide ones.
+pub(super) fn width(text: &str, scale: f64) -> f64 {
+    let of = |letter: char| match letter {
+        'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
+        ' ' | '.' | ',' | ':' | ';' | '\u{202f}' => 0.32,
+        'f' | 't' | 'r' | '(' | ')' | '-' | '/' | '″' | '′' => 0.4,
+        's' | 'c' | 'z' | '°' => 0.54,
+        'm' | 'w' | 'W' | 'M' | '−' | '±' | '+' | '=' | '<' | '>' | '%' | '…' => 0.88,
+        letter if letter.is_uppercase() => 0.72,
+        _ => 0.63,
+    };
+    text.chars().map(of).sum::<f64>() * LETTER * scale
+}
+
+/// A text cut to a width.
+pub(super) fn shortened(text: &str, room: f64) -> String {
+    if width(text, SMALL) <= room {
+        return text.to_owned();
+    }
+    let mut short = text.to_owned();
+    while !short.is_empty() && width(&short, SMALL) + 0.9 * LETTER > room {
+        short.pop();
+    }
+    short + "…"
+}
+
+fn px(shown: f64) -> i32 {
+    (shown * FINE).round() as i32
+}
+
+fn place((x, y): Point) -> (i32, i32) {
+    (px(x), px(y))
+}
+
+/// What a figure is drawn on.
+pub(super) struct Canvas<'a>(DrawingArea<SVGBackend<'a>, Shift>);
+
+/// An SVG document of this size.
+pub(super) fn draw(
+    (width, height): (u32, u32),
+    content: impl FnOnce(&Canvas) -> Result<(), DrawError>,
+) -> Result<String, DrawError> {
+    let (fine_width, fine_height) = (width * FINE as u32, height * FINE as u32);
+    let mut text = String::new();
+    {
+        let backend = SVGBackend::with_string(&mut text, (fine_width, fine_height));
+        let canvas = Canvas(backend.into_drawing_area());
+        canvas.0.fill(&WHITE)?;
+        content(&canvas)?;
+        canvas.0.present()?;
+    }
+    Ok(text.replacen(
+        &format!(r#"width="{fine_width}" height="{fine_height}" viewBox"#),
+        &format!(r#"width="{width}" height="{height}" viewBox"#),
+        1,
+    ))
+}
+
+impl Canvas<'_> {
+    /// Joins points.
+    pub(super) fn line(&self, points: &[Point], pen: Pen) -> Result<(), DrawError> {
+        let style = rgb(pen.color).stroke_width(px(pen.width) as u32);
+        let (dash, gap) = match pen.dash {
+            Dash::Solid => return self.stroke(points, rgb(pen.color), pen.width),
+            Dash::Dashed => (6.0, 4.0),
+            Dash::Dotted => (2.0, 2.5),
+        };
+        let points: Vec<_> = points.iter().copied().map(place).collect();
+        let dashes = DashedPathElement::new(points, px(dash), px(gap), style);
+        self.0.draw(&dashes)
+    }
+
+    /// The same without dashes in any colour.
+    pub(super) fn stroke(
+        &self,
+        points: &[Point],
+        color: RGBColor,
+        width: f64,
+    ) -> Result<(), DrawError> {
+        let points: Vec<_> = points.iter().copied().map(place).collect();
+        let style = color.stroke_width(px(width) as u32);
+        self.0.draw(&PathElement::new(points, style))
+    }
+
+    /// Fills an outline.
+    pub(super) fn area(&self, outline: &[Point], color: RGBColor) -> Result<(), DrawError> {
+        let outline: Vec<_> = outline.iter().copied().map(place).collect();
+        self.0.draw(&Polygon::new(outline, color.filled()))
+    }
+
+    /// Fills a rectangle.
+    pub(super) fn rectangle(&self, corners: [Point; 2], color: RGBColor) -> Result<(), DrawError> {
+        let rectangle = Rectangle::new(corners.map(place), color.filled());
+        self.0.draw(&rectangle)
+    }
+
+    /// A circle, filled or open with a line of this width.
+    pub(super) fn circle(
+        &self,
+        at: Point,
+        radius: f64,
+        color: RGBColor,
+        line: Option<f64>,
+    ) -> Result<(), DrawError> {
+        let style = line.map_or(color.filled(), |width| color.stroke_width(px(width) as u32));
+        self.0.draw(&Circle::new(place(at), px(radius), style))
+    }
+
+    /// Writes text; `scale` 1 is the usual size.
+    pub(super) fn text(
+        &self,
+        text: &str,
+        at: Point,
+        (h, v): (HPos, VPos),
+        color: RGBColor,
+        scale: f64,
+    ) -> Result<(), DrawError> {
+        let style = font(scale).color(&color).pos(Pos::new(h, v));
+        self.0.draw(&Text::new(text.to_owned(), place(at), style))
+    }
+
+    /// Writes text upwards.
+    pub(super) fn upright(&self, text: &str, at: Point, scale: f64) -> Result<(), DrawError> {
+        let style = font(scale).transform(FontTransform::Rotate270);
+        let style = style.color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
+        self.0.draw(&Text::new(text.to_owned(), place(at), style))
+    }
+}
+
+fn font(scale: f64) -> FontDesc<'static> {
+    ("sans-serif", LETTER * FONT_RATIO * FINE * scale).into_font()
+}

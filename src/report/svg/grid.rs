@@ -1,0 +1,251 @@
+//! Panels in rows: scales, margins, frames, ticks, titles, tags and notes.
+
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::super::plot::{Grid, Panel, Scale};
+use super::canvas::{
+    Canvas, DrawError, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
+};
+use super::frame::Frame;
+use super::series;
+
+/// Above the axes, for the title.
+const TOP: f64 = 26.0;
+/// Between one line of text and the next.
+const LINE: f64 = 17.0;
+/// Letters of tags.
+const TAG: f64 = 0.85;
+/// Of a panel's width, the most that names at the ends of lines may take.
+const LABELS: f64 = 0.3;
+
+fn rows(grid: &Grid) -> usize {
+    grid.panels.len().div_ceil(grid.columns).max(1)
+}
+
+pub(super) fn height(grid: &Grid) -> u32 {
+    grid.height * rows(grid) as u32
+}
+
+pub(super) fn draw(on: &Canvas, grid: &Grid) -> Result<(), DrawError> {
+    let panel_width = f64::from(WIDTH) / grid.columns as f64;
+    for column in 0..grid.columns {
+        let panels = grid.panels.iter().skip(column).step_by(grid.columns);
+        let scaled = panels.map(|p| (p, p.x.scale(p.widths()), p.y.scale(p.heights())));
+        let scaled: Vec<(&Panel, Scale, Scale)> = scaled.collect();
+        // All panels of a column have the same margins.
+        let drawn = || scaled.iter().filter(|(panel, ..)| !panel.blank);
+        let left = drawn().map(|(_, _, y)| widest(&y.ticks) + 14.0);
+        let right = drawn().map(|(panel, x, _)| right(panel, x, panel_width));
+        let [left, right] = [left.fold(14.0, f64::max), right.fold(14.0, f64::max)];
+        let origin = panel_width * column as f64;
+        let across = (origin + left, origin + panel_width - right);
+        for (row, (panel, x, y)) in scaled.into_iter().enumerate() {
+            let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
+            let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
+            let lines = lines + usize::from(!panel.x.title.is_empty());
+            let top = f64::from(grid.height) * row as f64;
+            let bottom = top + f64::from(grid.height) - 12.0 - LINE * lines as f64;
+            let down = (top + TOP, bottom);
+            let square = (across.0, across.0 + down.1 - down.0);
+            let frame = Frame {
+                panel,
+                x,
+                y,
+                across: if panel.square { square } else { across },
+                down,
+                end: origin + panel_width,
+            };
+            match panel.blank {
+                true => title(on, &frame)?,
+                false => of_panel(on, &frame, &names)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+fn widest(ticks: &[(f64, String)]) -> f64 {
+    let widths = ticks.iter().map(|(_, label)| width(label, SMALL));
+    widths.fold(0.0, f64::max)
+}
+
+/// Room for names at the ends of lines, or for half of the last tick's label.
+fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
+    let labels = panel
+        .series
+        .iter()
+        .filter_map(|series| series.label.as_ref());
+    let widest = labels
+        .map(|(_, text)| width(text, SMALL) + 18.0)
+        .fold(0.0, f64::max);
+    let last = x.ticks.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    let half = last.filter(|_| panel.x.places.is_empty());
+    let half = half.map_or(0.0, |(_, label)| 0.5 * width(label, SMALL) + 4.0);
+    widest.min(LABELS * panel_width).max(half)
+}
+
+/// Labels of the horizontal ticks, names of places in as many lines as they need.
+fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
+    let letters = (room / (0.6 * LETTER * SMALL)).max(3.0) as usize;
+    let lines = |label: &String| {
+        if width(label, SMALL) < room {
+            return vec![label.clone()];
+        }
+        let lines = textwrap::wrap(label, textwrap::Options::new(letters).break_words(false));
+        lines.into_iter().map(|line| line.into_owned()).collect()
+    };
+    x.ticks.iter().map(|(_, label)| lines(label)).collect()
+}
+
+fn title(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+    let at = (frame.across.0, frame.down.0 - TOP + 6.0);
+    on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
+}
+
+fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
+    let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
+    for range in &panel.shading {
+        let (start, end) = (range.start.max(frame.x.low), range.end.min(frame.x.high));
+        if end > start {
+            let corners = [(frame.at_x(start), top), (frame.at_x(end), bottom)];
+            on.rectangle(corners, SHADE)?;
+        }
+    }
+    ticks(on, frame, names)?;
+    on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75)?;
+    title(on, frame)?;
+    keys(on, frame, top - TOP + 6.0)?;
+    for series in &panel.series {
+        series::draw(on, frame, series)?;
+    }
+    tags(on, frame)?;
+    let (x, side) = match panel.notes_left {
+        true => (left + 6.0, HPos::Left),
+        false => (right - 6.0, HPos::Right),
+    };
+    for (line, note) in panel.notes.iter().enumerate() {
+        let at = (x, top + 6.0 + LINE * line as f64);
+        on.text(note, at, (side, VPos::Top), INK, SMALL)?;
+    }
+    labels(on, frame)
+}
+
+fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
+    let ((left, right), (top, bottom)) = (frame.across, frame.down);
+    let mut taken: Vec<f64> = Vec::new();
+    for (value, label) in &frame.y.ticks {
+        let y = frame.at_y(*value);
+        if taken.iter().any(|other| (other - y).abs() < LETTER) {
+            continue;
+        }
+        taken.push(y);
+        on.stroke(&[(left, y), (right, y)], GRID, 0.75)?;
+        on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75)?;
+        on.text(
+            label,
+            (left - 6.0, y),
+            (HPos::Right, VPos::Center),
+            INK,
+            SMALL,
+        )?;
+    }
+    let mut taken: Vec<(f64, f64)> = Vec::new();
+    for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
+        let x = frame.at_x(*value);
+        let half = 0.5
+            * lines
+                .iter()
+                .map(|line| width(line, SMALL))
+                .fold(0.0, f64::max);
+        let near = |&(other, of): &(f64, f64)| (other - x).abs() < half + of + 6.0;
+        on.stroke(&[(x, top), (x, bottom)], GRID, 0.75)?;
+        on.stroke(&[(x, bottom), (x, bottom + 3.0)], QUIET, 0.75)?;
+        if frame.panel.x.places.is_empty() && taken.iter().any(near) {
+            continue;
+        }
+        taken.push((x, half));
+        for (n, line) in lines.iter().enumerate() {
+            let at = (x, bottom + 6.0 + LINE * n as f64);
+            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL)?;
+        }
+    }
+    let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
+    let at = (0.5 * (left + right), bottom + 6.0 + LINE * lines);
+    let title = &frame.panel.x.title;
+    if title.is_empty() {
+        return Ok(());
+    }
+    on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
+}
+
+/// Names with a sample of their colour, from the right end of the title's line.
+fn keys(on: &Canvas, frame: &Frame, y: f64) -> Result<(), DrawError> {
+    let mut x = frame.across.1;
+    for series in frame.panel.series.iter().rev() {
+        let Some(key) = &series.key else { continue };
+        x -= width(key, SMALL);
+        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL)?;
+        let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
+        on.rectangle(sample, rgb(series.pen.color))?;
+        x -= 28.0;
+    }
+    Ok(())
+}
+
+/// Tags in the first of some lines that has room; those for which there is none are left out.
+fn tags(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+    let (left, right) = frame.across;
+    let mut taken = vec![f64::NEG_INFINITY; frame.panel.tag_lines];
+    for (x, text) in &frame.panel.tags {
+        let half = 0.5 * width(text, TAG);
+        if half > 0.5 * (right - left) {
+            continue;
+        }
+        let at = frame.at_x(*x).clamp(left + half, right - half);
+        let Some(line) = taken.iter().position(|end| *end < at - half) else {
+            continue;
+        };
+        taken[line] = at + half + 6.0;
+        let place = (at, frame.down.0 + 3.0 + 15.0 * line as f64);
+        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG)?;
+    }
+    Ok(())
+}
+
+/// Names at the ends of lines, pushed apart where they would overlap, each with a leader to its line.
+fn labels(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+    let labelled = frame.panel.series.iter();
+    let labelled = labelled.filter_map(|s| Some((s.label.as_ref()?, rgb(s.pen.color))));
+    let mut labels: Vec<_> = labelled
+        .map(|((point, text), color)| (frame.at(*point), text, color))
+        .collect();
+    labels.sort_by(|a, b| a.0.1.total_cmp(&b.0.1));
+    let heights: Vec<f64> = labels.iter().map(|label| label.0.1).collect();
+    let right = frame.across.1;
+    for (((x, y), text, color), shown_at) in labels.into_iter().zip(spread(&heights, frame.down)) {
+        on.stroke(&[(x, y), (right, y)], color, 0.4)?;
+        on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75)?;
+        let text = shortened(text, frame.end - right - 12.0);
+        let at = (right + 11.0, shown_at);
+        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL)?;
+    }
+    Ok(())
+}
+
+/// Ascending heights moved until they are a line apart, within the frame while there is room.
+fn spread(heights: &[f64], (top, bottom): (f64, f64)) -> Vec<f64> {
+    let most = (bottom - top) / heights.len().max(1) as f64;
+    let spacing = LETTER.min(most);
+    let mut heights = heights.to_vec();
+    let mut free = top;
+    for height in &mut heights {
+        *height = height.max(free);
+        free = *height + spacing;
+    }
+    let mut free = bottom;
+    for height in heights.iter_mut().rev() {
+        *height = height.min(free);
+        free = *height - spacing;
+    }
+    heights
+}

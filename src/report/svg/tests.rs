@@ -1,0 +1,165 @@
+//! What holds of every figure.
+
+use super::super::plot::{Axis, Mark, Panel, Plot, Series};
+use super::*;
+
+/// The value of an attribute.
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    let (_, rest) = tag.split_once(&format!(" {name}=\""))?;
+    rest.split_once('"').map(|(value, _)| value)
+}
+
+fn number(tag: &str, name: &str) -> f64 {
+    let of = attribute(tag, name).and_then(|value| value.parse().ok());
+    of.unwrap_or_else(|| panic!("{name} of {tag}"))
+}
+
+/// Left, right, upper and lower end of every text, in shown pixels.
+fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
+    let tags = svg.split("<text").skip(1);
+    tags.map(|tag| {
+        let (tag, rest) = tag.split_once('>').unwrap();
+        let text = rest.split_once("</text>").unwrap().0.trim().to_owned();
+        let (x, y) = (number(tag, "x") / 8.0, number(tag, "y") / 8.0);
+        let size = number(tag, "font-size") / 8.0;
+        let width = canvas::width(&text.replace("&lt;", "<"), size / canvas::LETTER);
+        if attribute(tag, "transform").is_some() {
+            return (text, [x - size, x + size, y - width, y]);
+        }
+        let start = match attribute(tag, "text-anchor") {
+            Some("middle") => x - 0.5 * width,
+            Some("end") => x - width,
+            _ => x,
+        };
+        let foot = match attribute(tag, "dy") {
+            Some("0.76em") => y + 0.76 * size,
+            Some(_) => y + 0.25 * size,
+            None => y,
+        };
+        (
+            text,
+            [start, start + width, foot - 0.8 * size, foot + 0.25 * size],
+        )
+    })
+    .collect()
+}
+
+/// What must hold of any figure: whole, of numbers, with its labels inside.
+pub(in crate::report) fn assert_sound(figures: &[String]) {
+    for svg in figures {
+        let head = &svg[..svg.find('>').unwrap()];
+        assert_eq!(number(head, "width"), 1200.0);
+        let height = number(head, "height");
+        assert!(svg.ends_with("</svg>\n"));
+        for bad in [
+            "NaN",
+            "inf\"",
+            "inf,",
+            "inf ",
+            "points=\"\"",
+            "<script",
+            "href",
+        ] {
+            assert!(!svg.contains(bad), "{bad}");
+        }
+        for (text, [left, right, top, bottom]) in texts(svg) {
+            let inside = left >= 0.0 && right <= 1200.0 && top >= 0.0 && bottom <= height;
+            assert!(
+                inside,
+                "`{text}` from {left} to {right}, {top} to {bottom} of {height}"
+            );
+        }
+    }
+}
+
+/// Figures that were drawn and found sound.
+pub(in crate::report) fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
+    let figures: Vec<String> = plots.map(|plot| draw(plot).unwrap()).collect();
+    assert_sound(&figures);
+    figures
+}
+
+fn of(panels: impl IntoIterator<Item = Panel>) -> String {
+    draw(&Plot::new("a.svg", "A", (2, 200), panels)).unwrap()
+}
+
+#[test]
+fn a_figure_is_shown_at_its_size_and_drawn_finer() {
+    let svg = of([]);
+    assert!(svg.starts_with(r#"<svg width="1200" height="200" viewBox="0 0 9600 1600""#));
+}
+
+#[test]
+fn thinning_a_line_keeps_its_extremes_and_its_end() {
+    let mut points: Vec<_> = (0..10_000).map(|i| (f64::from(i), 0.0)).collect();
+    points[1234].1 = 7.0;
+    points[7777].1 = -3.0;
+    let thin = series::thinned(&points, 400);
+    assert!(thin.len() <= 410);
+    assert!(thin.contains(&(1234.0, 7.0)) && thin.contains(&(7777.0, -3.0)));
+    assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
+    assert_eq!(thin.last(), points.last());
+}
+
+#[test]
+fn names_at_the_ends_of_lines_never_overlap_and_long_ones_are_cut() {
+    let long = "a calibration with a name that nobody can read to its end".repeat(3);
+    let line = |n: i32| Series::line([(0.0, 1.0), (1.0, 1.0 + 1e-3 * f64::from(n))]);
+    let panel = Panel::new("title", Axis::linear("x"), Axis::linear(""))
+        .with_all((0..8).map(|n| line(n).label(format!("line {n}"))))
+        .with(line(9).label(long));
+    let svg = of([panel.clone(), panel]);
+    assert_sound(std::slice::from_ref(&svg));
+    let mut names: Vec<_> = texts(&svg)
+        .into_iter()
+        .filter(|(t, _)| t.starts_with("line"))
+        .collect();
+    assert_eq!(names.len(), 16);
+    names.sort_by(|a, b| (a.1[0] as i64, a.1[2] as i64).cmp(&(b.1[0] as i64, b.1[2] as i64)));
+    for pair in names.chunks(8).flat_map(|column| column.windows(2)) {
+        assert!(pair[1].1[2] - pair[0].1[2] > 13.0, "{pair:?}");
+    }
+    assert!(svg.contains('…'));
+}
+
+#[test]
+fn numbers_that_are_none_are_drawn_as_gaps() {
+    let nan = (f64::NAN, f64::NAN);
+    let points = [
+        (0.0, 1.0),
+        (1.0, f64::INFINITY),
+        nan,
+        (2.0, 3.0),
+        (3.0, 4.0),
+        nan,
+    ];
+    let panel = Panel::new("", Axis::linear(""), Axis::log(""))
+        .with(Series::line(points))
+        .with(Series::marks(Mark::Ring, points))
+        .with(Series::band(vec![nan; 3], vec![nan; 3]))
+        .with(Series::level(2.0).label("level"));
+    assert_sound(&[of([panel, Panel::blank("nothing to show")])]);
+}
+
+#[test]
+fn ticks_leave_each_other_room() {
+    let places = (0..40).map(|k| format!("place number {k}"));
+    let panel = Panel::new(
+        "",
+        Axis::places(places),
+        Axis::symlog(1.0).between(-1e9, 1e9),
+    )
+    .with(Series::line([(0.0, 0.0)]));
+    let svg = draw(&Plot::new("a.svg", "A", (1, 120), [panel])).unwrap();
+    let ticks: Vec<f64> = texts(&svg)
+        .into_iter()
+        .filter(|(text, _)| text.contains("10") && !text.contains("place"))
+        .map(|(_, ends)| ends[2])
+        .collect();
+    for (k, y) in ticks.iter().enumerate() {
+        assert!(
+            ticks[..k].iter().all(|other| (other - y).abs() > 12.0),
+            "{ticks:?}"
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! What error terms explain: the data show the right one.
+
+use rayon::prelude::*;
+use turncal::calibration::{
+    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Options, Outcome, Problem, batch_estimate,
+    estimate, test_error_terms,
+};
+use turncal::imu::Term;
+use turncal::simulation::Scenario;
+
+/// Fixed before the first run was made.
+const SEED: u64 = 23;
+const ORDER: ErrorTerm = ErrorTerm::Instrument(Term::AccelSecondOrder);
+
+fn calibrated(problem: &Problem) -> (Outcome, Vec<ErrorTermTest>) {
+    let outcome = estimate(problem, &|_| {}).unwrap();
+    let tests = test_error_terms(problem, &outcome).unwrap();
+    (outcome, tests)
+}
+
+#[test]
+fn the_most_significant_error_term_is_the_one_that_is_there_and_none_where_none_is() {
+    most_significant_is(vec![Some(ORDER), Some(ErrorTerm::TableAxes), None]);
+}
+
+#[test]
+#[ignore = "statistical: 8 runs"]
+fn each_error_term_that_is_there_is_the_most_significant_one() {
+    let all = ErrorTerm::ALL.into_iter().map(Some);
+    most_significant_is(all.collect());
+}
+
+/// For each of these error terms, which is there and not modelled, or none.
+fn most_significant_is(all: Vec<Option<ErrorTerm>>) {
+    let most_significant = |unmodelled: Option<ErrorTerm>| {
+        let mut scenario = Scenario::load("demo").unwrap();
+        if let Some(term) = unmodelled {
+            scenario = scenario.with_error_term(term);
+        }
+        // The usual wandering is not told from white noise within ten minutes; five times as much is.
+        let noise = &mut scenario.instrument.noise;
+        for noise in [&mut noise.gyro, &mut noise.accel] {
+            if let Some(instability) = &mut noise.gauss_markov {
+                instability.sigma *= 5.0;
+            }
+        }
+        let run = scenario.simulate(SEED, 0).unwrap().run;
+        let mut problem = Problem::new(&run, &Options::default());
+        for term in ErrorTerm::ALL {
+            problem.model.switch_off(term);
+        }
+        let (_, tests) = calibrated(&problem);
+        assert!(tests.iter().all(|test| !test.on));
+        let finding = ErrorTermTest::most_significant(&tests);
+        let significant = tests.into_iter().filter(ErrorTermTest::significant);
+        let most = significant.max_by(|a, b| a.gain.total_cmp(&b.gain));
+        let most = most.map(|test| test.term);
+        match finding {
+            Some(Finding::ErrorTermSignificant { term, .. }) => {
+                assert_eq!(Some(term), most.map(ErrorTerm::name));
+            }
+            Some(other) => panic!("{other:?}"),
+            None => assert_eq!(most, None),
+        }
+        (unmodelled, most)
+    };
+    let found: Vec<_> = all.into_par_iter().map(most_significant).collect();
+    for (unmodelled, most) in found {
+        println!("{unmodelled:?}: {most:?}");
+        assert_eq!(unmodelled, most);
+    }
+}
+
+#[test]
+fn a_batch_refuses_a_problem_with_states_that_it_does_not_have() {
+    let scenario = Scenario::load("demo").unwrap();
+    let run = scenario.simulate(SEED, 0).unwrap().run;
+    let mut problem = Problem::new(&run, &Options::default());
+    let (outcome, _) = calibrated(&problem);
+    assert!(batch_estimate(&problem, &outcome).is_ok());
+    problem.model.switch_on(ORDER);
+    let refused = batch_estimate(&problem, &outcome).unwrap_err();
+    assert_eq!(refused, CalibrationError::NotInBatch { term: ORDER.name() });
+    assert!(refused.to_string().contains("accel-second-order"));
+}
