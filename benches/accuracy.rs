@@ -18,6 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         scenario: Scenario::load("demo")?,
         form: InstallationForm::General,
         unmodelled: Vec::new(),
+        noise: Default::default(),
         runs: RUNS,
         seed: SEED,
     };

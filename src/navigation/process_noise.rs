@@ -24,14 +24,14 @@ pub struct NoiseInput {
     /// Length in s.
     pub duration: f64,
     /// `[f_n×]` of the mean specific force, m/s².
-    pub(super) force: Matrix3<f64>,
+    pub(crate) force: Matrix3<f64>,
     /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ where the block is of a move, else zero.
     pub motion: PerSensor<f64>,
     /// Length in s where the block is of a move, else zero.
     pub moving: f64,
     /// Covariance in `n` that interpolated samples add to the integral of each triad's input, rad² and
     /// (m/s)².
-    pub(super) bridged: PerSensor<Matrix3<f64>>,
+    pub(crate) bridged: PerSensor<Matrix3<f64>>,
 }
 
 impl NoiseInput {

@@ -155,6 +155,13 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     }));
     let outcome = Outcome {
         form_test: None,
+        model: Model::new(&run, &Options::default().installation(form)),
+        noise: NoiseReport {
+            policy: Default::default(),
+            learnt: false,
+            test: None,
+            sources: Vec::new(),
+        },
         estimate: estimate(&truth, &final_sigma, &drawn),
         prior_sigma,
         prior_mean,

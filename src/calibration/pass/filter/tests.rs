@@ -4,7 +4,7 @@ use super::*;
 use crate::calibration::parameters::PARAMETERS;
 use crate::calibration::{Options, parameter};
 use crate::imu::PARAMETERS as PER_TRIAD;
-use crate::navigation::{BlockMatrix, ParameterBlock};
+use crate::navigation::{BlockMatrix, NoiseInput, ParameterBlock};
 use crate::simulation::Scenario;
 use approx::assert_relative_eq;
 
@@ -34,7 +34,7 @@ fn block(seed: f64) -> Block {
     let wave = |row: usize, column: usize| {
         ((seed + 1.0) * (1.0 + 1.7 * row as f64 + 0.9 * (column * column) as f64)).sin()
     };
-    let noise = BlockMatrix::from_fn(|r, c| 1e-4 * wave(r, c));
+    let bridged = Matrix3::from_fn(|r, c| 1e-4 * wave(r, c));
     Block {
         state: State::at_rest(Matrix3::identity()),
         duration: 0.1,
@@ -44,7 +44,16 @@ fn block(seed: f64) -> Block {
             accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
         },
         terms: Vec::new(),
-        noise: noise * noise.transpose(),
+        noise: NoiseInput {
+            duration: 0.1,
+            force: Matrix3::from_fn(|r, c| 9.8 * wave(c, r)),
+            motion: PerSensor {
+                gyro: 1e-3,
+                accel: 2e-2,
+            },
+            moving: 0.1,
+            bridged: PerSensor::from_fn(|_| bridged * bridged.transpose()),
+        },
     }
 }
 
@@ -200,7 +209,7 @@ fn turning(seed: f64) -> Block {
             .fixed_view_mut::<3, 3>(row, column)
             .copy_from(&wave.fixed_view::<3, 3>(row, column));
     }
-    block.noise *= 1e-8;
+    block.noise.bridged = PerSensor::from_fn(|_| Matrix3::identity() * 1e-16);
     block
 }
 
