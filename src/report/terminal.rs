@@ -196,6 +196,12 @@ fn laid_out(of: &Table, columns: &[usize], broken: bool) -> Vec<String> {
     laid_out
 }
 
+/// The text with a 0 for every digit: how a result is shown, whatever its figures are.
+#[cfg(test)]
+pub(super) fn layout(document: &Document, width: usize) -> String {
+    text(document, Some(width)).replace(|letter: char| letter.is_ascii_digit(), "0")
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::document::cells;

@@ -181,6 +181,42 @@ fn both_methods_may_follow_one_another_without_a_name_for_their_output() {
 }
 
 #[test]
+fn a_calibration_without_convergence_is_written_whole_and_fails() {
+    let directory = tempfile::tempdir().unwrap();
+    let (run, out) = (directory.path().join("run"), directory.path().join("out"));
+    turncal()
+        .args(["simulate", "demo", "--seed", "3", "-o"])
+        .arg(&run)
+        .assert()
+        .success();
+    // Gravity is wrong by one part in a hundred, and so is the form.
+    let run = run.join("run.toml");
+    let text = fs::read_to_string(&run).unwrap();
+    let (before, after) = text.split_once("gravity_m_s2 = ").unwrap();
+    let (_, after) = after.split_once('\n').unwrap();
+    fs::write(&run, format!("{before}gravity_m_s2 = 9.7\n{after}")).unwrap();
+    let failed = turncal()
+        .arg("calibrate")
+        .arg(&run)
+        .args(["--installation", "three-angle", "-o"])
+        .arg(&out)
+        .assert()
+        .code(1);
+    let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+    assert!(said.contains("not converged"), "{said}");
+    let record = Calibration::read(&out.join("calibration.json")).unwrap();
+    assert_eq!(record.converged, Some(false));
+    assert!(record.findings.iter().any(|f| f.kind == "not-converged"));
+    assert!(
+        record
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("Not converged"))
+    );
+    assert!(out.join("report").join("index.html").is_file());
+}
+
+#[test]
 fn wrong_usage_is_status_two_and_names_the_way() {
     for (arguments, way) in [
         (&["calibrate"][..], "Usage: turncal calibrate <RUN.toml>"),
@@ -190,7 +226,7 @@ fn wrong_usage_is_status_two_and_names_the_way() {
         ),
         (&["simulate", "demo"], "--output <DIR>"),
         (&["dance"], "unrecognized subcommand 'dance'"),
-        (&["demo", "--seed", "many"], "'many' for '--seed <SEED>'"),
+        (&["demo", "--seed", "many"], "'many' for '--seed <N>'"),
     ] {
         let refused = turncal().args(arguments).assert().code(2).stdout("");
         let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();

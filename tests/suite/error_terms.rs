@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 use turncal::calibration::{
-    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Options, Outcome, Problem, batch_estimate,
-    estimate, test_error_terms,
+    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Method, Options, Outcome, Problem,
+    batch_estimate, estimate, test_error_terms,
 };
 use turncal::imu::Term;
 use turncal::simulation::Scenario;
@@ -69,6 +69,30 @@ fn most_significant_is(all: Vec<Option<ErrorTerm>>) {
         println!("{unmodelled:?}: {most:?}");
         assert_eq!(unmodelled, most);
     }
+}
+
+#[test]
+fn a_calibration_warns_of_the_error_term_that_is_not_estimated() {
+    let scenario = Scenario::load("demo").unwrap().with_error_term(ORDER);
+    let mut run = scenario.simulate(SEED, 0).unwrap().run;
+    run.instrument.term_sigma.fill(0.0);
+    let problem = Problem::new(&run, &Options::default());
+    let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+    let assessment = solution.assess(&problem).unwrap();
+    let record = solution.calibration(&problem, &assessment);
+    let words = "accel-second-order";
+    assert!(
+        record
+            .warnings
+            .iter()
+            .any(|warning| warning.contains(words))
+    );
+    let findings = &record.findings;
+    let shown = findings.iter().find(|f| f.kind == "error-term-significant");
+    let shown = shown.unwrap();
+    assert_eq!(shown.figures["term"], ORDER.name());
+    assert!(shown.text.contains(words), "{}", shown.text);
+    assert!(shown.figures["gain"].as_f64() > shown.figures["limit"].as_f64());
 }
 
 #[test]

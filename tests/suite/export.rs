@@ -304,7 +304,7 @@ fn kalibr_holds_g_sensitivity_and_names_the_terms_that_it_does_not_hold() {
         kalibr_measures(&text, rate, force)[0],
         raw.component_div(&divisors[0]),
     );
-    let note = notes.iter().find(|n| n.contains("further terms")).unwrap();
+    let note = notes.iter().find(|n| n.contains("error terms")).unwrap();
     assert!(note.contains("accel-second-order") && !note.contains("g-sensitivity"));
     assert!(text.contains(note.as_str()) && text.contains("accel.second_order.x = 1e-6"));
 }

@@ -87,7 +87,7 @@ fn every_figure_is_drawn_whether_the_filter_works_or_not() {
         let text = summary(&accuracy);
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
     }
-    insta::assert_snapshot!(terminal::text(&document(&small()), Some(100)));
+    insta::assert_snapshot!(terminal::layout(&document(&small()), 100));
 }
 
 #[test]

@@ -58,7 +58,7 @@ mod tests {
         let run = scenario.simulate(1, 0).unwrap().run;
         let stretch = Stretch::find(&run, None).unwrap();
         let document = document("made-up", &NoiseAnalysis::new(&run, stretch));
-        insta::assert_snapshot!(terminal::text(&document, Some(100)));
+        insta::assert_snapshot!(terminal::layout(&document, 100));
         let drawn = svg::drawn(document.plots());
         assert!(drawn[0].contains("cluster time") && drawn[1].contains("accel z, µg"));
     }

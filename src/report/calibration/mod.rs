@@ -22,6 +22,9 @@ impl Report<'_> {
         let mut document = Document::new(self.title);
         document.lead = self.lead();
         document.warnings.items = self.warnings();
+        if document.warnings.items.is_empty() && self.outcome.is_some() {
+            document.lead.push("No warnings.".to_owned());
+        }
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }

@@ -60,7 +60,7 @@ mod tests {
             "{:?}",
             document.warnings
         );
-        insta::assert_snapshot!(terminal::text(&document, Some(120)));
+        insta::assert_snapshot!(terminal::layout(&document, 120));
         let drawn = svg::drawn(document.plots());
         assert!(drawn[0].contains("angular rate") && drawn[0].contains("z up"));
     }

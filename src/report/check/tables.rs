@@ -192,7 +192,7 @@ pub(super) fn methods(survey: &Survey) -> Table {
     let columns = std::iter::once(String::new()).chain(groups);
     let mut table = Table::new("What each method could observe, 1σ", columns).note(
         "RMS 1σ to be expected in the general form, from the prior's own σ on, linearised where the filter would \
-         begin; the closed form's from its equations. Auxiliary error terms are not in it.",
+         begin; the closed form's from its equations. Error terms are not in it.",
     );
     let mut rows = Vec::new();
     for method in &survey.methods {

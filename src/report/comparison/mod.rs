@@ -217,7 +217,7 @@ fn auxiliary(comparison: &Comparison) -> Table {
     Table::new("Auxiliary parameters", beside_reference(comparison))
         .section((0..AUXILIARY).filter_map(row))
         .note(
-            "Auxiliary error terms and errors of the table: values ± the 1σ that each calibration claims; z: \
+            "Error terms of instrument and table: values ± the 1σ that each calibration claims; z: \
              difference to the reference in its σ, where both have it.",
         )
 }

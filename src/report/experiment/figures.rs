@@ -47,7 +47,7 @@ fn distribution(experiment: &Experiment) -> Plot {
             situation_name(navigated.situation)
         );
         let x = Axis::log("").including(all.iter().copied()).room(0.1, 0.1);
-        Panel::new(title, x, Axis::places(names))
+        Panel::new(title, x, Axis::places(names).room(0.0, 0.4))
             .with(
                 Series::new(Shape::Upright(noise))
                     .color(Color::Quiet)
@@ -135,7 +135,7 @@ fn against_time(experiment: &Experiment) -> Plot {
             "{}: median position error, nmile",
             situation_name(navigated.situation)
         );
-        let y = Axis::log("").between(low, high);
+        let y = Axis::log("").between(low, 1.3 * high);
         Panel::new(title, Axis::hours(hours(experiment)), y)
             .with_all(navigated.methods.iter().map(series))
     };
@@ -191,7 +191,7 @@ fn budget(experiment: &Experiment) -> Plot {
                 let words = tops
                     .clone()
                     .into_iter()
-                    .filter(|top| top.1 >= 1e-3 * high)
+                    .filter(|top| top.1 >= 0.7 * low.max(1e-3 * high))
                     .map(|top| {
                         // Three digits of a small number would not fit above its bar.
                         let number = if top.1 < 1.0 {

@@ -116,7 +116,7 @@ mod tests {
             let text = terminal::text(&document, Some(100));
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         }
-        insta::assert_snapshot!(terminal::text(&document(&with_two), Some(120)));
+        insta::assert_snapshot!(terminal::layout(&document(&with_two), 120));
 
         let data = document(&with_two).data;
         assert_eq!(data["samples"], 2);

@@ -32,7 +32,8 @@ pub struct Axis {
     pub including: Vec<f64>,
     /// Distance of ticks, if it matters.
     pub step: Option<f64>,
-    /// Left free below and above the data: parts of their span, or of a logarithmic axis parts of the ends.
+    /// Left free below and above the data: parts of their span, of a logarithmic axis parts of the ends, of an
+    /// axis of names places.
     pub room: (f64, f64),
     /// Names at 0, 1, 2 … in the place of numbers.
     pub places: Vec<String>,
@@ -107,7 +108,7 @@ impl Axis {
     /// The scale that holds these values.
     pub fn scale(&self, values: impl IntoIterator<Item = f64>) -> Scale {
         if !self.places.is_empty() {
-            return Scale::places(&self.places);
+            return Scale::places(&self.places, self.room);
         }
         let values = values.into_iter().chain(self.including.iter().copied());
         let values = values.filter(|v| v.is_finite() && (*v > 0.0 || self.kind != Kind::Log));
@@ -168,20 +169,24 @@ impl Scale {
             true => (low.max(high * 10f64.powi(-DECADES)), high),
             false => (0.1, 10.0),
         };
-        if (high / low).log10() < FEW_DECADES {
+        let few = (high / low).log10() < FEW_DECADES;
+        if few || fixed {
             // Space that keeps a single value off the ends.
             let free = if fixed && high > low { 1.0 } else { 1.15 };
             let (low, high) = (low / free, high * free);
-            let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
-            let ticks = decades.flat_map(|k| [1.0, 2.0, 5.0].map(|m| (m, 10f64.powi(k))));
-            let ticks = ticks.filter(|(m, decade)| (low..=high).contains(&(m * decade)));
+            let decades = decades(low.log10().floor() as i32, high.log10().floor() as i32);
+            let of_decade: &[f64] = if few { &[1.0, 2.0, 5.0] } else { &[1.0] };
+            let ticks = decades.flat_map(|k| of_decade.iter().map(move |m| (m * 10f64.powi(k), k)));
+            let ticks = ticks.filter(|(x, _)| (low..=high).contains(x));
+            let label = |(x, k): (f64, i32)| match few {
+                true => (x, number::tick(x, 10f64.powi(k))),
+                false => (x, number::power_of_ten(k)),
+            };
             return Self {
                 kind: Kind::Log,
                 low,
                 high,
-                ticks: ticks
-                    .map(|(m, decade)| (m * decade, number::tick(m * decade, decade)))
-                    .collect(),
+                ticks: ticks.map(label).collect(),
             };
         }
         let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
@@ -216,12 +221,12 @@ impl Scale {
         }
     }
 
-    fn places(names: &[String]) -> Self {
+    fn places(names: &[String], (below, above): (f64, f64)) -> Self {
         let ticks = names.iter().enumerate();
         Self {
             kind: Kind::Linear,
-            low: -0.5,
-            high: names.len() as f64 - 0.5,
+            low: -0.5 - below,
+            high: names.len() as f64 - 0.5 + above,
             ticks: ticks.map(|(k, name)| (k as f64, name.clone())).collect(),
         }
     }
