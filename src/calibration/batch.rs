@@ -28,8 +28,8 @@ use super::parameters::{
 use super::problem::{Problem, Stretch};
 use super::schedule::AtRest;
 use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
-use crate::imu::Triad;
-use crate::navigation::{Block, BlockMatrix, Navigator, State};
+use crate::imu::{PerSensor, Triad};
+use crate::navigation::{Block, BlockMatrix, Navigator, ProcessNoise, State};
 
 /// The attitude error at the first sample is the initial one to within this, rad: a number so small
 /// that it is none, where a row needs a σ.
@@ -44,6 +44,7 @@ const NO_SOURCE: f64 = 1e-14;
 /// [`CalibrationError`] where the problem is not the one of the outcome, has several stretches, or has an
 /// error term on that the batch does not know.
 pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
+    let problem = &outcome.with_noise(problem);
     let model = &problem.model;
     let on = ErrorTerm::ALL.into_iter().find(|&term| model.has(term));
     if let Some(term) = on {
@@ -95,7 +96,6 @@ impl<'a> Batch<'a> {
         outcome: &Outcome,
     ) -> Result<Self, CalibrationError> {
         let (run, model, at) = (stretch.run, &problem.model, &outcome.linearised_at);
-        let walk = crate::imu::PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
         let diverged = CalibrationError::Diverged { time: 0.0 };
         let attitudes = at
             .initial_attitudes
@@ -104,7 +104,7 @@ impl<'a> Batch<'a> {
         let (attitude, prior) = attitudes.ok_or(diverged)?;
         let start = State::at_rest(*attitude);
         let imu = &run.recording.imu;
-        let navigator = Navigator::new(imu, &run.site, walk, &at.triads, start)
+        let navigator = Navigator::new(imu, &run.site, &at.triads, start)
             .ok_or_else(|| singular(&at.triads))?;
         Ok(Self {
             model,
@@ -121,7 +121,7 @@ impl<'a> Batch<'a> {
 
     fn advance(&mut self, block: &Block, end: usize) -> Result<(), CalibrationError> {
         let time = self.stretch.run.recording.imu.time(end);
-        let done = self.information.advance(block);
+        let done = self.information.advance(block, &self.model.process_noise());
         done.ok_or(CalibrationError::Diverged { time })
     }
 
@@ -153,7 +153,8 @@ impl<'a> Batch<'a> {
             rows.push((POSITION, state.position, variance.position));
         }
         if accepted() {
-            rows.push((VELOCITY, state.velocity, variance.velocity));
+            let variance = self.stretch.velocity_variance(model);
+            rows.push((VELOCITY, state.velocity, variance));
         }
         if let Some((reading, count)) = &at_rest.reading
             && accepted()
@@ -221,7 +222,7 @@ impl Information {
     /// From the navigation errors x at the beginning of a stretch to those at its end,
     /// `x⁺ = Φ x + Ψ δθ + G w` with w of unit variance: x is replaced by `Φ⁻¹ (x⁺ − Ψ δθ − G w)`,
     /// then w leaves. `None` if Φ has no inverse.
-    fn advance(&mut self, block: &Block) -> Option<()> {
+    fn advance(&mut self, block: &Block, noise: &PerSensor<ProcessNoise>) -> Option<()> {
         let back = block.navigation.try_inverse()?;
         let back = Mat::from_fn(NAVIGATION, NAVIGATION, |i, j| back[(i, j)]);
         let driven = Mat::from_fn(NAVIGATION, self.parameters.len(), |i, n| {
@@ -229,7 +230,7 @@ impl Information {
             let (sensor, of_triad) = sensor_and_parameter(index);
             block.parameters.get(sensor)[(i, of_triad)] * sigma
         });
-        let sources = sources(&block.noise);
+        let sources = sources(&block.noise.covariance(noise));
         let (noise, n) = (sources.ncols(), self.unknowns());
 
         let at_end = self.rows.get(.., self.navigation()) * &back;

@@ -77,6 +77,7 @@ pub fn test_error_terms(
     problem: &Problem,
     outcome: &Outcome,
 ) -> Result<Vec<ErrorTermTest>, CalibrationError> {
+    let problem = &outcome.with_noise(problem);
     let model = &problem.model;
     let scalars = 3.0 * outcome.innovations.len() as f64;
     let mut everything = model.clone();

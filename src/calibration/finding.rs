@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::innovation::Observation;
+use super::noise::SourceFigures;
 use crate::imu::InstallationForm;
 use crate::units::DEGREE;
 
@@ -67,6 +68,15 @@ pub enum Finding {
         observation: Observation,
         /// Normalised innovation squared.
         nis: f64,
+    },
+    /// The data contradict the stated noise, and another was learnt from them.
+    NoiseLearnt {
+        /// −2 ln of the likelihood ratio of stated to learnt noise …
+        ratio: f64,
+        /// … and what it stays below in 1,999 runs of 2,000 if what is stated is right.
+        limit: f64,
+        /// What was learnt, with what is stated.
+        sources: Vec<SourceFigures>,
     },
     /// An error term that the data show and that is not estimated.
     ErrorTermSignificant {
@@ -156,13 +166,29 @@ impl fmt::Display for Finding {
             Self::Inconsistent { observation, nis } => write!(
                 f,
                 "Innovations of {} are {:.2} times as large as their σ says (NIS {nis:.2}): noise \
-                 figures or model do not fit the data, and the σ of the parameters are as doubtful.",
+                 figures or model do not fit the data, and the σ of the parameters are as doubtful. \
+                 --noise auto finds the noise that the record shows.",
                 match observation {
                     Observation::Velocity => "velocity",
                     Observation::Table => "table attitude",
                 },
                 nis.sqrt()
             ),
+            Self::NoiseLearnt {
+                ratio,
+                limit,
+                sources,
+            } => {
+                let sources = sources.iter().filter(|figures| figures.counts());
+                let sources: Vec<String> = sources.map(SourceFigures::to_string).collect();
+                write!(
+                    f,
+                    "The data contradict the stated noise: −2 ln of its likelihood is {ratio:.1} above \
+                     that of the noise learnt from them, where right figures stay below {limit:.1} or \
+                     within the limit of each factor alone. Used and in all σ: {}.",
+                    sources.join("; ")
+                )
+            }
             Self::ErrorTermSignificant {
                 term,
                 nis_without,

@@ -8,11 +8,13 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
-use super::innovation::{Innovation, Observation, consistency};
-use super::linearisation::{AttitudePrior, Linearisation, singular};
+use super::innovation::{Observation, consistency};
+use super::iterations::{Iterated, iterate, summary};
+use super::linearisation::{AttitudePrior, singular};
+use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
-use super::parameters::{parameter_name, to_vector};
+use super::parameters::parameter_name;
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::problem::Problem;
 use crate::imu::Sensor;
@@ -21,13 +23,6 @@ use crate::run::Aiding;
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 
-/// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
-/// of its own linearised problem only, so a small rise means nothing.
-const COST_RISE: f64 = 0.1;
-/// After a step of more than this part of the one before, all go half as far.
-const SHRINKS: f64 = 0.8;
-/// More than this part of all observations beyond the gate are no outliers.
-const MOST_OUTLIERS: f64 = 0.05;
 /// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
 const DOUBTFUL: f64 = 0.2;
 
@@ -49,11 +44,16 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         .map(|start| attempt(problem, start, progress));
     let Attempt {
         priors,
-        passes,
+        mut passes,
         feedback,
-        held,
-        converged,
+        iterated,
     } = others.fold(of_start, better)?;
+    let Learnt {
+        model,
+        iterated: Iterated { held, converged },
+        report,
+    } = learn(problem, &priors, iterated, &mut passes, progress)?;
+    let problem = &problem.with_model(model);
     let triads = held.estimate.triads;
     let estimate = Estimate {
         covariance: held.covariance + curvature(&triads, &held.covariance),
@@ -85,7 +85,9 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         velocity_sigma: problem
             .stretches()
             .first()
-            .map_or(0.0, |s| s.velocity_sigma),
+            .map_or(0.0, |s| model.velocity_sigma.unwrap_or(s.velocity_sigma)),
+        model: model.clone(),
+        noise: report,
         passes,
         findings: Vec::new(),
     };
@@ -98,8 +100,7 @@ struct Attempt {
     priors: Vec<AttitudePrior>,
     passes: Vec<Pass>,
     feedback: Option<PassResult>,
-    held: PassResult,
-    converged: bool,
+    iterated: Iterated,
 }
 
 fn attempt(
@@ -120,13 +121,13 @@ fn attempt(
         passes.iter().for_each(progress);
     }
     let from = feedback.as_ref().map_or(&start.at, |pass| &pass.estimate);
-    let (held, converged) = iterate(problem, &priors, from.clone(), &mut passes, progress)?;
+    let gate = Gate::Innovations;
+    let iterated = iterate(problem, &priors, from.clone(), gate, &mut passes, progress)?;
     Ok(Attempt {
         priors,
         passes,
         feedback,
-        held,
-        converged,
+        iterated,
     })
 }
 
@@ -135,92 +136,11 @@ fn better(
     one: Result<Attempt, CalibrationError>,
     other: Result<Attempt, CalibrationError>,
 ) -> Result<Attempt, CalibrationError> {
-    let rank = |attempt: &Attempt| (!attempt.converged, attempt.held.cost);
+    let rank = |attempt: &Attempt| (!attempt.iterated.converged, attempt.iterated.held.cost);
     match (one, other) {
         (Ok(one), Ok(other)) if rank(&other) < rank(&one) => Ok(other),
         (Err(_), Ok(other)) => Ok(other),
         (one, _) => one,
-    }
-}
-
-/// Passes from a first point on, each linearised at the estimate of the one before; and whether they
-/// converged.
-fn iterate(
-    problem: &Problem,
-    priors: &[AttitudePrior],
-    from: Linearisation,
-    passes: &mut Vec<Pass>,
-    progress: Progress,
-) -> Result<(PassResult, bool), CalibrationError> {
-    let mut at = from;
-    let mut gate = Gate::Innovations;
-    let mut before: Option<PassResult> = None;
-    let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
-    loop {
-        let result = pass(problem, priors, &at, Mode::Held(gate))?;
-        let summary = summary(&result, &at, false);
-        progress(&summary);
-        passes.push(summary);
-        let same_data = before
-            .as_ref()
-            .is_some_and(|before| same_data(before, &result));
-        let settled = summary.largest_step <= problem.options.converged_sigma
-            && (same_data || (before.is_none() && summary.rejected == 0));
-        let doubtful = beyond(&result, problem.gate()) > MOST_OUTLIERS;
-        let finished = settled && (gate == Gate::Open || !doubtful);
-        if finished || passes.len() >= problem.options.passes {
-            return Ok((result, settled));
-        }
-        // Where many observations contradict the model it is the model that is wrong, and leaving
-        // them out would only hide that.
-        if doubtful {
-            gate = Gate::Open;
-        }
-        let too_far =
-            before.filter(|before| same_data && result.cost > before.cost * (1.0 + COST_RISE));
-        // A step as large as the one before may be the way back of it.
-        if summary.largest_step > SHRINKS * last_step {
-            fraction *= 0.5;
-        }
-        last_step = summary.largest_step;
-        at = match &too_far {
-            Some(before) => before.at.towards(&at, 0.5),
-            None if fraction < 1.0 => at.towards(&result.estimate, fraction),
-            None => result.estimate.clone(),
-        };
-        before = Some(too_far.unwrap_or(result));
-    }
-}
-
-/// Whether two passes let the same observations in.
-fn same_data(a: &PassResult, b: &PassResult) -> bool {
-    let accepted = |result: &PassResult| -> Vec<bool> {
-        result.innovations.iter().map(|i| i.accepted).collect()
-    };
-    accepted(a) == accepted(b)
-}
-
-/// Part of all observations that are beyond the gate or were left out.
-fn beyond(result: &PassResult, gate: f64) -> f64 {
-    let beyond = |i: &&Innovation| !i.accepted || i.distance() > gate;
-    result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
-}
-
-fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -> Pass {
-    let sigma = result.covariance.diagonal().map(f64::sqrt);
-    let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
-    Pass {
-        feedback,
-        largest_step: step
-            .iter()
-            .zip(&sigma)
-            .filter(|&(_, &sigma)| sigma > 0.0)
-            .map(|(step, sigma)| (step / sigma).abs())
-            .max_by(f64::total_cmp)
-            .unwrap_or(0.0),
-        cost: result.cost,
-        observations: 3 * result.innovations.len(),
-        rejected: result.innovations.iter().filter(|i| !i.accepted).count(),
     }
 }
 
@@ -231,6 +151,14 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         findings.push(Finding::NotConverged {
             passes: outcome.passes.len(),
             largest_step_sigma: last.map_or(f64::NAN, |pass| pass.largest_step),
+        });
+    }
+    let noise = &outcome.noise;
+    if let Some(test) = noise.test.filter(|test| noise.learnt && test.rejected) {
+        findings.push(Finding::NoiseLearnt {
+            ratio: test.ratio.unwrap_or(f64::NAN),
+            limit: test.ratio_limit,
+            sources: noise.sources.clone(),
         });
     }
     let form = outcome.estimate.form();
@@ -294,7 +222,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::super::Options;
-    use super::super::parameters::from_vector;
+    use super::super::linearisation::Linearisation;
+    use super::super::parameters::{from_vector, to_vector};
     use super::*;
     use crate::attitude::exp;
     use crate::imu::TermVector;

@@ -5,10 +5,12 @@ use nalgebra::Vector3;
 use super::error_term::ErrorTerm;
 use super::options::Options;
 use super::parameters::{ParameterVector, parameter, to_vector};
+use super::standstill::FLOOR;
 use crate::imu::{
     GaussMarkov, InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, TermVector,
     Triad,
 };
+use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
 use crate::turntable::{AXIS_TILTS, TableGeometry};
 use crate::units::ARCSEC;
@@ -37,6 +39,10 @@ pub struct Model {
     pub prior_sigma: ParameterVector,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
+    /// What moves add to it.
+    pub motion_noise: PerSensor<MotionNoise>,
+    /// White 1σ of the velocity at standstill, m/s; none: in each stretch what its run states or shows.
+    pub velocity_sigma: Option<f64>,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
@@ -49,6 +55,15 @@ pub struct Model {
     pub geometry: TableGeometry,
     /// Axes of the table whose angles are read; zero where they are not.
     table_axes: usize,
+}
+
+/// White noise that a triad has in moves beside that at rest, 1σ densities as in [`ProcessNoise`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotionNoise {
+    /// By how fast a move is, √s.
+    pub by_motion: f64,
+    /// By how long it takes, rad/√s or (m/s)/√s.
+    pub by_duration: f64,
 }
 
 impl Model {
@@ -64,6 +79,8 @@ impl Model {
             prior_mean: ParameterVector::zeros(),
             prior_sigma: ParameterVector::zeros(),
             noise: run.instrument.noise,
+            motion_noise: PerSensor::default(),
+            velocity_sigma: None,
             term_sigma: run.instrument.term_sigma,
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
@@ -79,6 +96,38 @@ impl Model {
             model.switch_on(term);
         }
         model
+    }
+
+    /// What drives the navigation errors.
+    pub(super) fn process_noise(&self) -> PerSensor<ProcessNoise> {
+        PerSensor::from_fn(|sensor| {
+            let MotionNoise {
+                by_motion,
+                by_duration,
+            } = *self.motion_noise.get(sensor);
+            ProcessNoise {
+                random_walk: self.noise.get(sensor).random_walk,
+                by_motion,
+                by_duration,
+            }
+        })
+    }
+
+    /// Sets the variance of the velocity at standstill over the least that is ever taken, m²/s².
+    pub(super) fn set_velocity_excess(&mut self, variance: f64) {
+        self.velocity_sigma = Some((variance + FLOOR.powi(2)).sqrt());
+    }
+
+    /// The same with the noise of another model.
+    pub(super) fn with_noise_of(&self, other: &Self) -> Self {
+        Self {
+            noise: other.noise,
+            motion_noise: other.motion_noise,
+            velocity_sigma: other.velocity_sigma,
+            position_sigma: other.position_sigma,
+            reading_sigma: other.reading_sigma,
+            ..self.clone()
+        }
     }
 
     /// The same parameters in another form.

@@ -1,6 +1,7 @@
 //! What is to be estimated, and how.
 
 use super::error_term::ErrorTerm;
+use super::noise::NoisePolicy;
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
 
@@ -24,6 +25,8 @@ pub struct Options {
     pub aiding: Option<Aiding>,
     /// Error terms to be estimated beside those that the instrument and the table state a σ for.
     pub terms: Vec<ErrorTerm>,
+    /// Which noise is used.
+    pub noise: NoisePolicy,
     /// Chance that the gate rejects a sound observation.
     pub false_rejection: f64,
     /// Converged when no parameter moves by more than this many of its σ.
@@ -38,6 +41,7 @@ impl Default for Options {
             form: InstallationForm::General,
             aiding: None,
             terms: Vec::new(),
+            noise: NoisePolicy::default(),
             false_rejection: 1e-6,
             converged_sigma: 0.02,
             passes: 10,
@@ -57,6 +61,11 @@ impl Options {
             aiding: Some(aiding),
             ..self
         }
+    }
+
+    /// With this noise.
+    pub fn noise(self, noise: NoisePolicy) -> Self {
+        Self { noise, ..self }
     }
 
     /// With this error term, its σ being the usual one unless instrument or table state another.

@@ -8,9 +8,12 @@ use super::finding::Finding;
 use super::form::FormTest;
 use super::innovation::{Consistency, Innovation};
 use super::linearisation::{AttitudePrior, Linearisation};
+use super::model::Model;
+use super::noise::NoiseReport;
 use super::observability::Observability;
 use super::parameters::{OBSERVED_BELOW, ParameterVector};
 use super::pass::Epoch;
+use super::problem::Problem;
 use crate::run::Aiding;
 
 /// χ² by which opposite headings differ where a run observes the heading.
@@ -59,6 +62,10 @@ pub struct Outcome {
     pub consistency: Consistency,
     /// Whether the data reject the installation form; none where they cannot.
     pub form_test: Option<FormTest>,
+    /// What was estimated, with the noise that was used.
+    pub model: Model,
+    /// How that noise was come by.
+    pub noise: NoiseReport,
     /// What a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
@@ -74,6 +81,14 @@ impl Outcome {
         let of_run = information(&self.attitude_sigma) - information(&prior.sigma);
         // Opposite directions of Earth rate differ by twice its level part.
         4.0 * of_run > HEADING_SEEN
+    }
+
+    /// The problem with the noise that was used, where that was learnt.
+    pub(super) fn with_noise<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        if !self.noise.learnt {
+            return problem.clone();
+        }
+        problem.with_model(problem.model.with_noise_of(&self.model))
     }
 
     /// Indices of the parameters that the run did not observe.

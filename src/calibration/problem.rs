@@ -10,7 +10,7 @@ use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
 use super::schedule::{Step, first_reading, steps};
-use super::standstill::velocity_sigma;
+use super::standstill::{FLOOR, velocity_sigma};
 use crate::attitude::to_tilt_and_heading;
 use crate::imu::PerSensor;
 use crate::recording::TableLog;
@@ -44,14 +44,15 @@ pub(super) struct Stretch<'a> {
     pub dwells: Vec<Dwell>,
     pub steps: Vec<Step>,
     pub variance: Variance,
-    /// White 1σ of the velocity at standstill, m/s, that is in `variance` already.
+    /// White 1σ of the velocity at standstill as the run states or shows it, m/s.
     pub velocity_sigma: f64,
 }
 
 /// Variance of each observation per axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Variance {
-    pub velocity: f64,
+    /// Of the computed velocity: a pulse's worth.
+    pub pulse: f64,
     pub position: f64,
     /// Of the computed attitude: a pulse's worth.
     pub attitude: f64,
@@ -123,6 +124,17 @@ impl<'a> Problem<'a> {
         &self.stretches
     }
 
+    /// Variance of the velocity at standstill over the least that is ever taken, m²/s²; of several
+    /// stretches the mean.
+    pub(super) fn velocity_excess(&self) -> f64 {
+        let of = |stretch: &Stretch| {
+            let sigma = self.model.velocity_sigma.unwrap_or(stretch.velocity_sigma);
+            (sigma.powi(2) - FLOOR.powi(2)).max(0.0)
+        };
+        let sum: f64 = self.stretches.iter().map(of).sum();
+        sum / self.stretches.len().max(1) as f64
+    }
+
     /// The run, of several the first.
     pub fn run(&self) -> &'a Run {
         self.run
@@ -162,7 +174,7 @@ impl<'a> Stretch<'a> {
         Self {
             steps: steps(run, table, &dwells),
             variance: Variance {
-                velocity: velocity_sigma.powi(2) + quantisation(accel),
+                pulse: quantisation(accel),
                 position: run.standstill.position_sigma.powi(2),
                 attitude: quantisation(gyro),
             },
@@ -172,6 +184,12 @@ impl<'a> Stretch<'a> {
             dwells,
             velocity_sigma,
         }
+    }
+
+    /// Variance of an observation of velocity per axis, m²/s².
+    pub fn velocity_variance(&self, model: &Model) -> f64 {
+        let sigma = model.velocity_sigma.unwrap_or(self.velocity_sigma);
+        sigma.powi(2) + self.variance.pulse
     }
 
     /// What the table says of the attitude at its first sample, where it says anything.

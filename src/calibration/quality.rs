@@ -75,6 +75,7 @@ impl Outcome {
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the outcome.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
+        let problem = &self.with_noise(problem);
         let estimate = Linearisation {
             triads: self.estimate.triads,
             terms: self.auxiliary.terms(),
@@ -247,7 +248,7 @@ fn navigate(
     samples: Range<usize>,
 ) -> Result<Matrix3<f64>, CalibrationError> {
     let (imu, state) = (&run.recording.imu, State::at_rest(from));
-    let navigator = Navigator::new(imu, &run.site, PerSensor::default(), &at.triads, state);
+    let navigator = Navigator::new(imu, &run.site, &at.triads, state);
     let on = (0..at.terms.len()).filter(|&k| at.terms[k] != 0.0);
     let terms = TermValues {
         on: on.collect(),

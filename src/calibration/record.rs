@@ -17,8 +17,8 @@ use super::problem::Problem;
 use super::quality::{Measures, Quality, Spread};
 use super::result::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FindingRecord, GravityRecord, MeasuresRecord, Method, NisRecord, QualityRecord, SpreadRecord,
-    TermRecord, TestVector, TriadRecord,
+    FindingRecord, GravityRecord, MeasuresRecord, Method, NisRecord, NoiseRecord, QualityRecord,
+    SpreadRecord, TermRecord, TestVector, TriadRecord,
 };
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
@@ -61,6 +61,7 @@ impl Outcome {
             converged: Some(self.converged),
             consistency: Some(consistency_record(&self.consistency)),
             observability: direction_records(self),
+            noise: Some(noise_record(self)),
             warnings: texts(&findings),
             findings: findings.iter().map(FindingRecord::from).collect(),
             ..self
@@ -288,6 +289,17 @@ fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
         all: of(all),
         velocity: some(velocity),
         table: some(table),
+    }
+}
+
+fn noise_record(outcome: &Outcome) -> NoiseRecord {
+    let correlation_time = PerSensor::from_fn(|sensor| {
+        let gauss_markov = outcome.model.noise.get(sensor).gauss_markov;
+        gauss_markov.map(|gauss_markov| gauss_markov.correlation_time)
+    });
+    NoiseRecord {
+        report: outcome.noise.clone(),
+        run_toml: outcome.noise.run_toml(correlation_time),
     }
 }
 

@@ -9,6 +9,7 @@ use std::ops::Index;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::noise::NoiseReport;
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
@@ -82,6 +83,9 @@ pub struct Calibration {
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<DirectionRecord>,
+    /// The noise that was used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseRecord>,
     /// What must be known before using the values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -103,6 +107,17 @@ pub struct Calibration {
     /// `[meta]` of the run.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meta: BTreeMap<String, String>,
+}
+
+/// The noise that a calibration used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseRecord {
+    /// Policy, test and sources.
+    #[serde(flatten)]
+    pub report: NoiseReport,
+    /// `[imu.noise]` of what was learnt, to be pasted into `run.toml`; none where nothing was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run_toml: Option<String>,
 }
 
 /// A constant beside the parameters of the triads.
@@ -322,6 +337,7 @@ impl Calibration {
             quality: None,
             blocks: Vec::new(),
             observability: Vec::new(),
+            noise: None,
             warnings: Vec::new(),
             findings: Vec::new(),
             fixed: Vec::new(),

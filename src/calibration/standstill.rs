@@ -5,7 +5,7 @@ use crate::run::{Dwell, Run};
 
 /// Below this the velocity at standstill is never trusted, m/s. Small beside what random walk makes of
 /// a tenth of a second in the best of instruments, lest the innovations be smaller than they claim.
-const FLOOR: f64 = 1e-7;
+pub(super) const FLOOR: f64 = 1e-7;
 /// Excess below this many of its own standard errors is chance.
 const SIGNIFICANT: f64 = 3.0;
 

@@ -10,8 +10,8 @@ use clap::error::ErrorKind;
 use rayon::prelude::*;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    self, Calibration, CalibrationError, ClosedForm, Estimate, Options, Problem, Reference,
-    Solution, in_body_frame, triads_of,
+    self, Calibration, CalibrationError, ClosedForm, Estimate, NoisePolicy, Options, Problem,
+    Reference, Solution, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
@@ -55,6 +55,9 @@ pub struct Calibrate {
     /// Error terms to estimate, beside those that the run switches on
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     with: Vec<TermArgument>,
+    /// Which noise the filter uses
+    #[arg(long, value_enum, default_value_t = Noise::default())]
+    noise: Noise,
     /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -91,6 +94,37 @@ pub enum Aiding {
     Table,
     /// Zero velocity alone; the accelerometers define the body axes
     Velocity,
+}
+
+/// Which noise the filter uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Noise {
+    /// As run.toml and models state it
+    Stated,
+    /// As stated unless the data contradict that, which right figures do once in a thousand runs
+    Auto,
+    /// As the data show it, around what is stated
+    Learnt,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        match NoisePolicy::default() {
+            NoisePolicy::Stated => Self::Stated,
+            NoisePolicy::Auto => Self::Auto,
+            NoisePolicy::Learnt => Self::Learnt,
+        }
+    }
+}
+
+impl From<Noise> for NoisePolicy {
+    fn from(noise: Noise) -> Self {
+        match noise {
+            Noise::Stated => Self::Stated,
+            Noise::Auto => Self::Auto,
+            Noise::Learnt => Self::Learnt,
+        }
+    }
 }
 
 impl From<Installation> for InstallationForm {
@@ -140,7 +174,9 @@ impl Calibrate {
             return Err(CalibrationError::NoTable).with_context(|| self.run.display().to_string());
         }
         let form = self.installation.into();
-        let mut options = Options::default().installation(form);
+        let mut options = Options::default()
+            .installation(form)
+            .noise(self.noise.into());
         options.aiding = self.aiding.map(turncal::run::Aiding::from);
         let mut problem = Problem::new(&run, &options);
         for term in &self.with {

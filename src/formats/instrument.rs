@@ -9,8 +9,8 @@ use super::clock::Clock;
 use super::error::FileError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
-use super::noise_keys::NoiseKeys;
 use super::quantity::{OUTPUTS, units};
+use crate::imu::NoiseKeys;
 use crate::imu::{
     GaussMarkov, Instrument, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term, TermVector,
 };

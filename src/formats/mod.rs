@@ -13,7 +13,6 @@ pub mod export;
 mod fields;
 mod imu_log;
 mod instrument;
-mod noise_keys;
 mod quantity;
 mod read;
 mod segments;
@@ -23,8 +22,8 @@ mod uniform;
 mod whole;
 mod write;
 
+pub use crate::imu::NoiseKeys;
 pub use error::{FileError, Place};
-pub use noise_keys::NoiseKeys;
 pub(crate) use quantity::unit_scale;
 pub(crate) use sheet::Sheet;
 pub(crate) use whole::write_whole_with;

@@ -9,10 +9,10 @@ use flate2::{Compression, GzBuilder};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use super::error::{FileError, Place, list, suggestion};
-use super::noise_keys::NoiseKeys;
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use crate::calibration::Calibration;
+use crate::imu::NoiseKeys;
 use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::increments::Increments;
+use super::process_noise::NoiseInput;
 use super::state::State;
 use crate::attitude::skew;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Term, TermResponse, Triad};
@@ -15,7 +16,7 @@ pub type BlockMatrix = SMatrix<f64, NAVIGATION, NAVIGATION>;
 pub type ParameterBlock = SMatrix<f64, NAVIGATION, PER_TRIAD>;
 
 /// The error model over a stretch of samples: the rows of the transition matrix that differ from
-/// identity, the process noise, and the computed state at the end.
+/// identity, what process noise acts on, and the computed state at the end.
 ///
 /// Errors: φ in `C_computed = (I − [φ×]) C_true` (rad), δV and δp computed − true (m/s, m), all
 /// East-North-Up; parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`].
@@ -35,8 +36,8 @@ pub struct Block {
     pub parameters: PerSensor<ParameterBlock>,
     /// Transition from the parameter errors of error terms that are on.
     pub terms: Vec<TermColumn>,
-    /// Covariance that noise adds to the navigation errors.
-    pub noise: BlockMatrix,
+    /// What noise acts on: its covariance follows for any densities.
+    pub noise: NoiseInput,
 }
 
 /// What the error of one term parameter makes of the navigation errors.
@@ -63,6 +64,10 @@ pub(super) struct Moments {
     /// ∫f_n dt.
     force: Vector3<f64>,
     duration: f64,
+    /// ∫|ω − ω_ie|² dt and ∫|f + g|² dt of a move.
+    motion: PerSensor<f64>,
+    /// Length of a move, s.
+    moving: f64,
     terms: Vec<TermMoment>,
 }
 
@@ -156,8 +161,17 @@ impl Moments {
             accel: integrals(attitude.tr_mul(force)).into(),
             force: force * duration,
             duration,
-            terms: Vec::new(),
+            ..Self::default()
         }
+    }
+
+    /// Adds the motion of a sample of a move: the turn over that of the Earth, rad, and the change of
+    /// velocity over that of gravity, m/s.
+    #[inline]
+    pub(super) fn add_motion(&mut self, turned: &Vector3<f64>, change: &Vector3<f64>, period: f64) {
+        self.motion.gyro += turned.norm_squared() / period;
+        self.motion.accel += change.norm_squared() / period;
+        self.moving += period;
     }
 
     /// Adds error terms to those of a body that stands.
@@ -173,14 +187,14 @@ impl Moments {
         self.add_terms(attitude, responses, &force, duration);
     }
 
-    /// The block of these integrals. `noise` is the covariance, in `n`, that white noise of each triad
-    /// adds to the integral of its input over the stretch, rad² and (m/s)².
+    /// The block of these integrals. `bridged` is the covariance, in `n`, that interpolated samples of
+    /// each triad add to the integral of its input over the stretch, rad² and (m/s)².
     pub(super) fn block(
         &self,
         state: State,
         earth_rate: &Vector3<f64>,
         responses: PerSensor<&CorrectedResponse>,
-        noise: &PerSensor<Matrix3<f64>>,
+        bridged: PerSensor<Matrix3<f64>>,
     ) -> Block {
         let t = self.duration;
         let force = skew(self.force);
@@ -245,39 +259,19 @@ impl Moments {
             navigation,
             parameters,
             terms: terms.collect(),
-            noise: self.noise(noise),
+            noise: NoiseInput {
+                duration: t,
+                // Of no time there is no mean, and no noise either.
+                force: if t > 0.0 {
+                    skew(self.force / t)
+                } else {
+                    Matrix3::zeros()
+                },
+                motion: self.motion,
+                moving: self.moving,
+                bridged,
+            },
         }
-    }
-
-    /// White noise through the chain attitude → velocity → position over the stretch, with the mean
-    /// specific force (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).
-    fn noise(&self, PerSensor { gyro, accel }: &PerSensor<Matrix3<f64>>) -> BlockMatrix {
-        let t = self.duration;
-        let mut noise = BlockMatrix::zeros();
-        if t == 0.0 {
-            return noise;
-        }
-        let force = skew(self.force / t);
-        let tilting = force * gyro;
-        let both = tilting * force.transpose();
-        let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
-            noise
-                .fixed_view_mut::<3, 3>(3 * row, 3 * column)
-                .copy_from(&m);
-            if row != column {
-                noise
-                    .fixed_view_mut::<3, 3>(3 * column, 3 * row)
-                    .copy_from(&m.transpose());
-            }
-        };
-        let t2 = t * t;
-        set(0, 0, *gyro);
-        set(1, 0, tilting * (t / 2.0));
-        set(2, 0, tilting * (t2 / 6.0));
-        set(1, 1, accel + both * (t2 / 3.0));
-        set(2, 1, accel * (t / 2.0) + both * (t2 * t / 8.0));
-        set(2, 2, accel * (t2 / 3.0) + both * (t2 * t2 / 20.0));
-        noise
     }
 }
 

@@ -15,6 +15,7 @@ mod block;
 pub mod error_model;
 mod increments;
 mod navigation_error;
+mod process_noise;
 mod site_fixed;
 mod state;
 mod strapdown;
@@ -26,6 +27,7 @@ pub use error_model::{
 };
 pub use increments::{Increments, Motion};
 pub use navigation_error::NavigationError;
+pub use process_noise::{NoiseInput, ProcessNoise};
 pub use site_fixed::{Navigator, TermValues};
 pub use state::State;
 pub(crate) use strapdown::within_reach;

@@ -16,7 +16,6 @@ use crate::recording::ImuSamples;
 #[derive(Debug, Clone)]
 pub struct Navigator<'a> {
     imu: &'a ImuSamples,
-    random_walk: PerSensor<f64>,
     gravity: Vector3<f64>,
     earth_rate: Vector3<f64>,
     earth_turn: Matrix3<f64>,
@@ -46,18 +45,15 @@ struct Instrument {
 
 impl<'a> Navigator<'a> {
     /// Starts at a state with these triads; `None` if the sensitivity of one is singular.
-    /// `random_walk` are the noise densities in rad/√s and (m/s)/√s.
     pub fn new(
         imu: &'a ImuSamples,
         site: &Site,
-        random_walk: PerSensor<f64>,
         triads: &PerSensor<Triad>,
         state: State,
     ) -> Option<Self> {
         let earth_rate = site.earth_rate_n();
         Some(Self {
             imu,
-            random_walk,
             gravity: site.gravity_n(),
             earth_rate,
             earth_turn: exp(-earth_rate * imu.period),
@@ -144,6 +140,9 @@ impl<'a> Navigator<'a> {
         self.navigate(samples.clone(), |navigator, step| {
             let middle = (step.before + step.after) * 0.5;
             moments.add(&middle, &step.increments, &step.change, period);
+            let turned = step.increments.angle - middle.tr_mul(&navigator.earth_rate) * period;
+            let change = step.change + navigator.gravity * period;
+            moments.add_motion(&turned, &change, period);
             if let Some(sensed) = &step.sensed {
                 let responses = navigator.responses(sensed);
                 moments.add_terms(&middle, &responses, &step.change, period);
@@ -216,22 +215,20 @@ impl<'a> Navigator<'a> {
 
     fn block(&self, samples: &Range<usize>, moments: &Moments) -> Block {
         let responses = PerSensor::from_fn(|sensor| &self.instrument.get(sensor).response);
-        let noise = self.noise(samples);
-        moments.block(self.state, &self.earth_rate, responses, &noise)
+        let bridged = self.bridged(samples);
+        moments.block(self.state, &self.earth_rate, responses, bridged)
     }
 
-    /// Covariance in `n` that noise and interpolation add to the integrals of both triads' input.
-    fn noise(&self, samples: &Range<usize>) -> PerSensor<Matrix3<f64>> {
-        let duration = samples.len() as f64 * self.imu.period;
-        let mut noise = PerSensor::from_fn(|sensor| {
-            Matrix3::from_diagonal_element(self.random_walk.get(sensor).powi(2) * duration)
-        });
+    /// Covariance in `n` that interpolation adds to the integrals of both triads' input.
+    fn bridged(&self, samples: &Range<usize>) -> PerSensor<Matrix3<f64>> {
+        let mut covariance = PerSensor::<Matrix3<f64>>::default();
         for (bridge, part) in self.imu.bridged(samples) {
             let correction = &self.instrument.get(bridge.sensor).correction;
             let error = self.state.attitude * correction.column(bridge.axis);
-            *noise.get_mut(bridge.sensor) += error * error.transpose() * (bridge.variance * part);
+            *covariance.get_mut(bridge.sensor) +=
+                error * error.transpose() * (bridge.variance * part);
         }
-        noise
+        covariance
     }
 }
 

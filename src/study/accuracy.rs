@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::navigation::NavigationStudyError;
 use crate::calibration::ErrorTerm;
 use crate::calibration::Nis;
+use crate::calibration::NoisePolicy;
 use crate::calibration::{CalibrationError, ErrorTermTest, Group, mean_square_interval};
 use crate::calibration::{PARAMETERS, ParameterVector};
 use crate::imu::InstallationForm;
@@ -39,6 +40,8 @@ pub struct AccuracyStudy {
     pub form: InstallationForm,
     /// Error terms that are there and that the filter does not have.
     pub unmodelled: Vec<ErrorTerm>,
+    /// Which noise the filter uses.
+    pub noise: NoisePolicy,
     /// Number of runs.
     pub runs: u64,
     /// Seed; each run has its own streams of it.

@@ -99,10 +99,10 @@ fn calibrate_gives_one_json_document_whose_model_card_holds() {
             (&record.accel, correction.accel),
         ] {
             // Its inverse is K C, whichever way round it was meant.
-            for i in 0..3 {
+            for (i, row) in matrix.iter().enumerate() {
                 for j in 0..3 {
                     let product: f64 = (0..3)
-                        .map(|k| matrix[i][k] * triad.scale[k] * triad.installation[k][j])
+                        .map(|k| row[k] * triad.scale[k] * triad.installation[k][j])
                         .sum();
                     let expected = f64::from(u8::from(i == j));
                     assert!((product - expected).abs() < 1e-12, "{i} {j}: {product}");

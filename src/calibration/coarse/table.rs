@@ -39,7 +39,7 @@ fn add_legs(
     let attitude_variance = model.position_sigma.powi(2) + imu.pulse.gyro.powi(2) / 12.0;
     let at_rest = |attitude| {
         let state = State::at_rest(attitude);
-        Navigator::new(imu, &run.site, walk, triads, state).ok_or_else(|| singular(triads))
+        Navigator::new(imu, &run.site, triads, state).ok_or_else(|| singular(triads))
     };
     let mut before = None;
     for dwell in &stretch.dwells {

@@ -177,7 +177,7 @@ impl Chain {
         let legs = dwells.iter().zip(&dwells[1..]);
         for ((before, after), up) in legs.zip(up.iter().zip(&up[1..])) {
             let start = State::at_rest(attitudes[attitudes.len() - 1]);
-            let block = Navigator::new(&run.recording.imu, &run.site, walk, triads, start)
+            let block = Navigator::new(&run.recording.imu, &run.site, triads, start)
                 .ok_or_else(|| singular(triads))?
                 .advance(before.samples.end..after.samples.start);
             let tilt = tilt(&(block.state.attitude * up.1.direction));

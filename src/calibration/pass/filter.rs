@@ -9,7 +9,7 @@ use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::{PerSensor, Sensor, TermVector};
-use crate::navigation::{Block, State};
+use crate::navigation::{Block, ProcessNoise, State};
 
 /// What a block makes of the navigation errors by the error of one state.
 type Column = [f64; NAVIGATION];
@@ -20,6 +20,7 @@ pub(in crate::calibration) struct Filter {
     pub layout: Layout,
     x: DVector<f64>,
     p: DMatrix<f64>,
+    noise: PerSensor<ProcessNoise>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
 }
@@ -55,6 +56,7 @@ impl Filter {
             layout,
             x,
             p,
+            noise: model.process_noise(),
             varying,
         }
     }
@@ -131,16 +133,16 @@ impl Filter {
             }
         }
         self.x.as_mut_slice()[..NAVIGATION].copy_from_slice(&x);
-        for constant in NAVIGATION..n {
-            for moving in 0..NAVIGATION {
-                let covariance = rows[constant][moving];
+        for (constant, row) in rows.iter().enumerate().skip(NAVIGATION) {
+            for (moving, &covariance) in row.iter().enumerate() {
                 self.p[(moving, constant)] = covariance;
                 self.p[(constant, moving)] = covariance;
             }
         }
+        let noise = block.noise.covariance(&self.noise);
         for (column, sum) in corner.iter().enumerate() {
-            for row in 0..NAVIGATION {
-                self.p[(row, column)] = sum[row] + block.noise[(row, column)];
+            for (row, sum) in sum.iter().enumerate() {
+                self.p[(row, column)] = sum + noise[(row, column)];
             }
         }
         self.vary(block.duration);
@@ -207,13 +209,26 @@ impl Filter {
     /// Takes in a measurement, one scalar after the other, in Joseph's form, which keeps the covariance
     /// symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li, Kirubarajan,
     /// *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
-    pub fn update(&mut self, measurement: &Measurement) {
+    ///
+    /// The scalar innovations as they came are independent of each other.
+    pub fn update(&mut self, measurement: &Measurement) -> [ScalarInnovation; 3] {
+        let mut scalars = [ScalarInnovation::default(); 3];
         let n = self.x.len();
         let (mut ph, mut gain, mut rest) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        for (row, z) in measurement.rows.iter().zip(&measurement.residual) {
+        for (axis, (row, z)) in measurement
+            .rows
+            .iter()
+            .zip(&measurement.residual)
+            .enumerate()
+        {
             self.times_upper(row, &mut ph);
-            let scale = 1.0 / (times(row, &ph) + measurement.variance);
+            let variance = times(row, &ph) + measurement.variance;
+            let scale = 1.0 / variance;
             let innovation = z - times(row, self.x.as_slice());
+            scalars[axis] = ScalarInnovation {
+                innovation,
+                variance,
+            };
             for ((x, gain), ph) in self.x.iter_mut().zip(&mut gain).zip(&ph) {
                 *gain = ph * scale;
                 *x += *gain * innovation;
@@ -240,6 +255,7 @@ impl Filter {
                 self.p[(column, row)] = self.p[(row, column)];
             }
         }
+        scalars
     }
 
     /// `P hᵀ` from the upper half of P.
@@ -392,6 +408,14 @@ impl Filter {
     pub fn initial_attitude(&self) -> Vector3<f64> {
         self.at(self.layout.initial_attitude())
     }
+}
+
+/// One component of a measurement less what the filter expected of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(in crate::calibration) struct ScalarInnovation {
+    pub innovation: f64,
+    /// As the filter expects it.
+    pub variance: f64,
 }
 
 /// What a pass with feedback takes out of the mean.

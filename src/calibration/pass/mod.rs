@@ -9,17 +9,20 @@ mod stretch;
 
 use super::auxiliary::auxiliary_vector;
 use super::error::CalibrationError;
-use super::linearisation::{AttitudePrior, Linearisation};
+use super::linearisation::{AttitudePrior, Linearisation, Start};
+use super::model::Model;
 use super::parameters::{ParameterVector, to_vector};
 use super::problem::{Problem, Stretch};
 use crate::imu::TermVector;
-pub(super) use filter::Filter;
+pub(super) use filter::{Filter, ScalarInnovation};
 use initial_attitude::InitialAttitude;
+pub(super) use measurement::Measurement;
 pub(super) use mode::{Gate, Mode};
 pub use result::Epoch;
 pub(super) use result::PassResult;
 use result::Sums;
 use stretch::OneStretch;
+pub(super) use stretch::navigator;
 
 /// A pass over all stretches of a problem, `priors` what is known of the initial attitude of each.
 pub(super) fn pass(
@@ -55,12 +58,8 @@ pub(super) fn pass(
             Mode::Held(_) => *prior,
         };
         let start = stretch.start(&known, &at.initial_attitudes[number]);
-        let anew = before.is_none_or(|b: &Stretch| b.recording != stretch.recording);
-        let moved = before.is_none_or(|b: &Stretch| b.run.site != stretch.run.site);
+        begin(&mut sums.filter, model, before, stretch, &start);
         before = Some(stretch);
-        let gravity = moved.then_some(stretch.run.site.gravity_sigma);
-        let table = model.position_sigma;
-        sums.filter.begin(&start, table, anew, gravity);
         let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
         one.run()?;
         sums = one.sums;
@@ -70,4 +69,18 @@ pub(super) fn pass(
     }
     let prior_sigma = auxiliary_vector(&model.geometry.vector(), &model.term_sigma);
     Ok(sums.result(prior_sigma, &attitudes))
+}
+
+/// A stretch begins after another: what is of another recording or site starts anew.
+pub(super) fn begin(
+    filter: &mut Filter,
+    model: &Model,
+    before: Option<&Stretch>,
+    stretch: &Stretch,
+    start: &Start,
+) {
+    let anew = before.is_none_or(|before| before.recording != stretch.recording);
+    let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
+    let gravity = moved.then_some(stretch.run.site.gravity_sigma);
+    filter.begin(start, model.position_sigma, anew, gravity);
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use nalgebra::Matrix3;
+
 use super::filter::Filter;
 use super::measurement::Measurement;
 use super::mode::{Gate, Mode};
@@ -9,11 +11,11 @@ use super::result::Sums;
 use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::innovation::{Innovation, Observation};
+use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::parameters::{from_vector, to_vector};
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::schedule::{AtRest, Step};
-use crate::imu::PerSensor;
 use crate::navigation::{Navigator, State, TermValues};
 
 /// After this many rejections in a row the gate doubts itself rather than the data.
@@ -51,6 +53,25 @@ struct Begin<'a> {
     log_determinant: f64,
 }
 
+/// Navigation through a stretch from this initial attitude on.
+pub(in crate::calibration) fn navigator<'a>(
+    stretch: &Stretch<'a>,
+    at: &Linearisation,
+    initial: &Matrix3<f64>,
+    layout: &Layout,
+) -> Result<Navigator<'a>, CalibrationError> {
+    let run = stretch.run;
+    let on = layout.terms().map(|(_, index)| index);
+    let terms = TermValues {
+        on: on.collect(),
+        values: at.terms,
+    };
+    let start = State::at_rest(*initial);
+    let navigator = Navigator::new(&run.recording.imu, &run.site, &at.triads, start);
+    let navigator = navigator.ok_or_else(|| singular(&at.triads))?;
+    Ok(navigator.with_terms(terms))
+}
+
 impl<'a> OneStretch<'a> {
     pub fn new(
         problem: &'a Problem<'a>,
@@ -59,17 +80,8 @@ impl<'a> OneStretch<'a> {
         mode: Mode<'a>,
         sums: Sums,
     ) -> Result<Self, CalibrationError> {
-        let (run, model) = (stretch.run, &problem.model);
-        let walk = PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
-        let start = State::at_rest(sums.at.initial_attitudes[number]);
-        let on = sums.filter.layout.terms().map(|(_, index)| index);
-        let terms = TermValues {
-            on: on.collect(),
-            values: sums.at.terms,
-        };
-        let navigator = Navigator::new(&run.recording.imu, &run.site, walk, &sums.at.triads, start)
-            .ok_or_else(|| singular(&sums.at.triads))?
-            .with_terms(terms);
+        let initial = &sums.at.initial_attitudes[number];
+        let navigator = navigator(stretch, &sums.at, initial, &sums.filter.layout)?;
         Ok(Self {
             problem,
             stretch,
@@ -143,6 +155,9 @@ impl<'a> OneStretch<'a> {
     /// The observation that closed the gate: where several in a row were rejected, the dwell's first of
     /// their kind that was not. None if there is no such thing, or were too many already.
     fn closing(&self, begin: &Begin) -> Option<usize> {
+        if matches!(self.mode, Mode::Held(Gate::As(_))) {
+            return None;
+        }
         let closed = self.row.iter().any(|&row| row >= REOPEN);
         if !closed || self.closing.len() >= MOST_CLOSING {
             return None;
@@ -195,7 +210,7 @@ impl<'a> OneStretch<'a> {
             // not at all: one observation a dwell, however long it is.
             filter.update(&Measurement::position(&state, variance.position));
         }
-        let velocity = Measurement::velocity(&state, variance.velocity);
+        let velocity = Measurement::velocity(&state, self.stretch.velocity_variance(model));
         self.observe(time, Observation::Velocity, &velocity)?;
         if let Some((reading, count)) = &at_rest.reading {
             let white = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;

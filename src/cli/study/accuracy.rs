@@ -8,7 +8,7 @@ use turncal::report;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
-use super::super::calibrate::{Aiding, Installation};
+use super::super::calibrate::{Aiding, Installation, Noise};
 use super::super::error_term::TermArgument;
 use super::super::input::{at_least_two, seed};
 use super::super::output::Delivery;
@@ -52,6 +52,9 @@ pub struct Accuracy {
     /// Error terms to simulate and not to estimate
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     unmodelled: Vec<TermArgument>,
+    /// Which noise the filter uses
+    #[arg(long, value_enum, default_value_t = Noise::default())]
+    noise: Noise,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
@@ -82,6 +85,7 @@ impl Accuracy {
         let study = AccuracyStudy {
             unmodelled: self.unmodelled.iter().map(|term| term.0).collect(),
             form: self.installation.into(),
+            noise: self.noise.into(),
             runs: self.runs,
             seed: self.seed.unwrap_or(scenario.seed),
             scenario,

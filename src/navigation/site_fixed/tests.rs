@@ -42,11 +42,7 @@ fn start() -> State {
 }
 
 fn navigate(triads: &PerSensor<Triad>, state: State) -> Block {
-    let walk = PerSensor {
-        gyro: 3e-7,
-        accel: 5e-5,
-    };
-    Navigator::new(&record(), &site(), walk, triads, state)
+    Navigator::new(&record(), &site(), triads, state)
         .unwrap()
         .advance(0..SAMPLES)
 }
@@ -129,13 +125,12 @@ fn transition_of_parameter_errors_is_the_derivative_of_navigation() {
 
 #[test]
 fn transition_of_error_terms_is_the_derivative_of_navigation() {
-    let walk = PerSensor::default();
     // As large as precise instruments have them.
     let some = TermVector::from_fn(|k, _| {
         0.1 * Term::of(k).map_or(0.0, Term::usual_sigma) * (k as f64).cos()
     });
     let with = |values: TermVector| {
-        Navigator::new(&record(), &site(), walk, &triads(), start())
+        Navigator::new(&record(), &site(), &triads(), start())
             .unwrap()
             .with_terms(TermValues {
                 on: (0..TERM_PARAMETERS).collect(),
@@ -176,14 +171,7 @@ fn an_ideal_instrument_at_rest_stays_at_rest() {
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-    let mut navigator = Navigator::new(
-        &record,
-        &site,
-        PerSensor::default(),
-        &ideal,
-        State::at_rest(attitude),
-    )
-    .unwrap();
+    let mut navigator = Navigator::new(&record, &site, &ideal, State::at_rest(attitude)).unwrap();
     let end = navigator.advance(0..samples).state;
     assert_relative_eq!(end.attitude, attitude, epsilon = 1e-12);
     assert!(end.velocity.norm() < 1e-9 && end.position.norm() < 1e-7);
@@ -199,12 +187,8 @@ fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-    let walk = PerSensor {
-        gyro: 3e-7,
-        accel: 5e-5,
-    };
     let at_rest = State::at_rest(attitude);
-    let navigator = Navigator::new(&record, &site, walk, &ideal, at_rest).unwrap();
+    let navigator = Navigator::new(&record, &site, &ideal, at_rest).unwrap();
     let moving = navigator.clone().advance(0..SAMPLES);
     let standing = navigator.clone().advance_standing(0..SAMPLES);
     assert_relative_eq!(moving.navigation, standing.navigation, epsilon = 1e-6);
@@ -224,17 +208,22 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-    let walk = PerSensor {
-        gyro: 0.1,
-        accel: 1.0,
+    let of = |random_walk| ProcessNoise {
+        random_walk,
+        ..ProcessNoise::default()
+    };
+    let noise = PerSensor {
+        gyro: of(0.1),
+        accel: of(1.0),
     };
     let start = State::at_rest(Matrix3::identity());
-    let mut navigator = Navigator::new(&record, &site, walk, &ideal, start).unwrap();
-    let whole = navigator.clone().advance(0..SAMPLES).noise;
+    let mut navigator = Navigator::new(&record, &site, &ideal, start).unwrap();
+    let whole = navigator.clone().advance(0..SAMPLES);
     let first = navigator.advance(0..SAMPLES / 2);
     let second = navigator.advance(SAMPLES / 2..SAMPLES);
-    let composed = second.navigation * first.noise * second.navigation.transpose() + second.noise;
-    assert_relative_eq!(whole, composed, epsilon = 1e-7);
+    let of = |block: &Block| block.noise.covariance(&noise);
+    let composed = second.navigation * of(&first) * second.navigation.transpose() + of(&second);
+    assert_relative_eq!(of(&whole), composed, epsilon = 1e-7);
 }
 
 #[test]
@@ -260,8 +249,9 @@ fn an_interpolated_axis_adds_its_error_along_that_axis() {
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
     let at_rest = State::at_rest(attitude);
     let of = |samples| {
-        let navigator = Navigator::new(&record, &site, PerSensor::default(), &ideal, at_rest);
-        navigator.unwrap().advance_standing(samples).noise
+        let navigator = Navigator::new(&record, &site, &ideal, at_rest);
+        let block = navigator.unwrap().advance_standing(samples);
+        block.noise.covariance(&PerSensor::default())
     };
     let along = |axis: usize, variance: f64| {
         let axis = attitude.column(axis);

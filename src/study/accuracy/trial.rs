@@ -83,7 +83,10 @@ impl AccuracyStudy {
             BodyFrame::Table => Aiding::Table,
             BodyFrame::Accelerometer => Aiding::Velocity,
         };
-        let options = Options::default().installation(self.form).aiding(aiding);
+        let options = Options::default()
+            .installation(self.form)
+            .aiding(aiding)
+            .noise(self.noise);
         let mut problem = Problem::new(&record, &options);
         let duration = record.recording.imu.duration();
         let form = self.bound_form(&truth);

@@ -101,7 +101,7 @@ fn block_propagation_equals_the_dense_product() {
         let phi = dense_transition(&filter, &block);
         let mut p = &phi * &filter.p * phi.transpose();
         let mut corner = p.view_mut((0, 0), (NAVIGATION, NAVIGATION));
-        corner += block.noise;
+        corner += block.noise.covariance(&filter.noise);
         let x = phi * &filter.x;
         filter.propagate(&block);
         assert_relative_eq!(filter.p, p, max_relative = 1e-12, epsilon = 1e-13);
@@ -140,7 +140,7 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
         let phi = dense_transition(&filter, &block);
         let mut p = &phi * &filter.p * phi.transpose();
         let mut corner = p.view_mut((0, 0), (NAVIGATION, NAVIGATION));
-        corner += block.noise;
+        corner += block.noise.covariance(&filter.noise);
         for &state in &varying {
             p[(state, state)] += sigma.powi(2) * (1.0 - phi[(state, state)].powi(2));
         }

@@ -1,7 +1,7 @@
 //! The names and units of noise figures in `[imu.noise]`: one table for reader, writer, drafts and the
 //! Allan command.
 
-use crate::imu::Sensor;
+use super::Sensor;
 use crate::units::{DEG_PER_H, DEG_PER_SQRT_H, MICRO_G, MICRO_G_PER_SQRT_HZ};
 
 /// Names and units of a triad's noise figures.

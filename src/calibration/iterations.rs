@@ -1,0 +1,112 @@
+//! Gauss–Newton iterations: passes with the linearisation held until nothing moves.
+
+use super::error::CalibrationError;
+use super::innovation::Innovation;
+use super::linearisation::{AttitudePrior, Linearisation};
+use super::outcome::Pass;
+use super::parameters::to_vector;
+use super::pass::{Gate, Mode, PassResult, pass};
+use super::problem::Problem;
+
+/// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
+/// of its own linearised problem only, so a small rise means nothing.
+const COST_RISE: f64 = 0.1;
+/// After a step of more than this part of the one before, all go half as far.
+const SHRINKS: f64 = 0.8;
+/// More than this part of all observations beyond the gate are no outliers.
+const MOST_OUTLIERS: f64 = 0.05;
+
+/// The last pass, and whether it moved nothing.
+pub(super) struct Iterated {
+    pub held: PassResult,
+    pub converged: bool,
+}
+
+/// Passes from a first point on, each linearised at the estimate of the one before; and whether they
+/// converged. `gate` is decided already, or by innovations.
+pub(super) fn iterate(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    from: Linearisation,
+    mut gate: Gate,
+    passes: &mut Vec<Pass>,
+    progress: &dyn Fn(&Pass),
+) -> Result<Iterated, CalibrationError> {
+    let most = match gate {
+        Gate::Innovations => problem.options.passes,
+        Gate::Open | Gate::As(_) => passes.len() + problem.options.passes,
+    };
+    let decided = matches!(gate, Gate::As(_));
+    let mut at = from;
+    let mut before: Option<PassResult> = None;
+    let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
+    loop {
+        let result = pass(problem, priors, &at, Mode::Held(gate))?;
+        let summary = summary(&result, &at, false);
+        progress(&summary);
+        passes.push(summary);
+        let same_data = before
+            .as_ref()
+            .is_some_and(|before| same_data(before, &result));
+        let settled = summary.largest_step <= problem.options.converged_sigma
+            && (decided || same_data || (before.is_none() && summary.rejected == 0));
+        let doubtful = !decided && beyond(&result, problem.gate()) > MOST_OUTLIERS;
+        let finished = settled && (gate == Gate::Open || !doubtful);
+        if finished || passes.len() >= most {
+            return Ok(Iterated {
+                held: result,
+                converged: settled,
+            });
+        }
+        // Where many observations contradict the model it is the model that is wrong, and leaving
+        // them out would only hide that.
+        if doubtful {
+            gate = Gate::Open;
+        }
+        let too_far =
+            before.filter(|before| same_data && result.cost > before.cost * (1.0 + COST_RISE));
+        // A step as large as the one before may be the way back of it.
+        if summary.largest_step > SHRINKS * last_step {
+            fraction *= 0.5;
+        }
+        last_step = summary.largest_step;
+        at = match &too_far {
+            Some(before) => before.at.towards(&at, 0.5),
+            None if fraction < 1.0 => at.towards(&result.estimate, fraction),
+            None => result.estimate.clone(),
+        };
+        before = Some(too_far.unwrap_or(result));
+    }
+}
+
+/// Whether two passes let the same observations in.
+fn same_data(a: &PassResult, b: &PassResult) -> bool {
+    let accepted = |result: &PassResult| -> Vec<bool> {
+        result.innovations.iter().map(|i| i.accepted).collect()
+    };
+    accepted(a) == accepted(b)
+}
+
+/// Part of all observations that are beyond the gate or were left out.
+fn beyond(result: &PassResult, gate: f64) -> f64 {
+    let beyond = |i: &&Innovation| !i.accepted || i.distance() > gate;
+    result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
+}
+
+pub(super) fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -> Pass {
+    let sigma = result.covariance.diagonal().map(f64::sqrt);
+    let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
+    Pass {
+        feedback,
+        largest_step: step
+            .iter()
+            .zip(&sigma)
+            .filter(|&(_, &sigma)| sigma > 0.0)
+            .map(|(step, sigma)| (step / sigma).abs())
+            .max_by(f64::total_cmp)
+            .unwrap_or(0.0),
+        cost: result.cost,
+        observations: 3 * result.innovations.len(),
+        rejected: result.innovations.iter().filter(|i| !i.accepted).count(),
+    }
+}

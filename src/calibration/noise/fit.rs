@@ -1,0 +1,271 @@
+//! Fisher scoring over the factors, and the score test of a point.
+//!
+//! Source: gradient and expected information of a Gaussian likelihood by its innovations, Gupta and Mehra
+//! 1974, "Computational aspects of maximum likelihood estimation and reduction in sensitivity function
+//! calculations", IEEE Trans. Automatic Control 19(6); here with differences of whole replays for the
+//! sensitivities.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::super::error::CalibrationError;
+use super::super::problem::Problem;
+use super::factors::{Factors, SOURCES, Scale};
+use super::replay::{Replay, Script};
+
+/// 1σ of ln σ of a stated figure before the data: a factor of three.
+const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
+/// Step of ln σ, or of a variance that is zero over its reference, for differences.
+const DIFFERENCE: f64 = 1e-3;
+/// A variance that is not stated and below this of its reference is none.
+const NOTHING: f64 = 1e-3;
+/// A fall of −2 ln of the likelihood that is nothing: a tenth of a σ of one factor.
+const SETTLED: f64 = 0.01;
+/// Longest step of ln σ.
+const LONGEST: f64 = 1.5;
+/// A step that lowers nothing at this fraction of itself is given up.
+const SHORTEST: f64 = 0.01;
+/// Steps at most.
+const STEPS: usize = 40;
+
+/// The likelihood of noise at one point of linearisation.
+pub(super) struct Likelihood<'a> {
+    pub problem: &'a Problem<'a>,
+    pub script: &'a Script<'a>,
+    pub scale: &'a Scale,
+    /// Of each observation of three components, whether it is let in.
+    pub accepted: &'a [bool],
+}
+
+/// A point with gradient and expected information of −½ of the deviance, by ln σ of a factor that is
+/// above zero, else by its variance over its reference.
+pub(super) struct Slope {
+    pub here: Replay,
+    pub score: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+/// The factors of largest posterior density.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub factors: Factors,
+    /// −2 ln of the likelihood there, without the prior of factors.
+    pub deviance: f64,
+}
+
+impl Likelihood<'_> {
+    pub fn replay(&self, factors: &Factors) -> Result<Replay, CalibrationError> {
+        let model = self.scale.apply(factors, &self.problem.model);
+        let problem = self.problem.with_model(model);
+        self.script.replay(&problem, self.accepted)
+    }
+
+    /// Score and information by these sources, from one replay more than there are.
+    pub fn slope(&self, factors: &Factors, sources: &[usize]) -> Result<Slope, CalibrationError> {
+        let here = self.replay(factors)?;
+        let differences = sources.par_iter().map(|&k| {
+            let mut moved = *factors;
+            moved.0[k] = match factors.0[k] {
+                0.0 => DIFFERENCE,
+                v => v * (2.0 * DIFFERENCE).exp(),
+            };
+            let there = self.replay(&moved)?;
+            let pairs = here.scalars.iter().zip(&there.scalars);
+            // Of ln of the variance, and of the innovation over σ.
+            Ok(pairs
+                .map(|(here, there)| {
+                    let variance = (there.variance / here.variance).ln() / DIFFERENCE;
+                    let change = there.innovation - here.innovation;
+                    (variance, change / (DIFFERENCE * here.variance.sqrt()))
+                })
+                .collect())
+        });
+        let differences: Vec<Vec<(f64, f64)>> =
+            differences.collect::<Result<_, CalibrationError>>()?;
+        let n = sources.len();
+        let score = DVector::from_fn(n, |i, _| {
+            let each = here.scalars.iter().zip(&differences[i]);
+            each.map(|(scalar, (variance, innovation))| {
+                let whitened = scalar.innovation / scalar.variance.sqrt();
+                0.5 * variance * (whitened.powi(2) - 1.0) - whitened * innovation
+            })
+            .sum()
+        });
+        let information = DMatrix::from_fn(n, n, |i, j| {
+            let each = differences[i].iter().zip(&differences[j]);
+            each.map(|(a, b)| 0.5 * a.0 * b.0 + a.1 * b.1).sum()
+        });
+        Ok(Slope {
+            here,
+            score,
+            information,
+        })
+    }
+
+    /// Twice what the prior of stated figures takes off ln of the likelihood.
+    fn penalty(&self, factors: &Factors) -> f64 {
+        let stated = (0..SOURCES).filter(|&k| self.scale.is_stated(k));
+        stated
+            .map(|k| (0.5 * factors.0[k].ln() / LOG_SIGMA).powi(2))
+            .sum()
+    }
+
+    /// The factors of largest posterior density of these sources, the others held.
+    ///
+    /// A variance that is zero and would go below rests until the others have settled; then each is
+    /// looked at once more.
+    pub fn fit(&self, start: &Factors, sources: &[usize]) -> Result<Fit, CalibrationError> {
+        let mut at = *start;
+        let mut resting: Vec<usize> = Vec::new();
+        let mut looked_again = false;
+        let mut deviance = f64::INFINITY;
+        for _ in 0..STEPS {
+            let moving = sources.iter().filter(|k| !resting.contains(k));
+            let moving: Vec<usize> = moving.copied().collect();
+            let slope = self.slope(&at, &moving)?;
+            deviance = slope.here.deviance();
+            let cost = deviance + self.penalty(&at);
+            let (gradient, information) = self.posterior(&slope, &at, &moving);
+            let (free, rests): (Vec<usize>, Vec<usize>) =
+                (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || gradient[i] > 0.0);
+            resting.extend(rests.iter().map(|&i| moving[i]));
+            let of_free = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
+            let information = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+                information[(free[i], free[j])]
+            });
+            let Some(step) = solve(information, &of_free) else {
+                break;
+            };
+            if of_free.dot(&step) < SETTLED {
+                if resting.is_empty() || looked_again {
+                    break;
+                }
+                looked_again = true;
+                resting.clear();
+                continue;
+            }
+            let free: Vec<usize> = free.iter().map(|&i| moving[i]).collect();
+            let Some(there) = self.shortened(&at, &free, &step, cost) else {
+                break;
+            };
+            at = there;
+        }
+        Ok(Fit {
+            factors: at,
+            deviance,
+        })
+    }
+
+    /// Score and information with those of the prior.
+    fn posterior(
+        &self,
+        slope: &Slope,
+        at: &Factors,
+        sources: &[usize],
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let (mut score, mut information) = (slope.score.clone(), slope.information.clone());
+        for (i, &k) in sources.iter().enumerate() {
+            if self.scale.is_stated(k) {
+                score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
+                information[(i, i)] += LOG_SIGMA.powi(-2);
+            }
+        }
+        (score, information)
+    }
+
+    /// The point at the longest fraction of a step that lowers the cost; none if none does.
+    fn shortened(
+        &self,
+        at: &Factors,
+        free: &[usize],
+        step: &DVector<f64>,
+        cost: f64,
+    ) -> Option<Factors> {
+        let mut fraction = 1.0;
+        while fraction > SHORTEST {
+            let mut there = *at;
+            for (&k, step) in free.iter().zip(step) {
+                let v = &mut there.0[k];
+                if *v > 0.0 {
+                    *v *= (2.0 * (fraction * step).clamp(-LONGEST, LONGEST)).exp();
+                    if *v < NOTHING && !self.scale.is_stated(k) {
+                        *v = 0.0;
+                    }
+                } else if *step > 0.0 {
+                    *v = (fraction * step).clamp(2.0 * NOTHING, (2.0 * LONGEST).exp());
+                }
+            }
+            // Noise that the filter cannot run with is too far.
+            let found = self.replay(&there).map(|replay| replay.deviance());
+            if found.is_ok_and(|found| found + self.penalty(&there) < cost) {
+                return Some(there);
+            }
+            fraction *= 0.5;
+        }
+        None
+    }
+
+    /// The same with ln σ of each factor that is above zero: its 1σ after the data; and 1σ of the variance
+    /// over its reference of each that is zero.
+    pub fn sigma(
+        &self,
+        factors: &Factors,
+        sources: &[usize],
+    ) -> Result<Vec<Option<f64>>, CalibrationError> {
+        let slope = self.slope(factors, sources)?;
+        let (_, information) = self.posterior(&slope, factors, sources);
+        let inverse = information.cholesky().map(|factor| factor.inverse());
+        Ok((0..sources.len())
+            .map(|i| Some(inverse.as_ref()?[(i, i)].sqrt()))
+            .collect())
+    }
+}
+
+/// The solution of `information · step = score`; a direction of no information takes no step.
+fn solve(mut information: DMatrix<f64>, score: &DVector<f64>) -> Option<DVector<f64>> {
+    for i in 0..information.nrows() {
+        information[(i, i)] += f64::EPSILON.sqrt() * (1.0 + information[(i, i)]);
+    }
+    Some(information.cholesky()?.solve(score))
+}
+
+impl Slope {
+    /// Score statistic against any factors at all (Rao 1948): twice what the quadratic model of the
+    /// likelihood gains at most, where those of `bounded` cannot fall.
+    pub fn statistic(&self, bounded: &[usize]) -> f64 {
+        let n = self.score.len();
+        let mut largest = 0f64;
+        // The best point of a cone is the best of one of its faces that lies in it.
+        for face in 0..1usize << bounded.len() {
+            let at_zero = |i: &usize| {
+                let place = bounded.iter().position(|b| b == i);
+                place.is_some_and(|place| face >> place & 1 == 0)
+            };
+            let kept: Vec<usize> = (0..n).filter(|i| !at_zero(i)).collect();
+            let score = DVector::from_fn(kept.len(), |i, _| self.score[kept[i]]);
+            let information = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+                self.information[(kept[i], kept[j])]
+            });
+            let Some(step) = information.cholesky().map(|factor| factor.solve(&score)) else {
+                continue;
+            };
+            let inside = kept
+                .iter()
+                .zip(&step)
+                .all(|(i, &step)| step >= 0.0 || !bounded.contains(i));
+            if inside {
+                largest = largest.max(score.dot(&step));
+            }
+        }
+        largest
+    }
+
+    /// The same against one factor alone.
+    pub fn statistic_of(&self, factor: usize, bounded: bool) -> f64 {
+        let (score, information) = (self.score[factor], self.information[(factor, factor)]);
+        if information <= 0.0 || (bounded && score <= 0.0) {
+            return 0.0;
+        }
+        score.powi(2) / information
+    }
+}

@@ -1,0 +1,50 @@
+//! What a likelihood ratio stays below by chance.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// What −2 ln of a likelihood ratio stays below but for this chance where `two_sided` factors may go
+/// either way and `one_sided` ones are at zero, which they cannot go below: a mixture of χ², in which
+/// each of the latter counts half of the time (Self and Liang 1987, J. Am. Stat. Assoc. 82(398), case 9,
+/// with factors that are not correlated).
+pub(super) fn limit(two_sided: usize, one_sided: usize, false_alarm: f64) -> f64 {
+    let beyond = |limit: f64| -> f64 {
+        let mut weight = 0.5f64.powi(one_sided as i32);
+        let mut chance = 0.0;
+        for above in 0..=one_sided {
+            // No degree of freedom is always zero.
+            if let Ok(chi2) = ChiSquared::new((two_sided + above) as f64) {
+                chance += weight * chi2.sf(limit);
+            }
+            weight *= (one_sided - above) as f64 / (above + 1) as f64;
+        }
+        chance
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    while beyond(high) > false_alarm {
+        high *= 2.0;
+    }
+    // Bisection to the last digit.
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) > false_alarm {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn without_bounds_it_is_chi_squared_and_one_bound_halves_the_chance() {
+        // Percentage points of χ²: Abramowitz and Stegun, Table 26.8.
+        assert_relative_eq!(limit(1, 0, 0.05), 3.84146, epsilon = 1e-5);
+        assert_relative_eq!(limit(10, 0, 0.001), 29.588, epsilon = 1e-3);
+        assert_relative_eq!(limit(0, 1, 0.025), limit(1, 0, 0.05), epsilon = 1e-9);
+    }
+}

@@ -1,0 +1,121 @@
+//! What became of the noise of a record.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::policy::NoisePolicy;
+use super::source::Source;
+
+/// What noise a calibration used, and how it came to that.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseReport {
+    /// What was asked for.
+    pub policy: NoisePolicy,
+    /// Whether the noise is learnt; else it is as stated.
+    pub learnt: bool,
+    /// The test of what is stated; none where nothing was tested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test: Option<NoiseTest>,
+    /// Every source that the record can have.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<SourceFigures>,
+}
+
+/// The test of stated noise against what the data show, at one false alarm in a thousand runs.
+///
+/// −2 ln of two likelihood ratios, each at half of that rate: against all factors at once, and the largest
+/// against one factor alone. A ratio is worked out where the score test, which costs no fit, is beyond
+/// its 5 % point; else it is none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NoiseTest {
+    /// Score statistic against all factors …
+    pub score: f64,
+    /// … and its 5 % point.
+    pub score_limit: f64,
+    /// Likelihood ratio against all factors …
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ratio: Option<f64>,
+    /// … and what it stays below if what is stated is right.
+    pub ratio_limit: f64,
+    /// The largest against one factor over what it stays below; one or less if what is stated is right …
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ratio_of_one: Option<f64>,
+    /// … and its source.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<Source>,
+    /// Whether the data contradict what is stated.
+    pub rejected: bool,
+}
+
+/// 1σ of a source, in the unit named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceFigures {
+    /// Which.
+    pub source: Source,
+    /// In words.
+    pub name: String,
+    /// Unit of the figures.
+    pub unit: String,
+    /// What is stated, or seen in dwells before the filter; none where nothing is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stated: Option<f64>,
+    /// What was used.
+    pub used: f64,
+    /// Its 95 % interval; none where it was not learnt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[f64; 2]>,
+}
+
+impl NoiseReport {
+    /// Noise as stated, not tested.
+    pub(super) fn stated(policy: NoisePolicy, test: Option<NoiseTest>) -> Self {
+        Self {
+            policy,
+            learnt: false,
+            test,
+            sources: Vec::new(),
+        }
+    }
+}
+
+impl fmt::Display for NoiseReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.learnt {
+            return match &self.test {
+                Some(_) => f.write_str("Noise as stated: the data do not contradict it."),
+                None => f.write_str("Noise as stated."),
+            };
+        }
+        f.write_str("Noise learnt from the record:")?;
+        for (number, figures) in self.sources.iter().filter(|s| s.counts()).enumerate() {
+            f.write_str(if number == 0 { " " } else { "; " })?;
+            write!(f, "{figures}")?;
+        }
+        f.write_str(".")
+    }
+}
+
+impl SourceFigures {
+    /// Whether it is there at all, stated or learnt.
+    pub fn counts(&self) -> bool {
+        self.used > 0.0 || self.stated.is_some()
+    }
+}
+
+impl fmt::Display for SourceFigures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            name, unit, used, ..
+        } = self;
+        write!(f, "{name} {used:.3e}")?;
+        if let Some([low, high]) = self.interval {
+            write!(f, " ({low:.2e} to {high:.2e})")?;
+        }
+        write!(f, " {unit}")?;
+        if let Some(stated) = self.stated {
+            write!(f, ", stated {stated:.3e}")?;
+        }
+        Ok(())
+    }
+}

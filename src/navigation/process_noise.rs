@@ -1,0 +1,77 @@
+//! White noise that drives the navigation errors over a block.
+
+use nalgebra::Matrix3;
+
+use super::block::BlockMatrix;
+use crate::imu::PerSensor;
+
+/// White noise of a triad as 1σ densities, alike on its three axes. Each of its sources is independent of
+/// the others, so their variances add.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ProcessNoise {
+    /// Angle or velocity random walk, rad/√s or (m/s)/√s.
+    pub random_walk: f64,
+    /// Of moves, by how fast they are: over the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f + g|² dt
+    /// (accelerometers), √s. Scale nonlinearity, bandwidth, timing and size effect grow so.
+    pub by_motion: f64,
+    /// Of moves, by how long they take, rad/√s or (m/s)/√s.
+    pub by_duration: f64,
+}
+
+/// What the sources of [`ProcessNoise`] act on over a block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseInput {
+    /// Length in s.
+    pub duration: f64,
+    /// `[f_n×]` of the mean specific force, m/s².
+    pub(super) force: Matrix3<f64>,
+    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ where the block is of a move, else zero.
+    pub motion: PerSensor<f64>,
+    /// Length in s where the block is of a move, else zero.
+    pub moving: f64,
+    /// Covariance in `n` that interpolated samples add to the integral of each triad's input, rad² and
+    /// (m/s)².
+    pub(super) bridged: PerSensor<Matrix3<f64>>,
+}
+
+impl NoiseInput {
+    /// Covariance that noise of these densities adds to the navigation errors. Linear in the squares of
+    /// the densities.
+    ///
+    /// White noise through the chain attitude → velocity → position over the block, with the mean
+    /// specific force (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).
+    pub fn covariance(&self, noise: &PerSensor<ProcessNoise>) -> BlockMatrix {
+        let t = self.duration;
+        let mut covariance = BlockMatrix::zeros();
+        if t == 0.0 {
+            return covariance;
+        }
+        let PerSensor { gyro, accel } = PerSensor::from_fn(|sensor| {
+            let noise = noise.get(sensor);
+            let variance = noise.random_walk.powi(2) * t
+                + noise.by_motion.powi(2) * self.motion.get(sensor)
+                + noise.by_duration.powi(2) * self.moving;
+            Matrix3::from_diagonal_element(variance) + self.bridged.get(sensor)
+        });
+        let tilting = self.force * gyro;
+        let both = tilting * self.force.transpose();
+        let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
+            covariance
+                .fixed_view_mut::<3, 3>(3 * row, 3 * column)
+                .copy_from(&m);
+            if row != column {
+                covariance
+                    .fixed_view_mut::<3, 3>(3 * column, 3 * row)
+                    .copy_from(&m.transpose());
+            }
+        };
+        let t2 = t * t;
+        set(0, 0, gyro);
+        set(1, 0, tilting * (t / 2.0));
+        set(2, 0, tilting * (t2 / 6.0));
+        set(1, 1, accel + both * (t2 / 3.0));
+        set(2, 1, accel * (t / 2.0) + both * (t2 * t / 8.0));
+        set(2, 2, accel * (t2 / 3.0) + both * (t2 * t2 / 20.0));
+        covariance
+    }
+}
