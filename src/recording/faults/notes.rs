@@ -23,7 +23,7 @@ pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
             "bridged by interpolation, whose error is in the σ.".to_owned()
         } else {
             format!(
-                "{unbridged} of {} stretches cannot be bridged, and part the record there.",
+                "too long to be bridged at {unbridged} of {} places, where attitude and velocity start anew.",
                 faults.len()
             )
         };
