@@ -222,7 +222,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::super::Options;
-    use super::super::parameters::from_vector;
+    use super::super::linearisation::Linearisation;
+    use super::super::parameters::{from_vector, to_vector};
     use super::*;
     use crate::attitude::exp;
     use crate::imu::TermVector;

@@ -154,6 +154,13 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         run.instrument.prior.get(s).mean(form)
     }));
     let outcome = Outcome {
+        model: crate::calibration::Model::new(&run, &crate::calibration::Options::default()),
+        noise: crate::calibration::NoiseReport {
+            policy: crate::calibration::NoisePolicy::Stated,
+            learnt: false,
+            test: None,
+            sources: Vec::new(),
+        },
         form_test: None,
         estimate: estimate(&truth, &final_sigma, &drawn),
         prior_sigma,

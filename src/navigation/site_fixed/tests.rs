@@ -1,6 +1,7 @@
 use super::*;
 use crate::attitude::log;
 use crate::imu::{InstallationForm, PARAMETERS, TERM_PARAMETERS, Term, TriadVector};
+use crate::navigation::ProcessNoise;
 use crate::recording::Bridge;
 use approx::assert_relative_eq;
 use nalgebra::SVector;

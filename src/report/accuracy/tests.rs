@@ -20,6 +20,7 @@ fn small() -> Accuracy {
         scenario.integrator.period = 0.05;
         let (form, runs, seed) = (InstallationForm::General, 3, 7);
         let study = AccuracyStudy {
+            noise: crate::calibration::NoisePolicy::Stated,
             scenario,
             form,
             unmodelled: Vec::new(),
