@@ -253,6 +253,12 @@ impl Moments {
             }
         });
 
+        // Of no time there is no mean, and no noise either.
+        let mean_force = if t > 0.0 {
+            self.force / t
+        } else {
+            Vector3::zeros()
+        };
         Block {
             state,
             duration: t,
@@ -260,16 +266,9 @@ impl Moments {
             parameters,
             terms: terms.collect(),
             noise: NoiseInput {
-                duration: t,
-                // Of no time there is no mean, and no noise either.
-                force: if t > 0.0 {
-                    skew(self.force / t)
-                } else {
-                    Matrix3::zeros()
-                },
                 motion: self.motion,
                 moving: self.moving,
-                bridged,
+                ..NoiseInput::bridging(t, mean_force, bridged)
             },
         }
     }

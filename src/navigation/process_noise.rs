@@ -1,8 +1,9 @@
 //! White noise that drives the navigation errors over a block.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::block::BlockMatrix;
+use crate::attitude::skew;
 use crate::imu::PerSensor;
 
 /// White noise of a triad as 1σ densities, alike on its three axes. Each of its sources is independent of
@@ -35,6 +36,18 @@ pub struct NoiseInput {
 }
 
 impl NoiseInput {
+    /// Of a block at rest of some length in s, with this mean specific force in m/s² and covariance that
+    /// interpolated samples add.
+    pub fn bridging(duration: f64, force: Vector3<f64>, bridged: PerSensor<Matrix3<f64>>) -> Self {
+        Self {
+            duration,
+            force: skew(force),
+            motion: PerSensor::default(),
+            moving: 0.0,
+            bridged,
+        }
+    }
+
     /// Covariance that noise of these densities adds to the navigation errors. Linear in the squares of
     /// the densities.
     ///

@@ -19,3 +19,6 @@ pub(super) use learn::{Learnt, learn};
 pub use policy::NoisePolicy;
 pub use report::{NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;
+
+#[cfg(test)]
+mod tests;

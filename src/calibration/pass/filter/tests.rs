@@ -29,12 +29,24 @@ fn filter() -> Filter {
     filter
 }
 
+/// Noise with nothing special about it.
+fn noise_input(scale: f64, wave: &dyn Fn(usize, usize) -> f64) -> NoiseInput {
+    let positive = |first: usize| {
+        let root = Matrix3::from_fn(|r, c| wave(first + r, c));
+        root * root.transpose() * scale
+    };
+    let bridged = PerSensor {
+        gyro: positive(0),
+        accel: positive(3),
+    };
+    NoiseInput::bridging(0.1, Vector3::new(0.1, -0.2, 9.8), bridged)
+}
+
 /// A block with nothing special about it.
 fn block(seed: f64) -> Block {
     let wave = |row: usize, column: usize| {
         ((seed + 1.0) * (1.0 + 1.7 * row as f64 + 0.9 * (column * column) as f64)).sin()
     };
-    let bridged = Matrix3::from_fn(|r, c| 1e-4 * wave(r, c));
     Block {
         state: State::at_rest(Matrix3::identity()),
         duration: 0.1,
@@ -44,16 +56,7 @@ fn block(seed: f64) -> Block {
             accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
         },
         terms: Vec::new(),
-        noise: NoiseInput {
-            duration: 0.1,
-            force: Matrix3::from_fn(|r, c| 9.8 * wave(c, r)),
-            motion: PerSensor {
-                gyro: 1e-3,
-                accel: 2e-2,
-            },
-            moving: 0.1,
-            bridged: PerSensor::from_fn(|_| bridged * bridged.transpose()),
-        },
+        noise: noise_input(1e-8, &wave),
     }
 }
 
@@ -209,7 +212,7 @@ fn turning(seed: f64) -> Block {
             .fixed_view_mut::<3, 3>(row, column)
             .copy_from(&wave.fixed_view::<3, 3>(row, column));
     }
-    block.noise.bridged = PerSensor::from_fn(|_| Matrix3::identity() * 1e-16);
+    block.noise = noise_input(1e-16, &|row, column| (seed + (row + column) as f64).sin());
     block
 }
 
