@@ -123,14 +123,18 @@ impl Filter {
         }
         for (j, row) in rows.iter_mut().enumerate() {
             let p = &p[n * j..n * j + phi.len()];
+            let mut sum = [0.0; NAVIGATION];
             for (column, p) in phi.iter().zip(p) {
-                add_scaled(row, column, *p);
+                add_scaled(&mut sum, column, *p);
             }
+            *row = sum;
         }
-        for (column, row) in phi.iter().zip(&rows) {
-            for (k, sum) in corner.iter_mut().enumerate() {
-                add_scaled(sum, row, column[k]);
+        for (k, row_of_corner) in corner.iter_mut().enumerate() {
+            let mut sum = [0.0; NAVIGATION];
+            for (column, row) in phi.iter().zip(&rows) {
+                add_scaled(&mut sum, row, column[k]);
             }
+            *row_of_corner = sum;
         }
         self.x.as_mut_slice()[..NAVIGATION].copy_from_slice(&x);
         for (constant, row) in rows.iter().enumerate().skip(NAVIGATION) {
