@@ -145,7 +145,8 @@ fn better(
 }
 
 fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = problem.notes().collect();
+    let notes = problem.notes().cloned();
+    let mut findings: Vec<Finding> = notes.map(|note| Finding::Recording { note }).collect();
     if !outcome.converged {
         let last = outcome.passes.last();
         findings.push(Finding::NotConverged {

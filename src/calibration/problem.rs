@@ -5,7 +5,6 @@ use std::sync::Arc;
 use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::finding::Finding;
 use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
@@ -141,10 +140,9 @@ impl<'a> Problem<'a> {
     }
 
     /// What the readers of the runs' files found.
-    pub(super) fn notes(&self) -> impl Iterator<Item = Finding> + '_ {
+    pub(super) fn notes(&self) -> impl Iterator<Item = &String> {
         let runs = std::iter::once(&self.run).chain(&self.others);
-        let notes = runs.flat_map(|run| &run.recording.notes);
-        notes.map(|note| Finding::Recording { note: note.clone() })
+        runs.flat_map(|run| &run.recording.notes)
     }
 
     /// The dwells of all runs.

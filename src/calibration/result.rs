@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::ops::Index;
 
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::noise::NoiseReport;
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
@@ -83,8 +84,12 @@ pub struct Calibration {
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<DirectionRecord>,
-    /// The noise that was used.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// The noise that was used; none where a file states noise of another kind, as a truth may.
+    #[serde(
+        default,
+        deserialize_with = "if_known",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub noise: Option<NoiseRecord>,
     /// What must be known before using the values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -118,6 +123,14 @@ pub struct NoiseRecord {
     /// `[imu.noise]` of what was learnt, to be pasted into `run.toml`; none where nothing was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run_toml: Option<String>,
+}
+
+/// A value of this kind, or none.
+fn if_known<'de, T: DeserializeOwned, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<T>, D::Error> {
+    let value = serde_json::Value::deserialize(from)?;
+    Ok(serde_json::from_value(value).ok())
 }
 
 /// A constant beside the parameters of the triads.
