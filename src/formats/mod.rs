@@ -1,6 +1,6 @@
 //! Files: runs in, calibrations in and out, what other programs read.
 //!
-//! A [`Run`] read here is in SI, on right-front-up body axes and in normalised outputs (see
+//! A [`crate::run::Run`] read here is in SI, on right-front-up body axes and in normalised outputs (see
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
 mod axes;

@@ -1,7 +1,7 @@
 //! What a result says, and how it is shown.
 //!
 //! A result fills a [`Document`]: facts, tables, plots, findings, and its figures by name. Three renderers turn
-//! any document into text ([`terminal`]), a page with figures ([`write`]) or JSON ([`json`]); they know nothing of
+//! any document into text ([`terminal`]), a page with figures ([`write()`]) or JSON ([`json`]); they know nothing of
 //! calibration. A plot is a value, too ([`plot`]), and one renderer draws them all ([`svg`]).
 //!
 //! Nothing is estimated here. What is worked out is what showing needs: differences, units, extremes.

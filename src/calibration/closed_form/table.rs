@@ -16,7 +16,7 @@ const ALONG_AXIS: f64 = 0.9998;
 /// The same from some dwells of the problem's first run with attitudes of a table, or parts of them.
 ///
 /// # Errors
-/// As [`six_position`], and without a table.
+/// As [`super::six_position`], and without a table.
 pub fn six_position_of(
     problem: &Problem,
     dwells: &[Dwell],
