@@ -53,7 +53,7 @@ pub(super) fn data(accuracy: &Accuracy) -> Value {
     });
     data["blocks"] = Value::Object(terms.collect::<Map<_, _>>());
     let effects: Vec<BlockRecord> = accuracy.effects.iter().map(BlockRecord::from).collect();
-    data["test_error_terms"] = json!(effects);
+    data["block_effects"] = json!(effects);
     data["navigation"] = navigation(accuracy);
     data
 }
