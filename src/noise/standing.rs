@@ -94,12 +94,7 @@ impl Stretch {
         let Some(segment) = longest else {
             return Err(StretchError::UnknownLabel {
                 label: label.to_owned(),
-                labels: run
-                    .recording
-                    .segments
-                    .iter()
-                    .map(|s| s.label.clone())
-                    .collect(),
+                labels: run.recording.labels(),
             });
         };
         let which = match of_label().count() {

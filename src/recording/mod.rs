@@ -40,6 +40,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Labels of the segments, in their order in the record; one that comes back stands more than once.
+    pub(crate) fn labels(&self) -> Vec<String> {
+        self.segments.iter().map(|s| s.label.clone()).collect()
+    }
+
     /// A recording of samples that follow one another without a gap: time in s at which the first
     /// begins, length of each in s, integrals of the normalised output (see [`crate::imu::Nominal`]) over
     /// each, rad and m/s along right-front-up.

@@ -67,12 +67,7 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
     }
     let undetermined = |sensor| CalibrationError::TooFewSections {
         sensor,
-        labels: run
-            .recording
-            .segments
-            .iter()
-            .map(|s| s.label.clone())
-            .collect(),
+        labels: run.recording.labels(),
     };
     let estimate = both_triads(&positions, model.form).map_err(undetermined)?;
     let mut findings = remarks(model, &estimate, Reference::Labels);

@@ -106,22 +106,26 @@ fn a_file_of_numbers_alone_is_told_by_them() {
     );
 }
 
+/// Accels, then gyros, as unsigned 16-bit registers of a data sheet's scale.
+fn registers([gx, gy, gz, ax, ay, az]: [f64; 6], separator: &str) -> String {
+    let gyro = |x: f64| (32_768.0 + x.to_degrees() * 65.5).round();
+    let accel = |x: f64| (32_768.0 + x / 9.80665 * 4096.0).round();
+    [
+        accel(ax),
+        accel(ay),
+        accel(az),
+        gyro(gx),
+        gyro(gy),
+        gyro(gz),
+    ]
+    .map(|register| register.to_string())
+    .join(separator)
+}
+
 #[test]
 fn unsigned_registers_have_their_zero_in_the_middle_and_a_data_sheets_scale() {
     let text = draft("n;AccX;AccY;AccZ;GyrX;GyrY;GyrZ\n", |k, v| {
-        let deg = 180.0 / std::f64::consts::PI;
-        let gyro = |x: f64| (32_768.0 + x * deg * 65.5).round();
-        let accel = |x: f64| (32_768.0 + x / 9.80665 * 4096.0).round();
-        let [gx, gy, gz, ax, ay, az] = v;
-        format!(
-            "{k};{};{};{};{};{};{}",
-            accel(ax),
-            accel(ay),
-            accel(az),
-            gyro(gx),
-            gyro(gy),
-            gyro(gz)
-        )
+        format!("{k};{}", registers(v, ";"))
     });
     has(
         &text,
@@ -176,21 +180,7 @@ fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
 
 #[test]
 fn registers_without_names_and_time_are_told_by_their_numbers() {
-    let text = draft("", |_, v| {
-        let deg = 180.0 / std::f64::consts::PI;
-        let gyro = |x: f64| (32_768.0 + x * deg * 65.5).round();
-        let accel = |x: f64| (32_768.0 + x / 9.80665 * 4096.0).round();
-        let [gx, gy, gz, ax, ay, az] = v;
-        format!(
-            "{} {} {} {} {} {}",
-            accel(ax),
-            accel(ay),
-            accel(az),
-            gyro(gx),
-            gyro(gy),
-            gyro(gz)
-        )
-    });
+    let text = draft("", |_, v| registers(v, " "));
     has(
         &text,
         &[
