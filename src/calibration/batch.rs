@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use faer::{Mat, MatRef, Side};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::curvature::curvature;
 use super::error::CalibrationError;
@@ -30,6 +30,7 @@ use super::schedule::AtRest;
 use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
 use crate::imu::{PerSensor, Triad};
 use crate::navigation::{Block, BlockMatrix, Navigator, ProcessNoise, State};
+use crate::run::Aiding;
 
 /// The attitude error at the first sample is the initial one to within this, rad: a number so small
 /// that it is none, where a row needs a σ.
@@ -86,6 +87,8 @@ struct Batch<'a> {
     /// The accelerometers where the outcome's last pass linearised.
     accel: Triad,
     navigator: Navigator<'a>,
+    /// The attitude that the dwell holds without a table.
+    held: Matrix3<f64>,
     information: Information,
 }
 
@@ -111,6 +114,7 @@ impl<'a> Batch<'a> {
             stretch,
             accel: at.triads.accel,
             navigator,
+            held: *attitude,
             information: Information::new(
                 model,
                 &stretch.start(prior, attitude),
@@ -140,12 +144,17 @@ impl<'a> Batch<'a> {
         }
         self.information.refer(&self.navigator.state, &tied);
         self.navigator.state = tied;
+        let held = model.aiding == Aiding::Velocity;
+        if at_rest.first && held {
+            self.information.hold_attitude();
+            self.held = tied.attitude;
+        }
 
         let end = samples.end;
         let block = self.navigator.advance_standing(samples);
         self.advance(&block, end)?;
         let state = &block.state;
-        if new_position {
+        if new_position && !held {
             self.information.new_table_position(model.position_sigma);
         }
         let mut rows = Vec::new();
@@ -163,49 +172,60 @@ impl<'a> Batch<'a> {
             let variance = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
             rows.push((ATTITUDE, difference, variance));
         }
+        if held && accepted() {
+            let difference = -log(&(state.attitude * self.held.transpose()));
+            let variance = self.stretch.attitude_variance(model);
+            rows.push((ATTITUDE, difference, variance));
+        }
         self.information.observe(&rows);
         Ok(())
     }
 }
 
 /// `[R | z]`: the unknowns x obey `R x = z` but for independent errors of unit variance, R upper
-/// triangular. Unknowns in order: table (three, none without position error), navigation errors now,
+/// triangular. Unknowns in order: attitude of the dwell (three, none of a table without position error),
+/// navigation errors now,
 /// parameter errors that are estimated, in units of their prior σ, and initial attitude error.
 struct Information {
     rows: Mat<f64>,
-    table: usize,
+    dwell: usize,
     /// Index and prior σ of each estimated parameter.
     parameters: Vec<(usize, f64)>,
 }
 
 impl Information {
     fn new(model: &Model, start: &Start, mean: &ParameterVector) -> Self {
-        let sigma = model.prior_sigma.iter().copied().enumerate();
-        let parameters: Vec<_> = sigma.filter(|&(_, sigma)| sigma > 0.0).collect();
-        let table = if model.position_sigma > 0.0 { 3 } else { 0 };
-        let initial = table + NAVIGATION + parameters.len();
+        let priors = model.prior_sigma.iter().copied().enumerate();
+        let parameters: Vec<_> = priors.filter(|&(_, sigma)| sigma > 0.0).collect();
+        let sigma = match model.aiding {
+            Aiding::Table => model.position_sigma,
+            // The first dwell begins with its own.
+            Aiding::Velocity => 1.0,
+        };
+        let dwell = if sigma > 0.0 { 3 } else { 0 };
+        let initial = dwell + NAVIGATION + parameters.len();
         let z = initial + 3;
         let mut rows = Mat::zeros(z, z + 1);
-        for axis in 0..table {
-            rows[(axis, axis)] = 1.0 / model.position_sigma;
+        for axis in 0..dwell {
+            rows[(axis, axis)] = 1.0 / sigma;
         }
         for axis in 0..3 {
             let mut know = |index: usize, sigma: f64| rows[(index, index)] = 1.0 / sigma;
-            know(table + ATTITUDE + axis, SAME);
-            know(table + VELOCITY + axis, start.velocity_sigma);
-            know(table + POSITION + axis, start.position_sigma);
+            know(dwell + ATTITUDE + axis, SAME);
+            know(dwell + VELOCITY + axis, start.velocity_sigma);
+            know(dwell + POSITION + axis, start.position_sigma);
             know(initial + axis, start.attitude_sigma[axis]);
-            rows[(table + ATTITUDE + axis, initial + axis)] = -1.0 / SAME;
+            rows[(dwell + ATTITUDE + axis, initial + axis)] = -1.0 / SAME;
             rows[(initial + axis, z)] = start.attitude[axis] / start.attitude_sigma[axis];
         }
         for (n, &(index, sigma)) in parameters.iter().enumerate() {
-            let unknown = table + NAVIGATION + n;
+            let unknown = dwell + NAVIGATION + n;
             rows[(unknown, unknown)] = 1.0;
             rows[(unknown, z)] = mean[index] / sigma;
         }
         Self {
             rows,
-            table,
+            dwell,
             parameters,
         }
     }
@@ -262,14 +282,23 @@ impl Information {
     /// The error of the table's position stands first: it leaves with its rows, another takes its
     /// place.
     fn new_table_position(&mut self, sigma: f64) {
-        for row in 0..self.table {
+        for row in 0..self.dwell {
             self.rows.row_mut(row).fill(0.0);
             self.rows[(row, row)] = 1.0 / sigma;
         }
     }
 
+    /// The attitude of now is what the dwell holds: the error of the one before it leaves with its rows.
+    fn hold_attitude(&mut self) {
+        for axis in 0..self.dwell {
+            self.rows.row_mut(axis).fill(0.0);
+            self.rows[(axis, axis)] = 1.0 / SAME;
+            self.rows[(axis, self.dwell + ATTITUDE + axis)] = -1.0 / SAME;
+        }
+    }
+
     /// Adds observed differences of three navigation errors from a first one on, each with its
-    /// variance per axis. An attitude is seen against the table's error.
+    /// variance per axis. An attitude is observed against that of the dwell.
     fn observe(&mut self, observed: &[(usize, Vector3<f64>, f64)]) {
         let n = self.unknowns();
         let mut stack = Mat::zeros(n + 3 * observed.len(), n + 1);
@@ -278,8 +307,8 @@ impl Information {
             let weight = 1.0 / variance.sqrt();
             for axis in 0..3 {
                 let row = n + 3 * k + axis;
-                stack[(row, self.table + first + axis)] = weight;
-                if *first == ATTITUDE && self.table > 0 {
+                stack[(row, self.dwell + first + axis)] = weight;
+                if *first == ATTITUDE && self.dwell > 0 {
                     stack[(row, axis)] = -weight;
                 }
                 stack[(row, n)] = weight * difference[axis];
@@ -304,7 +333,7 @@ impl Information {
     /// to more than the sum of their rotation vectors, so the sum is taken at the estimate so far.
     fn refer(&mut self, from: &State, to: &State) {
         let estimate = self.solution();
-        let error = Vector3::from_fn(|axis, _| estimate[(self.table + ATTITUDE + axis, 0)]);
+        let error = Vector3::from_fn(|axis, _| estimate[(self.dwell + ATTITUDE + axis, 0)]);
         let turned = from_tilt_and_heading(&error) * from.attitude * to.attitude.transpose();
         let mut shift = Mat::zeros(NAVIGATION, 1);
         for (first, by) in [
@@ -324,11 +353,11 @@ impl Information {
 
     /// Columns of three navigation errors.
     fn at(&self, first: usize) -> Range<usize> {
-        self.table + first..self.table + first + 3
+        self.dwell + first..self.dwell + first + 3
     }
 
     fn navigation(&self) -> Range<usize> {
-        self.table..self.table + NAVIGATION
+        self.dwell..self.dwell + NAVIGATION
     }
 
     /// The estimate of all unknowns, one column.

@@ -168,10 +168,7 @@ impl fmt::Display for Finding {
                 "Innovations of {} are {:.2} times as large as their σ says (NIS {nis:.2}): noise \
                  figures or model do not fit the data, and the σ of the parameters are as doubtful. \
                  --noise auto finds the noise that the record shows.",
-                match observation {
-                    Observation::Velocity => "velocity",
-                    Observation::Table => "table attitude",
-                },
+                observation.name(),
                 nis.sqrt()
             ),
             Self::NoiseLearnt {

@@ -8,7 +8,7 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
-use super::innovation::{Observation, consistency};
+use super::innovation::{Nis, consistency};
 use super::iterations::{Iterated, iterate, summary};
 use super::linearisation::{AttitudePrior, singular};
 use super::noise::{Learnt, learn};
@@ -85,7 +85,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         velocity_sigma: problem
             .stretches()
             .first()
-            .map_or(0.0, |s| model.velocity_sigma.unwrap_or(s.velocity_sigma)),
+            .map_or(0.0, |s| s.stillness(model, Sensor::Accel)),
         model: model.clone(),
         noise: report,
         passes,
@@ -207,10 +207,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             observations: outcome.innovations.len(),
         });
     }
-    for (observation, nis) in [
-        (Observation::Velocity, outcome.consistency.velocity.mean),
-        (Observation::Table, outcome.consistency.table.mean),
-    ] {
+    for (observation, Nis { mean: nis, .. }) in outcome.consistency.kinds() {
         if (nis - 1.0).abs() > DOUBTFUL {
             findings.push(Finding::Inconsistent { observation, nis });
         }

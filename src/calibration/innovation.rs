@@ -12,6 +12,22 @@ pub enum Observation {
     Velocity,
     /// Attitude of the table.
     Table,
+    /// Attitude that does not change at standstill, without a table.
+    Attitude,
+}
+
+impl Observation {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Velocity, Self::Table, Self::Attitude];
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Table => "table attitude",
+            Self::Attitude => "attitude at standstill",
+        }
+    }
 }
 
 /// The innovation of one observation.
@@ -43,6 +59,17 @@ pub struct Consistency {
     pub velocity: Nis,
     /// Attitude of the table.
     pub table: Nis,
+    /// Attitude that does not change at standstill, without a table.
+    pub attitude: Nis,
+}
+
+impl Consistency {
+    /// The kinds of observation that there are.
+    pub fn kinds(&self) -> impl Iterator<Item = (Observation, Nis)> {
+        let each = [self.velocity, self.table, self.attitude];
+        let all = Observation::ALL.into_iter().zip(each);
+        all.filter(|(_, nis)| nis.count > 0)
+    }
 }
 
 /// Mean of normalised innovations squared.
@@ -70,9 +97,10 @@ pub(super) fn consistency(innovations: &[Innovation]) -> Consistency {
             .map(|i| i.whitened))
     };
     Consistency {
-        all: of(&[Observation::Velocity, Observation::Table]),
+        all: of(&Observation::ALL),
         velocity: of(&[Observation::Velocity]),
         table: of(&[Observation::Table]),
+        attitude: of(&[Observation::Attitude]),
     }
 }
 

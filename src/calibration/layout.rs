@@ -11,6 +11,7 @@
 //! | gravity | 1 | true − stated magnitude of gravity, m/s²; where it has a σ |
 //! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
+//! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
 //! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
 //! | table axes | one for each tilt | tilts of the table's axes across themselves, see [`crate::turntable::tilts`], rad |
@@ -20,6 +21,7 @@ use std::ops::Range;
 use super::model::Model;
 use super::parameters::PARAMETERS;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
+use crate::run::Aiding;
 use crate::turntable::AXIS_TILTS;
 
 /// Attitude error φ.
@@ -44,6 +46,8 @@ pub(super) struct Layout {
     varying: Vec<(Sensor, usize)>,
     /// Whether the table's position error is a state.
     table: bool,
+    /// Whether the turn at rest is.
+    turn: bool,
     base: bool,
     /// The tilt that each state is.
     tilts: Vec<usize>,
@@ -65,6 +69,7 @@ impl Layout {
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
                 .collect(),
             table: model.position_sigma > 0.0,
+            turn: model.aiding == Aiding::Velocity,
             base: model.geometry.base.amax() > 0.0,
             tilts: (0..AXIS_TILTS)
                 .filter(|&k| model.geometry.axes[k] > 0.0)
@@ -100,17 +105,22 @@ impl Layout {
 
     /// The states that drive the navigation errors: parameters, error terms, gravity, varying biases.
     pub fn driving(&self) -> Range<usize> {
-        NAVIGATION..self.table_begin()
+        NAVIGATION..self.dwell_begin()
     }
 
     /// Error of the table's position, if it is a state.
     pub fn table_position(&self) -> Option<usize> {
-        self.table.then(|| self.table_begin())
+        self.table.then(|| self.dwell_begin())
+    }
+
+    /// What the attitude error has become more since the body came to rest, if it is a state.
+    pub fn turn_at_rest(&self) -> Option<usize> {
+        self.turn.then(|| self.dwell_begin())
     }
 
     /// Attitude error at the first sample of the stretch.
     pub fn initial_attitude(&self) -> usize {
-        self.table_begin() + 3 * usize::from(self.table)
+        self.dwell_begin() + 3 * usize::from(self.table || self.turn)
     }
 
     /// Error of the table's base, if it is a state.
@@ -141,7 +151,7 @@ impl Layout {
         self.gravity_begin() + usize::from(self.gravity)
     }
 
-    fn table_begin(&self) -> usize {
+    fn dwell_begin(&self) -> usize {
         self.varying_begin() + self.varying.len()
     }
 
@@ -172,8 +182,8 @@ mod tests {
         assert_eq!(with(ErrorTerm::Instrument(Term::SizeEffect)), 6);
         assert_eq!(with(ErrorTerm::GaussMarkovBias), 6);
         assert_eq!(with(ErrorTerm::TableBase), 3);
-        // Three parameters fix the body frame, and there is no table.
-        let velocity = size(Options::default().aiding(crate::run::Aiding::Velocity));
-        assert_eq!(velocity, 9 + 21 + 3);
+        // Three parameters fix the body frame.
+        let velocity = size(Options::default().aiding(Aiding::Velocity));
+        assert_eq!(velocity, 9 + 21 + 3 + 3);
     }
 }

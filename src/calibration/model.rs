@@ -41,8 +41,9 @@ pub struct Model {
     pub noise: PerSensor<Noise>,
     /// What moves add to it.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// White 1σ of the velocity at standstill, m/s; none: in each stretch what its run states or shows.
-    pub velocity_sigma: Option<f64>,
+    /// White 1σ at standstill of what each triad's output adds up to, attitude in rad and velocity in m/s;
+    /// none: in each stretch what its run states or shows.
+    pub stillness: PerSensor<Option<f64>>,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
@@ -80,7 +81,7 @@ impl Model {
             prior_sigma: ParameterVector::zeros(),
             noise: run.instrument.noise,
             motion_noise: PerSensor::default(),
-            velocity_sigma: None,
+            stillness: PerSensor::default(),
             term_sigma: run.instrument.term_sigma,
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
@@ -113,9 +114,10 @@ impl Model {
         })
     }
 
-    /// Sets the variance of the velocity at standstill over the least that is ever taken, m²/s².
-    pub(super) fn set_velocity_excess(&mut self, variance: f64) {
-        self.velocity_sigma = Some((variance + FLOOR.powi(2)).sqrt());
+    /// Sets the variance at standstill over the least that is ever taken, rad² or m²/s².
+    pub(super) fn set_unrest(&mut self, sensor: Sensor, variance: f64) {
+        let sigma = (variance + FLOOR.get(sensor).powi(2)).sqrt();
+        *self.stillness.get_mut(sensor) = Some(sigma);
     }
 
     /// The same with the noise of another model.
@@ -123,7 +125,7 @@ impl Model {
         Self {
             noise: other.noise,
             motion_noise: other.motion_noise,
-            velocity_sigma: other.velocity_sigma,
+            stillness: other.stillness,
             position_sigma: other.position_sigma,
             reading_sigma: other.reading_sigma,
             ..self.clone()

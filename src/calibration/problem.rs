@@ -9,9 +9,9 @@ use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
 use super::schedule::{Step, first_reading, steps};
-use super::standstill::{FLOOR, velocity_sigma};
+use super::standstill::{FLOOR, stillness};
 use crate::attitude::to_tilt_and_heading;
-use crate::imu::PerSensor;
+use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
 use crate::run::{Dwell, Run};
 
@@ -43,8 +43,8 @@ pub(super) struct Stretch<'a> {
     pub dwells: Vec<Dwell>,
     pub steps: Vec<Step>,
     pub variance: Variance,
-    /// White 1σ of the velocity at standstill as the run states or shows it, m/s.
-    pub velocity_sigma: f64,
+    /// White 1σ at standstill as the run states or shows it: attitude in rad, velocity in m/s.
+    pub stillness: PerSensor<f64>,
 }
 
 /// Variance of each observation per axis.
@@ -108,10 +108,10 @@ impl<'a> Problem<'a> {
                 run,
                 table,
                 recording,
-                velocity_sigma,
+                stillness,
                 ..
             } = *stretch;
-            Stretch::new(run, table, recording, dwells, velocity_sigma)
+            Stretch::new(run, table, recording, dwells, stillness)
         });
         Self {
             stretches: stretches.collect(),
@@ -123,12 +123,12 @@ impl<'a> Problem<'a> {
         &self.stretches
     }
 
-    /// Variance of the velocity at standstill over the least that is ever taken, m²/s²; of several
-    /// stretches the mean.
-    pub(super) fn velocity_excess(&self) -> f64 {
+    /// Variance at standstill over the least that is ever taken, of attitude in rad² (gyros) or velocity in
+    /// m²/s²; of several stretches the mean.
+    pub(super) fn unrest(&self, sensor: Sensor) -> f64 {
         let of = |stretch: &Stretch| {
-            let sigma = self.model.velocity_sigma.unwrap_or(stretch.velocity_sigma);
-            (sigma.powi(2) - FLOOR.powi(2)).max(0.0)
+            let sigma = stretch.stillness(&self.model, sensor);
+            (sigma.powi(2) - FLOOR.get(sensor).powi(2)).max(0.0)
         };
         let sum: f64 = self.stretches.iter().map(of).sum();
         sum / self.stretches.len().max(1) as f64
@@ -165,7 +165,7 @@ impl<'a> Stretch<'a> {
         table: Option<&'a TableLog>,
         recording: usize,
         dwells: Vec<Dwell>,
-        velocity_sigma: f64,
+        stillness: PerSensor<f64>,
     ) -> Self {
         let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
         let PerSensor { gyro, accel } = run.recording.imu.pulse;
@@ -180,14 +180,24 @@ impl<'a> Stretch<'a> {
             table,
             recording,
             dwells,
-            velocity_sigma,
+            stillness,
         }
     }
 
     /// Variance of an observation of velocity per axis, m²/s².
     pub fn velocity_variance(&self, model: &Model) -> f64 {
-        let sigma = model.velocity_sigma.unwrap_or(self.velocity_sigma);
-        sigma.powi(2) + self.variance.pulse
+        self.stillness(model, Sensor::Accel).powi(2) + self.variance.pulse
+    }
+
+    /// Variance per axis of an observation of the attitude that a dwell without a table holds, rad².
+    pub fn attitude_variance(&self, model: &Model) -> f64 {
+        self.stillness(model, Sensor::Gyro).powi(2) + self.variance.attitude
+    }
+
+    /// White 1σ at standstill that the filter uses, of attitude in rad (gyros) or velocity in m/s.
+    pub fn stillness(&self, model: &Model, sensor: Sensor) -> f64 {
+        let of_model = *model.stillness.get(sensor);
+        of_model.unwrap_or(*self.stillness.get(sensor))
     }
 
     /// What the table says of the attitude at its first sample, where it says anything.
@@ -211,13 +221,13 @@ impl<'a> Stretch<'a> {
 fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'a>> {
     let table = run.observed_table(model.aiding);
     let dwells = run.dwells(model.aiding);
-    let velocity_sigma = velocity_sigma(run, &dwells);
+    let stillness = stillness(run, &dwells);
     let imu = &run.recording.imu;
     let unbroken = |before: &Dwell, after: &Dwell| {
         imu.unbroken(&(before.samples.end - 1..after.samples.start + 1))
     };
     let parts = dwells.chunk_by(unbroken);
     parts
-        .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), velocity_sigma))
+        .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), stillness))
         .collect()
 }

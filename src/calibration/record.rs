@@ -279,6 +279,7 @@ fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
         all,
         velocity,
         table,
+        attitude,
     } = consistency;
     let of = |nis: &Nis| NisRecord {
         nis: nis.mean,
@@ -289,6 +290,7 @@ fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
         all: of(all),
         velocity: some(velocity),
         table: some(table),
+        attitude: some(attitude),
     }
 }
 

@@ -185,6 +185,9 @@ pub struct ConsistencyRecord {
     /// Of the table's attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
+    /// Of the attitude that does not change at standstill, without a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude: Option<NisRecord>,
 }
 
 /// Mean of normalised innovations squared with its 95 % interval; one if σ are true.

@@ -1,33 +1,47 @@
-//! How still the IMU is while the table stands.
+//! How still the IMU is while the table is at rest.
+
+use nalgebra::Vector3;
 
 use super::schedule::step_length;
+use crate::imu::{PerSensor, Sensor};
 use crate::run::{Dwell, Run};
 
-/// Below this the velocity at standstill is never trusted, m/s. Small beside what random walk makes of
-/// a tenth of a second in the best of instruments, lest the innovations be smaller than they claim.
-pub(super) const FLOOR: f64 = 1e-7;
+/// Below this neither velocity, m/s, nor attitude, rad, at standstill is ever trusted. Small beside what
+/// random walk makes of a tenth of a second in the best of instruments, lest the innovations be smaller
+/// than they claim.
+pub(super) const FLOOR: PerSensor<f64> = PerSensor {
+    gyro: 1e-8,
+    accel: 1e-7,
+};
 /// Excess below this many of its own standard errors is chance.
 const SIGNIFICANT: f64 = 3.0;
 
-/// White 1σ in m/s of the velocity at standstill, beyond random walk and pulses.
-///
-/// Neighbouring velocity increments share the velocity at their common border, so its variance is
+/// White 1σ at standstill of what each triad's output adds up to, beyond random walk and pulses: attitude
+/// in rad, velocity in m/s. As the run states it, else as its dwells show it.
+pub(super) fn stillness(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
+    PerSensor::from_fn(|sensor| {
+        let floor = *FLOOR.get(sensor);
+        let given = run.standstill.sigma.get(sensor);
+        given.map_or_else(|| shown(run, dwells, sensor), |given| given.max(floor))
+    })
+}
+
+/// Neighbouring increments share the attitude or velocity at their common border, so its variance is
 /// minus their covariance; random walk has none.
-pub(super) fn velocity_sigma(run: &Run, dwells: &[Dwell]) -> f64 {
-    if let Some(given) = run.standstill.velocity_sigma {
-        return given.max(FLOOR);
-    }
-    let stretch = step_length(run.recording.imu.period);
+fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
+    let imu = &run.recording.imu;
+    let (samples, floor) = (imu.of(sensor), *FLOOR.get(sensor));
+    let stretch = step_length(imu.period);
     let (mut covariance, mut variance, mut pairs) = (0.0, 0.0, 0usize);
     for dwell in dwells {
-        let sums: Vec<_> = run.recording.imu.accel[dwell.samples.clone()]
+        let sums: Vec<_> = samples[dwell.samples.clone()]
             .chunks_exact(stretch)
-            .map(|chunk| chunk.iter().sum::<nalgebra::Vector3<f64>>())
+            .map(|chunk| chunk.iter().sum::<Vector3<f64>>())
             .collect();
         if sums.len() < 3 {
             continue;
         }
-        let mean = sums.iter().sum::<nalgebra::Vector3<f64>>() / sums.len() as f64;
+        let mean = sums.iter().sum::<Vector3<f64>>() / sums.len() as f64;
         for pair in sums.windows(2) {
             covariance += (pair[0] - mean).dot(&(pair[1] - mean));
             variance += (pair[0] - mean).norm_squared();
@@ -35,14 +49,16 @@ pub(super) fn velocity_sigma(run: &Run, dwells: &[Dwell]) -> f64 {
         }
     }
     if pairs == 0 {
-        return FLOOR;
+        return floor;
     }
     let (covariance, variance) = (covariance / pairs as f64, variance / pairs as f64);
-    let excess = -covariance - run.recording.imu.pulse.accel.powi(2) / 12.0;
-    if excess > SIGNIFICANT * variance / (pairs as f64).sqrt() {
-        excess.sqrt().max(FLOOR)
+    let pulse = imu.pulse.get(sensor).powi(2) / 12.0;
+    let excess = -covariance - pulse;
+    // At a constant rate the fractions left over may alternate, which is four times as much as at random.
+    if excess > SIGNIFICANT * variance / (pairs as f64).sqrt() + 3.0 * pulse {
+        excess.sqrt().max(floor)
     } else {
-        FLOOR
+        floor
     }
 }
 
@@ -51,7 +67,6 @@ mod tests {
     use super::*;
     use crate::imu::Output;
     use crate::simulation::Scenario;
-    use nalgebra::Vector3;
 
     #[test]
     fn random_walk_and_pulses_alone_are_no_unrest() {
@@ -59,7 +74,7 @@ mod tests {
         for output in [Output::Pulse, Output::Increment] {
             scenario.output = output;
             let run = scenario.simulate(1, 0).unwrap().run;
-            assert_eq!(velocity_sigma(&run, &run.dwells(run.aiding())), FLOOR);
+            assert_eq!(stillness(&run, &run.dwells(run.aiding())), FLOOR);
         }
     }
 
@@ -81,7 +96,7 @@ mod tests {
         for k in 0..run.recording.imu.accel.len() {
             run.recording.imu.accel[k] += velocity(k + 1) - velocity(k);
         }
-        let found = velocity_sigma(&run, &run.dwells(run.aiding()));
+        let found = stillness(&run, &run.dwells(run.aiding())).accel;
         assert!((found / sigma - 1.0).abs() < 0.1, "{found}");
     }
 }

@@ -11,7 +11,7 @@ use super::table_log::TableLogFile;
 use crate::earth::Site;
 use crate::recording::{Recording, faults};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::units::{DEGREE, MILLIGAL};
+use crate::units::{ARCSEC, DEGREE, MILLIGAL};
 
 /// The version of the format of `run.toml`.
 pub(super) const FORMAT: &str = "turncal-run/1";
@@ -174,9 +174,19 @@ fn labels(top: &Fields, directory: &Path) -> Result<Option<(PathBuf, f64)>, File
 
 fn standstill(top: &Fields) -> Result<Standstill, FileError> {
     let mut standstill = Standstill::default();
-    if let Some(fields) = top.table("standstill", &["velocity_sigma_m_s", "position_sigma_m"])? {
+    if let Some(fields) = top.table(
+        "standstill",
+        &[
+            "velocity_sigma_m_s",
+            "attitude_sigma_arcsec",
+            "position_sigma_m",
+        ],
+    )? {
         if let Some(field) = fields.get("velocity_sigma_m_s") {
-            standstill.velocity_sigma = Some(field.positive()?);
+            standstill.sigma.accel = Some(field.positive()?);
+        }
+        if let Some(field) = fields.get("attitude_sigma_arcsec") {
+            standstill.sigma.gyro = Some(field.positive()? * ARCSEC);
         }
         if let Some(field) = fields.get("position_sigma_m") {
             standstill.position_sigma = field.positive()?;

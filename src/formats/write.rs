@@ -241,7 +241,11 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
         "# how still the IMU is while the table is at rest\n[standstill]\nposition_sigma_m = {:?}\n",
         run.standstill.position_sigma
     ));
-    if let Some(sigma) = run.standstill.velocity_sigma {
+    if let Some(sigma) = run.standstill.sigma.gyro {
+        let sigma = short(sigma / ARCSEC);
+        sections.push(format!("attitude_sigma_arcsec = {sigma:?}\n"));
+    }
+    if let Some(sigma) = run.standstill.sigma.accel {
         sections.push(format!("velocity_sigma_m_s = {sigma:?}\n"));
     }
     if run.recording.table.is_some() {

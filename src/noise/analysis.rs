@@ -69,10 +69,7 @@ impl NoiseAnalysis {
         let sizes = cluster_sizes(stretch.samples.len());
         let clusters = Clusters::new(stretch.samples.len(), period, sizes);
         let triads = PerSensor::from_fn(|sensor| {
-            let all = match sensor {
-                Sensor::Gyro => &run.recording.imu.gyro,
-                Sensor::Accel => &run.recording.imu.accel,
-            };
+            let all = run.recording.imu.of(sensor);
             let samples = all.get(stretch.samples.clone()).unwrap_or_default();
             TriadNoise::new(samples, period, &clusters)
         });

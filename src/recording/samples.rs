@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::{Bridge, Fault, LogFacts};
-use crate::imu::PerSensor;
+use crate::imu::{PerSensor, Sensor};
 
 /// The samples of both triads, at one period, in one stretch or several.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +73,14 @@ pub enum SampleError {
 }
 
 impl ImuSamples {
+    /// Increments of one triad's output.
+    pub fn of(&self, sensor: Sensor) -> &[Vector3<f64>] {
+        match sensor {
+            Sensor::Gyro => &self.gyro,
+            Sensor::Accel => &self.accel,
+        }
+    }
+
     /// Samples that follow one another without a gap, the first from `start` on, s.
     ///
     /// # Errors

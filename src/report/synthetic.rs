@@ -200,6 +200,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             all: nis(1.01, 7182),
             velocity: nis(1.002, 5985),
             table: nis(1.051, 1197),
+            attitude: nis(f64::NAN, 0),
         },
         velocity_sigma: 1.2e-5,
         findings: vec![Finding::Recording {

@@ -143,10 +143,7 @@ impl Dwell {
 
     /// Mean output of a triad over it.
     pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
-        let samples = match sensor {
-            Sensor::Gyro => &run.recording.imu.gyro,
-            Sensor::Accel => &run.recording.imu.accel,
-        };
+        let samples = run.recording.imu.of(sensor);
         let duration = self.samples.len() as f64 * run.recording.imu.period;
         let sum: Vector3<f64> = samples[self.samples.clone()].iter().sum();
         let mut interpolated = Vector3::<f64>::zeros();

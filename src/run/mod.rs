@@ -11,7 +11,7 @@ pub use dwells::{Dwell, MeanOutput, Position};
 use serde::{Deserialize, Serialize};
 
 use crate::earth::Site;
-use crate::imu::{BodyFrame, Instrument};
+use crate::imu::{BodyFrame, Instrument, PerSensor};
 use crate::recording::{Recording, TableLog};
 use crate::turntable::TableAccuracy;
 use crate::units::DEGREE;
@@ -89,8 +89,9 @@ impl Aiding {
 /// How still the IMU is while the table is at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstill {
-    /// White 1σ of the velocity at standstill, m/s; found from the dwells if not given.
-    pub velocity_sigma: Option<f64>,
+    /// White 1σ of what each triad's output adds up to at standstill: attitude in rad, velocity in m/s;
+    /// found from the dwells if not given.
+    pub sigma: PerSensor<Option<f64>>,
     /// 1σ of the IMU's position while the table is at rest, m. Never below the IMU's distance from the
     /// table's centre, for that is how far it moves between positions.
     pub position_sigma: f64,
@@ -99,7 +100,7 @@ pub struct Standstill {
 impl Default for Standstill {
     fn default() -> Self {
         Self {
-            velocity_sigma: None,
+            sigma: PerSensor::default(),
             position_sigma: 1.0,
         }
     }

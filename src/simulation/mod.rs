@@ -152,7 +152,7 @@ impl Scenario {
             site: self.site,
             table: self.table_accuracy(),
             standstill: Standstill {
-                velocity_sigma: None,
+                sigma: PerSensor::default(),
                 position_sigma: Standstill::default()
                     .position_sigma
                     .max(self.integrator.lever_arm.norm()),

@@ -161,7 +161,7 @@ fn parts_of_a_record_are_runs_of_one_instrument() {
         .unwrap()
         .run;
     // Else each run finds its own in its dwells.
-    run.standstill.velocity_sigma = Some(2e-6);
+    run.standstill.sigma.accel = Some(2e-6);
     let lost = in_the_longest_move(&run);
     let cut = broken(&run, &lost);
     let before = part(&run, 0..lost.start);

@@ -6,6 +6,7 @@ use super::super::schedule::step_length;
 use super::replay::Moves;
 use super::source::Source;
 use crate::imu::Sensor;
+use crate::run::Aiding;
 
 /// Number of sources.
 pub(super) const SOURCES: usize = Source::ALL.len();
@@ -59,6 +60,9 @@ impl Scale {
                 Source::AccelMoving => of_moves(Sensor::Accel, moves.duration),
                 _ if source.stated(problem) => sigma.powi(2),
                 Source::Velocity => walk(Sensor::Accel) * step,
+                // Beside a table's readings it says nothing.
+                Source::Attitude if problem.model.aiding == Aiding::Table => 0.0,
+                Source::Attitude => walk(Sensor::Gyro) * step,
                 Source::GyroGaussMarkov => over_step(walk(Sensor::Gyro)),
                 Source::AccelGaussMarkov => over_step(walk(Sensor::Accel)),
                 _ => 0.0,

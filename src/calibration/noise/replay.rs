@@ -1,6 +1,8 @@
 //! A pass with the linearisation held, of which navigation is done once and the filter as often as noise
 //! is tried.
 
+use nalgebra::Matrix3;
+
 use super::super::error::CalibrationError;
 use super::super::layout::Layout;
 use super::super::linearisation::{AttitudePrior, Linearisation};
@@ -32,6 +34,8 @@ struct Rest<'a> {
     /// Computed state at its begin, and where the pass linearises instead.
     from: State,
     to: State,
+    /// The attitude that the dwell holds without a table.
+    held: Matrix3<f64>,
     block: Block,
 }
 
@@ -72,9 +76,10 @@ impl<'a> Script<'a> {
         let events = stretches.map(|(stretch, initial)| {
             let mut navigator = navigator(stretch, at, initial, &layout)?;
             let steps: &'a [Step] = &stretch.steps;
+            let mut held = *initial;
             let number = steps.iter().enumerate();
             Ok(number
-                .map(|(k, step)| event(&mut navigator, stretch, at, step, k > 0))
+                .map(|(k, step)| event(&mut navigator, &mut held, stretch, at, step, k > 0))
                 .collect())
         });
         Ok(Self {
@@ -132,6 +137,7 @@ impl<'a> Script<'a> {
 
 fn event<'a>(
     navigator: &mut Navigator,
+    held: &mut Matrix3<f64>,
     stretch: &Stretch,
     at: &Linearisation,
     step: &'a Step,
@@ -143,12 +149,16 @@ fn event<'a>(
     let from = navigator.state;
     let to = at_rest.tied(&from, &at.triads.accel);
     navigator.state = to;
+    if at_rest.first {
+        *held = to.attitude;
+    }
     Event::Rest(Box::new(Rest {
         time: stretch.run.recording.imu.time(step.samples.end),
         at_rest,
         new_position: at_rest.first && later,
         from,
         to,
+        held: *held,
         block: navigator.advance_standing(step.samples.clone()),
     }))
 }
@@ -168,6 +178,9 @@ impl Pass<'_> {
             filter.come_to_rest(&rest.from);
         }
         filter.refer(&rest.from, &rest.to);
+        if rest.at_rest.first {
+            filter.begin_to_hold();
+        }
         filter.propagate(&rest.block);
         let state = &rest.block.state;
         if rest.new_position {
@@ -182,6 +195,11 @@ impl Pass<'_> {
             let layout = &self.filter.layout;
             let attitude = Measurement::table(layout, state, reading, tilts, white);
             self.observe(rest.time, &attitude)?;
+        }
+        let variance = stretch.attitude_variance(model);
+        let layout = &self.filter.layout;
+        if let Some(turn) = Measurement::turn_at_rest(layout, state, &rest.held, variance) {
+            self.observe(rest.time, &turn)?;
         }
         Ok(())
     }

@@ -25,6 +25,8 @@ pub enum Source {
     AccelMoving,
     /// White velocity at standstill.
     Velocity,
+    /// White attitude at standstill, without a table.
+    Attitude,
     /// Position error of the table.
     TablePosition,
     /// Reading of the table.
@@ -37,7 +39,7 @@ pub enum Source {
 
 impl Source {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::AngleRandomWalk,
         Self::VelocityRandomWalk,
         Self::GyroMotion,
@@ -45,6 +47,7 @@ impl Source {
         Self::GyroMoving,
         Self::AccelMoving,
         Self::Velocity,
+        Self::Attitude,
         Self::TablePosition,
         Self::TableReading,
         Self::GyroGaussMarkov,
@@ -61,6 +64,7 @@ impl Source {
             Self::GyroMoving => "attitude noise of moves by time",
             Self::AccelMoving => "velocity noise of moves by time",
             Self::Velocity => "velocity at standstill",
+            Self::Attitude => "attitude at standstill",
             Self::TablePosition => "table position",
             Self::TableReading => "table reading",
             Self::GyroGaussMarkov => "Gauss-Markov bias of the gyros",
@@ -78,7 +82,7 @@ impl Source {
             Self::GyroMoving => ("deg/sqrt(s)", DEGREE),
             Self::AccelMoving => ("mm/s/sqrt(s)", 1e-3),
             Self::Velocity => ("mm/s", 1e-3),
-            Self::TablePosition | Self::TableReading => ("arcsec", ARCSEC),
+            Self::Attitude | Self::TablePosition | Self::TableReading => ("arcsec", ARCSEC),
             Self::GyroGaussMarkov => ("deg/h", DEG_PER_H),
             Self::AccelGaussMarkov => ("ug", MICRO_G),
         }
@@ -87,8 +91,12 @@ impl Source {
     /// Whether the run states a figure of it that is not zero.
     pub(super) fn stated(self, problem: &Problem) -> bool {
         match self {
-            Self::Velocity => {
-                let stated = problem.run().standstill.velocity_sigma;
+            Self::Velocity | Self::Attitude => {
+                let sensor = match self {
+                    Self::Velocity => Sensor::Accel,
+                    _ => Sensor::Gyro,
+                };
+                let stated = problem.run().standstill.sigma.get(sensor);
                 stated.is_some_and(|_| self.sigma(problem) > 0.0)
             }
             Self::GyroMotion | Self::AccelMotion | Self::GyroMoving | Self::AccelMoving => false,
@@ -96,7 +104,7 @@ impl Source {
         }
     }
 
-    /// Its σ in the model of a problem, in SI and radians; the smallest velocity that is ever taken counts
+    /// Its σ in the model of a problem, in SI and radians; the smallest unrest that is ever taken counts
     /// as none.
     pub(super) fn sigma(self, problem: &Problem) -> f64 {
         let model = &problem.model;
@@ -114,7 +122,8 @@ impl Source {
             Self::AccelMotion => model.motion_noise.accel.by_motion,
             Self::GyroMoving => model.motion_noise.gyro.by_duration,
             Self::AccelMoving => model.motion_noise.accel.by_duration,
-            Self::Velocity => problem.velocity_excess().sqrt(),
+            Self::Velocity => problem.unrest(Sensor::Accel).sqrt(),
+            Self::Attitude => problem.unrest(Sensor::Gyro).sqrt(),
             Self::TablePosition => model.position_sigma,
             Self::TableReading => model.reading_sigma,
             Self::GyroGaussMarkov => gauss_markov(Sensor::Gyro),
@@ -131,7 +140,8 @@ impl Source {
             Self::AccelMotion => model.motion_noise.accel.by_motion = sigma,
             Self::GyroMoving => model.motion_noise.gyro.by_duration = sigma,
             Self::AccelMoving => model.motion_noise.accel.by_duration = sigma,
-            Self::Velocity => model.set_velocity_excess(sigma.powi(2)),
+            Self::Velocity => model.set_unrest(Sensor::Accel, sigma.powi(2)),
+            Self::Attitude => model.set_unrest(Sensor::Gyro, sigma.powi(2)),
             Self::TablePosition => model.position_sigma = sigma,
             Self::TableReading => model.reading_sigma = sigma,
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {

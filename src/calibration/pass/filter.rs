@@ -11,9 +11,6 @@ use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_an
 use crate::imu::{PerSensor, Sensor, TermVector};
 use crate::navigation::{Block, ProcessNoise, State};
 
-/// What a block makes of the navigation errors by the error of one state.
-type Column = [f64; NAVIGATION];
-
 /// Mean and covariance of the errors.
 #[derive(Debug, Clone)]
 pub(in crate::calibration) struct Filter {
@@ -109,51 +106,77 @@ impl Filter {
         }
     }
 
-    /// Carries mean and covariance over a block. Only the top rows of Φ differ from identity, so of
-    /// `Φ P Φᵀ + Q` only the rows and columns of the navigation errors change.
+    /// The body does not turn from now on: what the computed attitude does is an error.
+    pub fn begin_to_hold(&mut self) {
+        if let Some(turn) = self.layout.turn_at_rest() {
+            (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));
+        }
+    }
+
+    /// Carries mean and covariance over a block.
     pub fn propagate(&mut self, block: &Block) {
-        let phi = self.top_rows(block);
+        match self.layout.turn_at_rest() {
+            Some(_) => self.carry::<{ NAVIGATION + 3 }>(block),
+            None => self.carry::<NAVIGATION>(block),
+        }
+        self.vary(block.duration);
+    }
+
+    /// Only the rows of Φ of `MOVING` states differ from identity: navigation errors and, where there is
+    /// one, the turn at rest. Of `Φ P Φᵀ + Q` only their rows and columns change.
+    fn carry<const MOVING: usize>(&mut self, block: &Block) {
+        let phi = self.moving_rows::<MOVING>(block);
         let n = self.x.len();
-        let mut x = [0.0; NAVIGATION];
-        let mut rows = vec![[0.0; NAVIGATION]; n];
-        let mut corner = [[0.0; NAVIGATION]; NAVIGATION];
+        let mut x = [0.0; MOVING];
+        let mut rows = vec![[0.0; MOVING]; n];
+        let mut corner = [[0.0; MOVING]; MOVING];
         let p = self.p.as_slice();
         for (k, column) in phi.iter().enumerate() {
             add_scaled(&mut x, column, self.x[k]);
         }
         for (j, row) in rows.iter_mut().enumerate() {
             let p = &p[n * j..n * j + phi.len()];
-            let mut sum = [0.0; NAVIGATION];
+            let mut sum = [0.0; MOVING];
             for (column, p) in phi.iter().zip(p) {
                 add_scaled(&mut sum, column, *p);
             }
             *row = sum;
         }
         for (k, row_of_corner) in corner.iter_mut().enumerate() {
-            let mut sum = [0.0; NAVIGATION];
+            let mut sum = [0.0; MOVING];
             for (column, row) in phi.iter().zip(&rows) {
                 add_scaled(&mut sum, row, column[k]);
             }
             *row_of_corner = sum;
         }
-        self.x.as_mut_slice()[..NAVIGATION].copy_from_slice(&x);
-        for (constant, row) in rows.iter().enumerate().skip(NAVIGATION) {
-            for (moving, &covariance) in row.iter().enumerate() {
+        let turn = self.layout.turn_at_rest().unwrap_or(n);
+        // Where a moving state is, and which navigation error's noise it has.
+        let place = |moving: usize| match moving.checked_sub(NAVIGATION) {
+            Some(axis) => (turn + axis, ATTITUDE + axis),
+            None => (moving, moving),
+        };
+        let constants = NAVIGATION..turn;
+        for constant in constants.chain((turn + 3).min(n)..n) {
+            for (moving, &covariance) in rows[constant].iter().enumerate() {
+                let (moving, _) = place(moving);
                 self.p[(moving, constant)] = covariance;
                 self.p[(constant, moving)] = covariance;
             }
         }
         let noise = block.noise.covariance(&self.noise);
         for (column, sum) in corner.iter().enumerate() {
+            let (at_column, of_column) = place(column);
+            self.x[at_column] = x[column];
             for (row, sum) in sum.iter().enumerate() {
-                self.p[(row, column)] = sum + noise[(row, column)];
+                let (at_row, of_row) = place(row);
+                self.p[(at_row, at_column)] = sum + noise[(of_row, of_column)];
             }
         }
-        self.vary(block.duration);
     }
 
-    /// The top rows of Φ, column by column: navigation errors, then the states that drive them.
-    fn top_rows(&self, block: &Block) -> Vec<Column> {
+    /// The rows of Φ of the states that move, column by column: navigation errors, the states that drive
+    /// them, the turn at rest.
+    fn moving_rows<const MOVING: usize>(&self, block: &Block) -> Vec<[f64; MOVING]> {
         let PerSensor { gyro, accel } = &block.parameters;
         let navigation = block.navigation.column_iter();
         let of_triad = |sensor: Sensor, parameter: usize| match sensor {
@@ -175,7 +198,20 @@ impl Filter {
         let known = navigation.chain(parameters).chain(terms);
         let known = known.map(|column| std::array::from_fn(|row| column[row]));
         let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
-        known.chain(gravity).chain(varying).collect()
+        let driving = known.chain(gravity).chain(varying);
+        let driving = driving
+            .enumerate()
+            .map(|(state, column): (usize, [f64; NAVIGATION])| {
+                std::array::from_fn(|moving| match moving.checked_sub(NAVIGATION) {
+                    // By as much as the attitude error has changed.
+                    Some(axis) if state == ATTITUDE + axis => column[state] - 1.0,
+                    Some(axis) => column[ATTITUDE + axis],
+                    None => column[moving],
+                })
+            });
+        let turn = (NAVIGATION..MOVING)
+            .map(|itself| std::array::from_fn(|moving| if moving == itself { 1.0 } else { 0.0 }));
+        driving.chain(turn).collect()
     }
 
     /// Varying biases forget as time goes by, and are driven.
@@ -314,9 +350,12 @@ impl Filter {
     pub fn refer(&mut self, from: &State, to: &State) {
         let error = self.at(ATTITUDE);
         let estimated = from_tilt_and_heading(&error) * from.attitude;
-        self.x
-            .fixed_rows_mut::<3>(ATTITUDE)
-            .copy_from(&to_tilt_and_heading(&(estimated * to.attitude.transpose())));
+        let referred = to_tilt_and_heading(&(estimated * to.attitude.transpose()));
+        self.x.fixed_rows_mut::<3>(ATTITUDE).copy_from(&referred);
+        if let Some(turn) = self.layout.turn_at_rest() {
+            let mut turn = self.x.fixed_rows_mut::<3>(turn);
+            turn += referred - error;
+        }
         let mut velocity = self.x.fixed_rows_mut::<3>(VELOCITY);
         velocity += to.velocity - from.velocity;
         let mut position = self.x.fixed_rows_mut::<3>(POSITION);
@@ -434,8 +473,8 @@ pub(in crate::calibration) struct Feedback {
 }
 
 #[inline]
-fn add_scaled(sum: &mut Column, column: &Column, factor: f64) {
-    for k in 0..NAVIGATION {
+fn add_scaled<const N: usize>(sum: &mut [f64; N], column: &[f64; N], factor: f64) {
+    for k in 0..N {
         sum[k] += column[k] * factor;
     }
 }

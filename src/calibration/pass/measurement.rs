@@ -29,6 +29,17 @@ impl Measurement {
         Self::of(POSITION, computed.position, variance)
     }
 
+    /// The attitude when the body came to rest: `z = φ − φ₀`, the turn at rest. None with a table.
+    pub fn turn_at_rest(
+        layout: &Layout,
+        computed: &State,
+        held: &Matrix3<f64>,
+        variance: f64,
+    ) -> Option<Self> {
+        let residual = -log(&(computed.attitude * held.transpose()));
+        Some(Self::of(layout.turn_at_rest()?, residual, variance))
+    }
+
     /// The table's reading: `z = φ − τ − ε − Σ t_k α_k`, with the tilts α of its axes and the directions
     /// t in which each turns the table.
     pub fn table(

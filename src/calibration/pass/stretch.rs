@@ -34,8 +34,10 @@ pub(super) struct OneStretch<'a> {
     navigator: Navigator<'a>,
     pub sums: Sums,
     gate: f64,
-    /// Rejections in a row of velocity and of table observations.
-    row: [usize; 2],
+    /// Rejections in a row of each kind of observation.
+    row: [usize; Observation::ALL.len()],
+    /// The attitude that the dwell holds without a table, as it is computed when it begins.
+    held: Matrix3<f64>,
     /// Observations of this dwell that are left out because they closed the gate to those after them.
     closing: Vec<usize>,
 }
@@ -80,8 +82,8 @@ impl<'a> OneStretch<'a> {
         mode: Mode<'a>,
         sums: Sums,
     ) -> Result<Self, CalibrationError> {
-        let initial = &sums.at.initial_attitudes[number];
-        let navigator = navigator(stretch, &sums.at, initial, &sums.filter.layout)?;
+        let initial = sums.at.initial_attitudes[number];
+        let navigator = navigator(stretch, &sums.at, &initial, &sums.filter.layout)?;
         Ok(Self {
             problem,
             stretch,
@@ -90,7 +92,8 @@ impl<'a> OneStretch<'a> {
             navigator,
             sums,
             gate: problem.gate(),
-            row: [0; 2],
+            row: [0; Observation::ALL.len()],
+            held: initial,
             closing: Vec::new(),
         })
     }
@@ -130,7 +133,7 @@ impl<'a> OneStretch<'a> {
     }
 
     fn begin(&mut self, step: usize) -> Begin<'a> {
-        self.row = [0; 2];
+        self.row = Default::default();
         self.closing.clear();
         let Sums {
             at,
@@ -179,7 +182,7 @@ impl<'a> OneStretch<'a> {
         self.sums.history.truncate(begin.history);
         self.sums.cost = begin.cost;
         self.sums.log_determinant = begin.log_determinant;
-        self.row = [0; 2];
+        self.row = Default::default();
         self.closing.push(closing);
     }
 
@@ -201,6 +204,10 @@ impl<'a> OneStretch<'a> {
             filter.refer(&self.navigator.state, &tied);
             self.navigator.state = tied;
         }
+        if at_rest.first {
+            filter.begin_to_hold();
+            self.held = self.navigator.state.attitude;
+        }
         let block = self.navigator.advance_standing(samples);
         filter.propagate(&block);
         let state = block.state;
@@ -218,6 +225,11 @@ impl<'a> OneStretch<'a> {
             let tilts = at_rest.tilts.as_ref();
             let attitude = Measurement::table(layout, &state, reading, tilts, white);
             self.observe(time, Observation::Table, &attitude)?;
+        }
+        let variance = self.stretch.attitude_variance(model);
+        let layout = &self.sums.filter.layout;
+        if let Some(turn) = Measurement::turn_at_rest(layout, &state, &self.held, variance) {
+            self.observe(time, Observation::Attitude, &turn)?;
         }
         match self.mode {
             Mode::Feedback => self.feed_back(),

@@ -154,6 +154,7 @@ impl Report<'_> {
         let kinds = [
             ("velocity", Observation::Velocity, &consistency.velocity),
             ("table attitude", Observation::Table, &consistency.table),
+            ("attitude", Observation::Attitude, &consistency.attitude),
         ];
         let of_kind = |kind| {
             outcome

@@ -171,9 +171,8 @@ pub(super) fn passes(outcome: &Outcome) -> Table {
 }
 
 fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
-    let (velocity, table) = (outcome.consistency.velocity, outcome.consistency.table);
-    let all = [("zero velocity", velocity), ("table attitude", table)];
-    all.into_iter().filter(|(_, nis)| nis.count > 0)
+    let kinds = outcome.consistency.kinds();
+    kinds.map(|(observation, nis)| (observation.name(), nis))
 }
 
 /// NIS of each kind of observation with its interval.

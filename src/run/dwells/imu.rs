@@ -1,6 +1,10 @@
 //! Standstills in what the instrument itself says.
 
+use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
+
 use nalgebra::Vector3;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{Dwell, STILL_RATE};
 use crate::earth::ROTATION_RATE;
@@ -16,6 +20,11 @@ const FEWEST: usize = 4;
 const STILL_SIGMAS: f64 = 6.0;
 /// … and specific force by this much more, m/s²: a turn of 0.02°.
 const STILL_FORCE: f64 = 3e-3;
+/// A window that the windows beside it contradict but for this chance ends a standstill: an axis that has
+/// begun to turn, or still settles. A false alarm costs a window.
+const SETTLED_BUT_FOR: f64 = 0.01;
+/// Windows beside it.
+const BESIDE: usize = 2 * FEWEST;
 /// A bias is within this many σ of its prior.
 const BIAS_SIGMAS: f64 = 6.0;
 
@@ -24,6 +33,39 @@ struct Windows {
     means: Vec<Vector3<f64>>,
     /// 1σ per axis of their noise.
     sigma: f64,
+}
+
+impl Windows {
+    /// The part of a standstill at whose ends the output is what it is beside them.
+    fn settled(&self, standstill: Range<usize>) -> Range<usize> {
+        let Range { mut start, mut end } = standstill;
+        // Three degrees of freedom are always valid.
+        let limit = ChiSquared::new(3.0).map_or(f64::INFINITY, |chi2| {
+            chi2.inverse_cdf(1.0 - SETTLED_BUT_FOR)
+        });
+        // A median of n normal numbers has a variance of π/2n.
+        let variance = self.sigma.powi(2) * (1.0 + FRAC_PI_2 / BESIDE as f64);
+        let moves = |window: usize, beside: Range<usize>| {
+            let rest = self.median(beside);
+            rest.is_some_and(|rest| (self.means[window] - rest).norm_squared() > limit * variance)
+        };
+        while end.saturating_sub(start) > BESIDE && moves(start, start + 1..start + 1 + BESIDE) {
+            start += 1;
+        }
+        while end.saturating_sub(start) > BESIDE && moves(end - 1, end - 1 - BESIDE..end - 1) {
+            end -= 1;
+        }
+        start..end
+    }
+
+    /// Median of each axis.
+    fn median(&self, windows: Range<usize>) -> Option<Vector3<f64>> {
+        let axis = |axis: usize| {
+            let values = self.means[windows.clone()].iter();
+            median(&mut values.map(|mean| mean[axis]).collect::<Vec<_>>())
+        };
+        Some(Vector3::new(axis(0)?, axis(1)?, axis(2)?))
+    }
 }
 
 impl Run {
@@ -51,10 +93,19 @@ impl Run {
                 continue;
             }
             // A move begins and ends too gently for the windows at its ends to show it.
-            let begin = if first == 0 { 0 } else { first + 1 };
-            let end = if k == count { k } else { k.saturating_sub(1) };
+            let settled = gyro.settled(first..k);
+            let begin = if settled.start == 0 {
+                0
+            } else {
+                settled.start + 1
+            };
+            let end = if settled.end == count {
+                count
+            } else {
+                settled.end.saturating_sub(1)
+            };
             if end >= begin + FEWEST {
-                let end = if k == count {
+                let end = if end == count {
                     self.recording.imu.len()
                 } else {
                     end * length
@@ -70,10 +121,7 @@ impl Run {
     }
 
     fn windows(&self, sensor: Sensor, length: usize) -> Windows {
-        let samples = match sensor {
-            Sensor::Gyro => &self.recording.imu.gyro,
-            Sensor::Accel => &self.recording.imu.accel,
-        };
+        let samples = self.recording.imu.of(sensor);
         let duration = length as f64 * self.recording.imu.period;
         let mean = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>() / duration;
         let means: Vec<_> = samples.chunks_exact(length).map(mean).collect();

@@ -78,7 +78,10 @@ pub fn made_run(name: &str) -> Run {
             geometry: Default::default(),
         },
         standstill: Standstill {
-            velocity_sigma: Some(2e-6),
+            sigma: PerSensor {
+                gyro: Some(3e-8),
+                accel: Some(2e-6),
+            },
             position_sigma: 0.4,
         },
         segment_sigma: 2.0 * DEGREE,

@@ -123,6 +123,7 @@ fn a_calibration_comes_back_as_it_went() {
         all: nis,
         velocity: Some(nis),
         table: None,
+        attitude: None,
     });
     record.warnings = vec!["heading is not observed".to_owned()];
     record.fixed = vec!["accel.installation.xy".to_owned()];
