@@ -13,6 +13,8 @@ use super::problem::Problem;
 const COST_RISE: f64 = 0.1;
 /// After a step of more than this part of the one before, all go half as far.
 const SHRINKS: f64 = 0.8;
+/// Passes after which the gate's decision stands, lest an observation at its edge goes in and out.
+const DECIDED_AFTER: usize = 4;
 /// More than this part of all observations beyond the gate are no outliers.
 const MOST_OUTLIERS: f64 = 0.05;
 
@@ -36,12 +38,16 @@ pub(super) fn iterate(
         Gate::Innovations => problem.options.passes,
         Gate::Open | Gate::As(_) => passes.len() + problem.options.passes,
     };
-    let decided = matches!(gate, Gate::As(_));
+    let given = matches!(gate, Gate::As(_));
+    let mut decision: Option<Vec<Innovation>> = None;
+    let first = passes.len();
     let mut at = from;
     let mut before: Option<PassResult> = None;
     let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
     loop {
-        let result = pass(problem, priors, &at, Mode::Held(gate))?;
+        let gate_now = decision.as_deref().map_or(gate, Gate::As);
+        let decided = matches!(gate_now, Gate::As(_));
+        let result = pass(problem, priors, &at, Mode::Held(gate_now))?;
         let summary = summary(&result, &at, false);
         progress(&summary);
         passes.push(summary);
@@ -50,7 +56,7 @@ pub(super) fn iterate(
             .is_some_and(|before| same_data(before, &result));
         let settled = summary.largest_step <= problem.options.converged_sigma
             && (decided || same_data || (before.is_none() && summary.rejected == 0));
-        let doubtful = !decided && beyond(&result, problem.gate()) > MOST_OUTLIERS;
+        let doubtful = !given && beyond(&result, problem.gate()) > MOST_OUTLIERS;
         let finished = settled && (gate == Gate::Open || !doubtful);
         if finished || passes.len() >= most {
             return Ok(Iterated {
@@ -62,6 +68,9 @@ pub(super) fn iterate(
         // them out would only hide that.
         if doubtful {
             gate = Gate::Open;
+            decision = None;
+        } else if gate == Gate::Innovations && passes.len() == first + DECIDED_AFTER {
+            decision = Some(result.innovations.clone());
         }
         let too_far =
             before.filter(|before| same_data && result.cost > before.cost * (1.0 + COST_RISE));

@@ -44,7 +44,7 @@ impl Default for Options {
             noise: NoisePolicy::default(),
             false_rejection: 1e-6,
             converged_sigma: 0.02,
-            passes: 10,
+            passes: 20,
         }
     }
 }
