@@ -69,6 +69,15 @@ pub enum Finding {
         /// Normalised innovation squared.
         nis: f64,
     },
+    /// Dwells scatter by more than the covariance says, which was widened.
+    DwellsScatter {
+        /// Mean of squared scores of dwells, each over its σ …
+        mean: f64,
+        /// … and what it stays below in 999 runs of 1000 if σ are true.
+        limit: f64,
+        /// By how much the largest σ grew.
+        growth: f64,
+    },
     /// The data contradict the stated noise, and another was learnt from them.
     NoiseLearnt {
         /// −2 ln of the likelihood ratio of stated to learnt noise …
@@ -170,6 +179,17 @@ impl fmt::Display for Finding {
                  --noise auto finds the noise that the record shows.",
                 observation.name(),
                 nis.sqrt()
+            ),
+            Self::DwellsScatter {
+                mean,
+                limit,
+                growth,
+            } => write!(
+                f,
+                "What one dwell says of the parameters differs from what the others say by more than σ \
+                 allow: squared and over its variance {mean:.2}, where right σ stay below {limit:.2}. The \
+                 covariance is that of this scatter where it is the larger, and σ are up to {growth:.1} \
+                 times as large as noise alone makes them. What is not modelled shows itself so."
             ),
             Self::NoiseLearnt {
                 ratio,

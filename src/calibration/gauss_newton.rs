@@ -4,17 +4,19 @@
 use super::auxiliary::auxiliary_name;
 use super::coarse::{CoarseStart, coarse_start};
 use super::curvature::curvature;
+use super::dwell_scatter::DwellScores;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
 use super::innovation::{Nis, consistency};
 use super::iterations::{Iterated, iterate, summary};
+use super::layout::Layout;
 use super::linearisation::{AttitudePrior, singular};
 use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
-use super::parameters::parameter_name;
+use super::parameters::{ParameterMatrix, parameter_name};
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::problem::Problem;
 use crate::imu::Sensor;
@@ -50,10 +52,23 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     } = others.fold(of_start, better)?;
     let Learnt {
         model,
-        iterated: Iterated { held, converged },
+        iterated: Iterated {
+            mut held,
+            converged,
+        },
         report,
     } = learn(problem, &priors, iterated, &mut passes, progress)?;
     let problem = &problem.with_model(model);
+    let form_test = form_test(problem, &priors, &held)?;
+    let scores = held.posteriors.split_first();
+    let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
+    let widened = scores.as_ref().and_then(DwellScores::widened);
+    let mut widest = None;
+    if let Some(widened) = &widened {
+        let before = held.covariance;
+        held.widen(&Layout::new(&problem.model), widened);
+        widest = Some(largest_growth(&before, &held.covariance));
+    }
     let triads = held.estimate.triads;
     let estimate = Estimate {
         covariance: held.covariance + curvature(&triads, &held.covariance),
@@ -65,7 +80,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     }
     let model = &problem.model;
     let mut outcome = Outcome {
-        form_test: form_test(problem, &priors, &held)?,
+        form_test,
+        dwell_scatter: scores.map(|scores| scores.scatter),
         observability: Observability::new(&estimate, &model.prior_sigma, &held.attitude_covariance),
         estimate,
         prior_sigma: model.prior_sigma,
@@ -92,7 +108,21 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         findings: Vec::new(),
     };
     outcome.findings = findings(problem, &outcome);
+    if let Some((scatter, growth)) = outcome.dwell_scatter.zip(widest) {
+        outcome.findings.push(Finding::DwellsScatter {
+            mean: scatter.mean,
+            limit: scatter.limit,
+            growth,
+        });
+    }
     Ok(outcome)
+}
+
+/// The largest σ over what it was.
+fn largest_growth(before: &ParameterMatrix, after: &ParameterMatrix) -> f64 {
+    let variances = before.diagonal().component_div(&after.diagonal());
+    let smallest = variances.iter().copied().filter(|ratio| *ratio > 0.0);
+    smallest.fold(1.0, f64::min).sqrt().recip()
 }
 
 /// A calibration from one start.

@@ -108,6 +108,12 @@ impl Layout {
         NAVIGATION..self.dwell_begin()
     }
 
+    /// The states that are the same constants throughout a recording.
+    pub fn constants(&self) -> impl Iterator<Item = usize> + use<> {
+        let after_initial = self.initial_attitude() + 3;
+        (NAVIGATION..self.varying_begin()).chain(after_initial..self.size())
+    }
+
     /// Error of the table's position, if it is a state.
     pub fn table_position(&self) -> Option<usize> {
         self.table.then(|| self.dwell_begin())

@@ -12,6 +12,7 @@ mod coarse;
 mod comparison;
 mod correction;
 mod curvature;
+mod dwell_scatter;
 mod error;
 mod error_term;
 mod error_term_test;
@@ -54,6 +55,7 @@ pub use closed_form::{
 pub use coarse::{CoarseStart, coarse_start};
 pub use comparison::{Comparison, Named, Side, compare};
 pub use correction::{Calibrated, Correction, CorrectionError};
+pub use dwell_scatter::DwellScatter;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
 pub use error_term_test::{ErrorTermTest, test_error_terms};

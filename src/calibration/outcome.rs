@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::auxiliary::Auxiliary;
+use super::dwell_scatter::DwellScatter;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::FormTest;
@@ -60,6 +61,8 @@ pub struct Outcome {
     pub log_determinant: f64,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
+    /// How much dwells scatter over what the covariance says; none where there are too few.
+    pub dwell_scatter: Option<DwellScatter>,
     /// Whether the data reject the installation form; none where they cannot.
     pub form_test: Option<FormTest>,
     /// What was estimated, with the noise that was used.

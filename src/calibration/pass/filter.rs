@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::measurement::Measurement;
 use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
+use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
@@ -423,6 +424,16 @@ impl Filter {
             all[index] = self.x[state];
         }
         all
+    }
+
+    /// Mean and covariance of the errors of what is constant throughout a recording.
+    pub fn constants(&self) -> Posterior {
+        let states: Vec<usize> = self.layout.constants().collect();
+        let n = states.len();
+        Posterior {
+            mean: DVector::from_fn(n, |i, _| self.x[states[i]]),
+            covariance: DMatrix::from_fn(n, n, |i, j| self.p[(states[i], states[j])]),
+        }
     }
 
     /// Mean of a state's error.

@@ -43,6 +43,7 @@ pub(super) fn pass(
         filter: Filter::new(model, &parameters, &terms),
         innovations: Vec::new(),
         history: Vec::new(),
+        posteriors: Vec::new(),
         cost: 0.0,
         log_determinant: 0.0,
     };
@@ -59,6 +60,9 @@ pub(super) fn pass(
         };
         let start = stretch.start(&known, &at.initial_attitudes[number]);
         begin(&mut sums.filter, model, before, stretch, &start);
+        if before.is_none() {
+            sums.posteriors.push(sums.filter.constants());
+        }
         before = Some(stretch);
         let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
         one.run()?;

@@ -1,11 +1,12 @@
 //! What a pass gives.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::filter::Filter;
 use super::initial_attitude::InitialAttitude;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::auxiliary::{Auxiliary, AuxiliaryVector};
+use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::innovation::Innovation;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
@@ -49,6 +50,8 @@ pub(in crate::calibration) struct PassResult {
     pub log_determinant: f64,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
+    /// What is known of the constants before the first dwell and after each.
+    pub posteriors: Vec<Posterior>,
 }
 
 /// What a pass has come to so far.
@@ -58,6 +61,7 @@ pub(super) struct Sums {
     pub filter: Filter,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
+    pub posteriors: Vec<Posterior>,
     pub cost: f64,
     pub log_determinant: f64,
 }
@@ -104,7 +108,42 @@ impl Sums {
             log_determinant: self.log_determinant,
             innovations: self.innovations,
             history: self.history,
+            posteriors: self.posteriors,
             at: self.at,
+        }
+    }
+}
+
+impl PassResult {
+    /// Takes another covariance of the constants, each in units of the σ that it has.
+    pub fn widen(&mut self, layout: &Layout, widened: &DMatrix<f64>) {
+        let states: Vec<usize> = layout.constants().collect();
+        let Some(last) = self.posteriors.last() else {
+            return;
+        };
+        let sigma = last.covariance.diagonal().map(f64::sqrt);
+        let of = |one: usize, other: usize| {
+            let place = |state| states.binary_search(&state).ok();
+            let (i, j) = (place(one)?, place(other)?);
+            Some(widened.get((i, j))? * sigma[i] * sigma[j])
+        };
+        let covariance = |one, other| of(one, other).unwrap_or(0.0);
+        for (row, i) in layout.parameters() {
+            for (column, j) in layout.parameters() {
+                self.covariance[(i, j)] = covariance(row, column);
+            }
+        }
+        let auxiliary = auxiliary_states(layout);
+        for &(row, i) in &auxiliary {
+            for &(column, j) in &auxiliary {
+                self.auxiliary.covariance[(i, j)] = covariance(row, column);
+            }
+            for (parameter, index) in layout.parameters() {
+                self.auxiliary.cross[(index, i)] = covariance(parameter, row);
+            }
+        }
+        if let Some(gravity) = layout.gravity() {
+            self.gravity.1 = covariance(gravity, gravity).sqrt();
         }
     }
 }

@@ -128,6 +128,11 @@ impl<'a> OneStretch<'a> {
                 self.sums.history.push(epoch);
             }
             next += 1;
+            let in_dwell = |step: &Step| step.at_rest.as_ref().is_some_and(|rest| !rest.first);
+            if step.at_rest.is_some() && !steps.get(next).is_some_and(in_dwell) {
+                let posterior = self.sums.filter.constants();
+                self.sums.posteriors.push(posterior);
+            }
         }
         Ok(())
     }
@@ -142,6 +147,7 @@ impl<'a> OneStretch<'a> {
             history,
             cost,
             log_determinant,
+            ..
         } = &self.sums;
         Begin {
             step,
