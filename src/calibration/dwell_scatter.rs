@@ -9,7 +9,7 @@
 //! correction of the leverage of few clusters: Bell and McCaffrey 2002, Survey Methodology 28(2)).
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::innovation::mean_square_interval;
 
@@ -27,7 +27,7 @@ pub(super) struct Posterior {
 }
 
 /// How much the dwells scatter, over what the covariance says.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DwellScatter {
     /// Mean of squared scores, each over its σ; one if σ are true.
     pub mean: f64,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::innovation::Observation;
+use super::innovation::Inconsistency;
 use super::noise::SourceFigures;
 use crate::imu::InstallationForm;
 use crate::units::DEGREE;
@@ -64,10 +64,8 @@ pub enum Finding {
     },
     /// Innovations that are not as large as their covariance says.
     Inconsistent {
-        /// Of what.
-        observation: Observation,
-        /// Normalised innovation squared.
-        nis: f64,
+        /// Where that shows.
+        looks: Vec<Inconsistency>,
     },
     /// Dwells scatter by more than the covariance says, which was widened.
     DwellsScatter {
@@ -172,14 +170,28 @@ impl fmt::Display for Finding {
                 f,
                 "{rejected} of {observations} observations were rejected as outliers."
             ),
-            Self::Inconsistent { observation, nis } => write!(
-                f,
-                "Innovations of {} are {:.2} times as large as their σ says (NIS {nis:.2}): noise \
-                 figures or model do not fit the data, and the σ of the parameters are as doubtful. \
-                 --noise auto finds the noise that the record shows.",
-                observation.name(),
-                nis.sqrt()
-            ),
+            Self::Inconsistent { looks } => {
+                let one = |look: &Inconsistency| {
+                    let Inconsistency {
+                        observation,
+                        look,
+                        nis,
+                        limits: (low, high),
+                        ..
+                    } = look;
+                    let (name, words) = (observation.name(), look.words());
+                    format!("{name}{words} {nis:.2} ({low:.2} to {high:.2})")
+                };
+                let looks: Vec<String> = looks.iter().map(one).collect();
+                write!(
+                    f,
+                    "Innovations are not as large as their σ says. NIS, with what it stays within in 999 \
+                     runs of 1000 if noise figures and model are right: {}. After moves it is what grows \
+                     with a move (table position, scale, timing), over dwells what lasts (bias), \
+                     everywhere the white noise. --noise auto finds the noise that the record shows.",
+                    looks.join("; ")
+                )
+            }
             Self::DwellsScatter {
                 mean,
                 limit,

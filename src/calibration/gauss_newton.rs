@@ -9,7 +9,7 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
-use super::innovation::{Nis, consistency};
+use super::innovation::{consistency, inconsistencies};
 use super::iterations::{Iterated, iterate, summary};
 use super::layout::Layout;
 use super::linearisation::{AttitudePrior, singular};
@@ -24,9 +24,6 @@ use crate::run::Aiding;
 
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
-
-/// A NIS this far from one is worth a warning; what is within changes σ by less than a tenth.
-const DOUBTFUL: f64 = 0.2;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
 ///
@@ -237,10 +234,9 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             observations: outcome.innovations.len(),
         });
     }
-    for (observation, Nis { mean: nis, .. }) in outcome.consistency.kinds() {
-        if (nis - 1.0).abs() > DOUBTFUL {
-            findings.push(Finding::Inconsistent { observation, nis });
-        }
+    let looks = inconsistencies(&outcome.innovations);
+    if !looks.is_empty() {
+        findings.push(Finding::Inconsistent { looks });
     }
     findings
 }

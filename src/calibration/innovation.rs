@@ -41,6 +41,8 @@ pub struct Innovation {
     pub whitened: [f64; 3],
     /// Whether the gate let it in.
     pub accepted: bool,
+    /// Number of the dwell in which it was made.
+    pub dwell: usize,
 }
 
 impl Innovation {
@@ -83,6 +85,122 @@ pub struct Nis {
     pub interval: (f64, f64),
     /// Correlation of neighbouring innovations, zero if they are white.
     pub lag_one: f64,
+}
+
+/// Innovations that are looked at apart: what is wrong with a model shows in a few of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Look {
+    /// All that were let in.
+    All,
+    /// The first of each dwell but the first dwell, let in or not: it carries what the move before has done.
+    AfterMoves,
+    /// Sums over each dwell, each over its σ: they carry what lasts.
+    OverDwells,
+    /// East.
+    East,
+    /// North.
+    North,
+    /// Up.
+    Up,
+}
+
+impl Look {
+    const ALL: [Self; 6] = [
+        Self::All,
+        Self::AfterMoves,
+        Self::OverDwells,
+        Self::East,
+        Self::North,
+        Self::Up,
+    ];
+
+    /// In words, after what was observed.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::All => "",
+            Self::AfterMoves => " first after each move",
+            Self::OverDwells => " summed over each dwell",
+            Self::East => " along East",
+            Self::North => " along North",
+            Self::Up => " along Up",
+        }
+    }
+
+    /// Squares of independent numbers of σ 1.
+    fn squares(self, of_kind: &[&Innovation]) -> Vec<f64> {
+        let accepted = || of_kind.iter().filter(|i| i.accepted);
+        let along = |axis: usize| accepted().map(|i| i.whitened[axis].powi(2)).collect();
+        let dwells = || of_kind.chunk_by(|a, b| a.dwell == b.dwell);
+        match self {
+            Self::All => accepted().flat_map(|i| i.whitened.map(|w| w * w)).collect(),
+            Self::AfterMoves => {
+                let later = dwells().filter(|dwell| dwell.iter().all(|i| i.dwell > 0));
+                later
+                    .filter_map(|dwell| dwell.first())
+                    .flat_map(|i| i.whitened.map(|w| w * w))
+                    .collect()
+            }
+            Self::OverDwells => dwells().flat_map(summed).collect(),
+            Self::East => along(0),
+            Self::North => along(1),
+            Self::Up => along(2),
+        }
+    }
+}
+
+/// Squares of the sums over a dwell of what was let in, over their variance.
+fn summed(dwell: &[&Innovation]) -> Vec<f64> {
+    let accepted: Vec<_> = dwell.iter().filter(|i| i.accepted).collect();
+    let sum = |axis: usize| accepted.iter().map(|i| i.whitened[axis]).sum::<f64>();
+    match accepted.len() {
+        0 => Vec::new(),
+        n => (0..3).map(|axis| sum(axis).powi(2) / n as f64).collect(),
+    }
+}
+
+/// Innovations that are not as large as their covariance says.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Inconsistency {
+    /// Of what.
+    pub observation: Observation,
+    /// Which of them.
+    pub look: Look,
+    /// Mean of their squares.
+    pub nis: f64,
+    /// How many numbers.
+    pub count: usize,
+    /// What the mean stays within, for all looks at once, in 999 runs of 1000 if σ are true.
+    pub limits: (f64, f64),
+}
+
+/// Chance that any look at a run finds a right model inconsistent.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// The looks at innovations that find them larger or smaller than chance allows.
+pub(super) fn inconsistencies(innovations: &[Innovation]) -> Vec<Inconsistency> {
+    let kinds = Observation::ALL.map(|kind| {
+        let of_kind = innovations.iter().filter(|i| i.observation == kind);
+        (kind, of_kind.collect::<Vec<_>>())
+    });
+    let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
+    let looks = kinds.clone().count() * Look::ALL.len();
+    let looked = kinds.flat_map(|(observation, of_kind)| {
+        Look::ALL.into_iter().map(move |look| {
+            let squares = look.squares(of_kind);
+            let count = squares.len();
+            Inconsistency {
+                observation: *observation,
+                look,
+                nis: squares.iter().sum::<f64>() / count as f64,
+                count,
+                limits: mean_square_interval(count, FALSE_ALARM / looks as f64),
+            }
+        })
+    });
+    looked
+        .filter(|found| found.nis < found.limits.0 || found.nis > found.limits.1)
+        .collect()
 }
 
 /// Two-sided probability outside the intervals.

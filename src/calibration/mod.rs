@@ -65,7 +65,9 @@ pub use form::FormTest;
 pub use frame::{Canonical, in_body_frame};
 pub use gauss_newton::{Progress, estimate};
 pub use group::Group;
-pub use innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
+pub use innovation::{
+    Consistency, Inconsistency, Innovation, Look, Nis, Observation, mean_square_interval,
+};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::{Model, MotionNoise};
 pub use nees::{Nees, nees};

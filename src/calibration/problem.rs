@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::innovation::Observation;
 use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
@@ -13,7 +14,7 @@ use super::standstill::{FLOOR, stillness};
 use crate::attitude::to_tilt_and_heading;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
-use crate::run::{Dwell, Run};
+use crate::run::{Aiding, Dwell, Run};
 
 /// 1σ of the initial velocity: a body at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
@@ -119,6 +120,19 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The same observed at the end of so many steps of a dwell, with the mean of what a table read
+    /// meanwhile.
+    pub(super) fn observed_every(&self, steps_of_dwell: usize) -> Self {
+        let stretches = self.stretches.iter().map(|stretch| Stretch {
+            steps: steps(stretch.run, stretch.table, &stretch.dwells, steps_of_dwell),
+            ..stretch.clone()
+        });
+        Self {
+            stretches: stretches.collect(),
+            ..self.clone()
+        }
+    }
+
     pub(super) fn stretches(&self) -> &[Stretch<'a>] {
         &self.stretches
     }
@@ -143,6 +157,21 @@ impl<'a> Problem<'a> {
     pub(super) fn notes(&self) -> impl Iterator<Item = &String> {
         let runs = std::iter::once(&self.run).chain(&self.others);
         runs.flat_map(|run| &run.recording.notes)
+    }
+
+    /// What is observed at the end of a step, in order.
+    pub(super) fn observed(&self, step: &Step) -> impl Iterator<Item = Observation> + use<> {
+        let at_rest = step.at_rest.as_ref();
+        let reading = at_rest.is_some_and(|rest| rest.reading.is_some());
+        let still = self.model.aiding == Aiding::Velocity;
+        let kinds = [
+            (Observation::Velocity, at_rest.is_some()),
+            (Observation::Table, reading),
+            (Observation::Attitude, at_rest.is_some() && still),
+        ];
+        kinds
+            .into_iter()
+            .filter_map(|(kind, there)| there.then_some(kind))
     }
 
     /// The dwells of all runs.
@@ -170,7 +199,7 @@ impl<'a> Stretch<'a> {
         let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
         let PerSensor { gyro, accel } = run.recording.imu.pulse;
         Self {
-            steps: steps(run, table, &dwells),
+            steps: steps(run, table, &dwells, 1),
             variance: Variance {
                 pulse: quantisation(accel),
                 position: run.standstill.position_sigma.powi(2),

@@ -59,7 +59,10 @@ impl Outcome {
             }),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
-            consistency: Some(consistency_record(&self.consistency)),
+            consistency: Some(ConsistencyRecord {
+                dwells: self.dwell_scatter,
+                ..consistency_record(&self.consistency)
+            }),
             observability: direction_records(self),
             noise: Some(noise_record(self)),
             warnings: texts(&findings),
@@ -291,6 +294,7 @@ fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
         velocity: some(velocity),
         table: some(table),
         attitude: some(attitude),
+        dwells: None,
     }
 }
 

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::dwell_scatter::DwellScatter;
 use super::noise::NoiseReport;
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
@@ -185,6 +186,9 @@ pub struct ConsistencyRecord {
     /// Of the table's attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
+    /// Scores of dwells over their σ; none where there are too few dwells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dwells: Option<DwellScatter>,
     /// Of the attitude that does not change at standstill, without a table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude: Option<NisRecord>,

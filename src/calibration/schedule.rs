@@ -42,8 +42,14 @@ pub(super) fn step_length(period: f64) -> usize {
     ((STEP / period).round() as usize).max(1)
 }
 
-/// The steps from the begin of the first dwell to the end of the last, between which nothing is lost.
-pub(super) fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell]) -> Vec<Step> {
+/// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
+/// dwells `longer` times as long as in moves.
+pub(super) fn steps(
+    run: &Run,
+    table: Option<&TableLog>,
+    dwells: &[Dwell],
+    longer: usize,
+) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
     let mut steps = Vec::new();
@@ -65,7 +71,7 @@ pub(super) fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell]) -> Ve
         let tilts = table.zip(position);
         let tilts = tilts.and_then(|(table, p)| table.tilts.get(p.readings.start).copied());
         let mut first = true;
-        cut(dwell.samples.clone(), length, |samples| {
+        cut(dwell.samples.clone(), longer * length, |samples| {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
             let reading = table.zip(unread.as_mut()).and_then(|(table, unread)| {
                 let readings = take_until(unread, table, until);

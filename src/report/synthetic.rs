@@ -120,7 +120,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         (1..=400).map(moment).collect()
     };
     let mut innovations = Vec::new();
-    for dwell in &dwells {
+    for (number, dwell) in dwells.iter().enumerate() {
         for k in 1..20u32 {
             let whitened = [0; 3].map(|_| StandardNormal.sample(rng));
             let time = dwell.start + (dwell.end - dwell.start) * f64::from(k) / 20.0;
@@ -130,6 +130,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
                 observation,
                 whitened,
                 accepted: k % 19 != 0,
+                dwell: number,
             }));
         }
     }

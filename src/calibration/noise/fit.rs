@@ -34,7 +34,7 @@ pub(super) struct Likelihood<'a> {
     pub script: &'a Script<'a>,
     pub scale: &'a Scale,
     /// Of each observation of three components, whether it is let in.
-    pub accepted: &'a [bool],
+    pub accepted: Vec<bool>,
 }
 
 /// A point with gradient and expected information of −½ of the deviance, by ln σ of a factor that is
@@ -57,7 +57,7 @@ impl Likelihood<'_> {
     pub fn replay(&self, factors: &Factors) -> Result<Replay, CalibrationError> {
         let model = self.scale.apply(factors, &self.problem.model);
         let problem = self.problem.with_model(model);
-        self.script.replay(&problem, self.accepted)
+        self.script.replay(&problem, &self.accepted)
     }
 
     /// Score and information by these sources, from one replay more than there are.

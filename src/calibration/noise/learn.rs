@@ -1,13 +1,14 @@
 //! From a calibration with stated noise to one with the noise that its data show.
 
 use super::super::error::CalibrationError;
-use super::super::innovation::Innovation;
+use super::super::innovation::{Innovation, Observation};
 use super::super::iterations::{Iterated, iterate};
 use super::super::linearisation::AttitudePrior;
 use super::super::model::Model;
 use super::super::outcome::Pass;
 use super::super::pass::Gate;
 use super::super::problem::Problem;
+use super::super::schedule::Step;
 use super::factors::{Factors, Scale};
 use super::fit::{Fit, Likelihood};
 use super::likelihood_ratio::limit;
@@ -26,6 +27,12 @@ const ROUNDS: usize = 6;
 /// A change of −2 ln of the likelihood from one point of linearisation to the next that is nothing: a
 /// third of a σ of one factor.
 const SETTLED: f64 = 0.1;
+/// Observations of three components that noise is learnt from: 3,000 numbers, half of which tell σ of a
+/// white noise to 2 %.
+const ENOUGH: usize = 1000;
+/// Steps of a dwell between observations at most: longer ones would not tell white noise of velocity and
+/// attitude from random walk.
+const LONGEST: usize = 10;
 /// Half of a 95 % interval in σ, and what 95 % stay below.
 const INTERVAL: f64 = 1.96;
 const ONE_SIDED: f64 = 1.645;
@@ -55,16 +62,13 @@ pub(in crate::calibration) fn learn(
         return Ok(keep(stated, None));
     }
     let at = stated.held.estimate.clone();
-    let script = Script::new(problem, priors, &at)?;
-    let scale = Scale::new(problem, &script.moves());
     let mut accepted: Vec<bool> = let_in(&stated.held.innovations);
-    let likelihood = Likelihood {
-        problem,
-        script: &script,
-        scale: &scale,
-        accepted: &accepted,
-    };
-    let (test, fitted) = likelihood.test(policy)?;
+    let thinned = Thinned::new(problem, accepted.len());
+    let script = Script::new(&thinned.problem, priors, &at)?;
+    let scale = Scale::new(problem, &script.moves());
+    let (test, fitted) = thinned
+        .likelihood(&script, &scale, &accepted)
+        .test(policy)?;
     let Some(mut fit) = fitted else {
         return Ok(keep(stated, Some(test)));
     };
@@ -75,19 +79,18 @@ pub(in crate::calibration) fn learn(
     let mut iterated = stated;
     // Stated noise may have thrown the gate open; the learnt one decides once.
     let mut open = accepted.iter().all(|&accepted| accepted);
-    let mut script = script;
     let mut before = None;
-    let mut at;
+    let mut at = at;
     let mut round = 0;
     loop {
         round += 1;
-        let distances = likelihood_of(problem, &script, &scale, &accepted)
-            .replay(&fit.factors)?
+        let model = scale.apply(&fit.factors, &problem.model);
+        let with_noise = problem.with_model(model.clone());
+        let distances = Script::new(&with_noise, priors, &at)?
+            .replay(&with_noise, &accepted)?
             .distances;
         let changed = regate(&mut accepted, &distances, problem.gate(), open);
         open = false;
-        let model = scale.apply(&fit.factors, &problem.model);
-        let with_noise = problem.with_model(model.clone());
         let as_decided: Vec<Innovation> = iterated
             .held
             .innovations
@@ -102,8 +105,8 @@ pub(in crate::calibration) fn learn(
         let gate = Gate::As(&as_decided);
         iterated = iterate(&with_noise, priors, from, gate, passes, progress)?;
         at = iterated.held.estimate.clone();
-        script = Script::new(problem, priors, &at)?;
-        let likelihood = likelihood_of(problem, &script, &scale, &accepted);
+        let script = Script::new(&thinned.problem, priors, &at)?;
+        let likelihood = thinned.likelihood(&script, &scale, &accepted);
         let now = likelihood.replay(&fit.factors)?.deviance();
         let moved = before.is_none_or(|before: f64| (now - before).abs() > SETTLED);
         if (!changed && !moved) || round == ROUNDS {
@@ -119,17 +122,60 @@ pub(in crate::calibration) fn learn(
     }
 }
 
-fn likelihood_of<'a>(
-    problem: &'a Problem<'a>,
-    script: &'a Script<'a>,
-    scale: &'a Scale,
-    accepted: &'a [bool],
-) -> Likelihood<'a> {
-    Likelihood {
-        problem,
-        script,
-        scale,
-        accepted,
+/// A problem of which only so many observations are looked at as noise needs: those of a dwell are thinned
+/// out, the first after each move stays.
+struct Thinned<'a> {
+    problem: Problem<'a>,
+    /// Observations of three components that one of each kind stands for, in their order.
+    groups: Vec<Vec<usize>>,
+}
+
+impl<'a> Thinned<'a> {
+    fn new(problem: &Problem<'a>, observations: usize) -> Self {
+        let longer = (observations / ENOUGH).clamp(1, LONGEST);
+        let thinned = problem.observed_every(longer);
+        let mut groups = Vec::new();
+        let mut next = 0;
+        for (all, few) in problem.stretches().iter().zip(thinned.stretches()) {
+            let mut all = all
+                .steps
+                .iter()
+                .filter(|step| step.at_rest.is_some())
+                .peekable();
+            for step in few.steps.iter().filter(|step| step.at_rest.is_some()) {
+                let mut of_kinds: [Vec<usize>; Observation::ALL.len()] = Default::default();
+                let within = |one: &&Step| one.samples.end <= step.samples.end;
+                while let Some(one) = all.next_if(within) {
+                    for kind in problem.observed(one) {
+                        of_kinds[kind as usize].push(next);
+                        next += 1;
+                    }
+                }
+                let kinds = problem.observed(step);
+                groups.extend(kinds.map(|kind| std::mem::take(&mut of_kinds[kind as usize])));
+            }
+        }
+        Self {
+            problem: thinned,
+            groups,
+        }
+    }
+
+    /// The likelihood of noise where these of all observations are let in.
+    fn likelihood<'b>(
+        &'b self,
+        script: &'b Script<'b>,
+        scale: &'b Scale,
+        accepted: &[bool],
+    ) -> Likelihood<'b> {
+        let let_in = |index: &usize| accepted.get(*index).copied().unwrap_or(true);
+        let group = |group: &Vec<usize>| group.iter().all(let_in);
+        Likelihood {
+            problem: &self.problem,
+            script,
+            scale,
+            accepted: self.groups.iter().map(group).collect(),
+        }
     }
 }
 

@@ -279,6 +279,7 @@ impl<'a> OneStretch<'a> {
             observation,
             whitened: whitened.into(),
             accepted,
+            dwell: sums.posteriors.len() - 1,
         });
         Ok(())
     }
