@@ -135,8 +135,18 @@ impl Column<'_> {
     /// The rate within may be off from that beside as much as that beside changes in the same time: one
     /// that only touches the value, `a t²` off, is off by 0.6 of that.
     fn leaves_its_level(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let least = 8 * SUM;
+        let most = (run.len() / 2).max(least);
+        // A level may be short.
+        [least, 2 * least, most]
+            .into_iter()
+            .filter(|&half| half <= most)
+            .any(|half| self.is_off_level(run, half, limit))
+    }
+
+    /// The same with two halves of so many rows on either side.
+    fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> bool {
         let first = run.start - 1;
-        let half = (run.len() / 2).max(8 * SUM);
         let Some(far_before) = first.checked_sub(2 * half) else {
             return false;
         };
@@ -165,14 +175,19 @@ impl Column<'_> {
         let off = (value - level).abs() / self.step;
         // Where a motion came to the value or left it, the rows next to the run are on their way.
         let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(|rows| moments(rows).0);
+        let beside = half as f64;
         let pairs = [
-            (left.0, far_left.0),
-            (right.0, far_right.0),
-            (left.0, right.0),
-            (left.0, next[0]),
-            (right.0, next[1]),
+            (left.0, far_left.0, beside),
+            (right.0, far_right.0, beside),
+            (left.0, right.0, beside),
+            (left.0, next[0], NEXT as f64),
+            (right.0, next[1], NEXT as f64),
         ];
-        let changes = pairs.map(|(one, other)| (one - other).abs() / self.step);
+        // Sums of pulses are right to a step, so that means may differ by as much without a change.
+        let changes = pairs.map(|(one, other, rows)| {
+            let rounded = 1.0 / beside + 1.0 / rows;
+            (one - other).abs() / self.step - if self.pulses { rounded } else { 0.0 }
+        });
         let change = changes.into_iter().fold(0.0, f64::max);
         // Rounding averages out in sums, which leaves noise and what is left of the motion.
         let sums = |side: &[f64]| {
@@ -185,7 +200,7 @@ impl Column<'_> {
         let variance =
             halves.map(sums).iter().sum::<f64>() / (4.0 * SUM as f64 * self.step.powi(2));
         let variance = variance.max(self.of_grid() / SUM as f64);
-        let (length, beside) = (run.len() as f64, half as f64);
+        let length = run.len() as f64;
         let noise = (variance * (1.0 / length + 0.5 / beside)).sqrt();
         let freedom = 4.0 * ((half / SUM) as f64 - 1.0);
         off > change + 1.0 / length + 1.0 / beside + limit.of_student(freedom) * noise
