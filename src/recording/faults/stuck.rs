@@ -114,16 +114,19 @@ impl Column<'_> {
         if self.pulses { 1.0 / 6.0 } else { 1.0 / 12.0 }
     }
 
-    /// Of all repeats those that are repeated, in the parts of the record where most are.
+    /// Of all repeats those that are repeated, in the parts of the record where most are; the longest run
+    /// of each part is left out, for the axis may be stuck there.
     fn repeats_of_repeats(&self) -> f64 {
         let part = self.values.len().div_ceil(PARTS).max(BLOCK);
         let of_part = |values: &[f64]| {
-            let (mut repeats, mut again) = (0.0, 0.0);
-            for three in values.windows(3).filter(|three| three[0] == three[1]) {
-                repeats += 1.0;
-                again += f64::from(u8::from(three[1] == three[2]));
+            let lengths: Vec<usize> = runs(values).iter().map(Range::len).collect();
+            let repeats = lengths.iter().sum::<usize>() - lengths.iter().max().unwrap_or(&0);
+            let runs = lengths.len().saturating_sub(1);
+            if repeats > 0 {
+                (repeats - runs) as f64 / repeats as f64
+            } else {
+                0.0
             }
-            if repeats > 0.0 { again / repeats } else { 0.0 }
         };
         let mut parts: Vec<f64> = self.values.chunks(part).map(of_part).collect();
         let rank = ((1.0 - STUCK_PART) * parts.len() as f64) as usize;
