@@ -9,9 +9,10 @@ use super::instrument::InstrumentFields;
 use super::segments;
 use super::table_log::TableLogFile;
 use crate::earth::Site;
-use crate::recording::{Recording, faults};
+use crate::imu::{Output, Sensor};
+use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::units::{ARCSEC, DEGREE, MILLIGAL};
+use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 
 /// The version of the format of `run.toml`.
 pub(super) const FORMAT: &str = "turncal-run/1";
@@ -74,6 +75,7 @@ impl Run {
         files.extend(segments_file.clone());
         let imu = instrument.log.read()?;
         notes.extend(faults::notes(&imu));
+        notes.extend(clock_note(&imu, &instrument));
         let accuracy = table_log.as_ref().map(|log| log.accuracy);
         let table = table_log.map(|log| log.read(&imu)).transpose()?;
         let segments = match segments_file {
@@ -100,6 +102,36 @@ impl Run {
             segment_sigma: segment_sigma.unwrap_or(SET_BY_HAND),
         })
     }
+}
+
+/// What it means that stamps were taken and not `sample_period_s`.
+///
+/// Rates are integrated over the period to angles, increments of velocity divided by it to specific
+/// force: a scale changes by as much as the period.
+fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String> {
+    let off = imu.log.as_ref()?.off_stated_period?;
+    let (sensor, triad) = match instrument.log.output {
+        Output::Rate => (Sensor::Gyro, "gyros"),
+        Output::Pulse | Output::Increment => (Sensor::Accel, "accelerometers"),
+    };
+    let sigma = instrument.known.prior.get(sensor).scale_sigma.min();
+    let ppm = |part: f64| format!("{:.2}", part / PPM);
+    let found = format!(
+        "Stamps come every {} s, {} ppm {} than sample_period_s says; stamps are taken, and the scale of the \
+         {triad} is by as much another",
+        nanoseconds(imu.period),
+        ppm(off.abs()),
+        if off > 0.0 { "more" } else { "less" },
+    );
+    Some(if off.abs() <= sigma {
+        format!("{found}, within its prior σ of {} ppm.", ppm(sigma))
+    } else {
+        format!(
+            "{found}, beyond its prior σ of {} ppm: if the instrument's clock is right and the stamps are not, \
+             leave the time column out.",
+            ppm(sigma)
+        )
+    })
 }
 
 /// The name of the directory of a `run.toml`, else the file's own.

@@ -18,8 +18,12 @@ pub(super) struct Uniform {
     /// Stamps against due times, s.
     pub jitter_rms: f64,
     pub jitter_max: f64,
+    /// The period over the one that was given less one, where stamps contradict that.
+    pub off_given: Option<f64>,
 }
 
+/// σ that one sound record in ten thousand exceeds.
+const BY_CHANCE: f64 = 3.89;
 /// Part of a stamp's difference by which the phase of the clock follows it: little, so that jitter
 /// averages out …
 const PHASE: f64 = 0.02;
@@ -31,26 +35,49 @@ const EXACT: f64 = 1e-9;
 const FIRST: usize = 50;
 
 impl Uniform {
-    /// Finds the number of each sample, and the clock that all stamps share within half a period.
-    /// There must be at least two stamps.
+    /// Finds the number of each sample, and the clock that all stamps share within half a period. A
+    /// given period is that of the clock unless the stamps contradict it. There must be at least two
+    /// stamps.
     pub fn new(file: &Path, stamps: &[(f64, u64)], given: Option<f64>) -> Result<Self, FileError> {
-        let error = |line, found: String, expected: String, advice: &str| {
-            let place = Place::Line(line);
-            Err(FileError::new(file, place, found, expected, advice))
-        };
         let first = stamps[0];
         let found = mean_step(stamps);
         if let Some(period) = given
             && (found - period).abs() > 0.5 * period
         {
-            return error(
-                first.1,
-                format!("steps of {} s from row to row", nanoseconds(found)),
-                format!("sample_period_s = {period} as in run.toml"),
-                "Correct sample_period_s or the time column.",
-            );
+            return Err(FileError::new(
+                file,
+                Place::Line(first.1),
+                format_args!("steps of {} s from row to row", nanoseconds(found)),
+                format_args!("sample_period_s = {period} as in run.toml"),
+                "Correct sample_period_s, time_unit or the time column.",
+            ));
         }
-        let about = given.unwrap_or(found);
+        if let Some(period) = given
+            && let Ok(free) = Self::with_period(file, stamps, found, false)
+            && free.contradicts(period)
+        {
+            let off_given = Some(free.period / period - 1.0);
+            return Ok(Self { off_given, ..free });
+        }
+        Self::with_period(file, stamps, given.unwrap_or(found), given.is_some())
+    }
+
+    /// Whether stamps drift from a clock of another period, over all of them, by more than jitter makes
+    /// a line through them drift, if they are independent, and by more than any of them jitters, if not.
+    fn contradicts(&self, period: f64) -> bool {
+        let last = self.numbers.last().map_or(0.0, |&last| last as f64);
+        let count = self.numbers.len() as f64;
+        let drift = (self.period - period).abs() * last;
+        let sigma = self.jitter_rms * (12.0 / count).sqrt();
+        drift > self.jitter_max.max(BY_CHANCE * sigma)
+    }
+
+    fn with_period(
+        file: &Path,
+        stamps: &[(f64, u64)],
+        about: f64,
+        given: bool,
+    ) -> Result<Self, FileError> {
         let gap = |row: usize| {
             let ((before, _), (time, line)) = (stamps[row - 1], stamps[row]);
             FileError::new(
@@ -62,10 +89,10 @@ impl Uniform {
             )
         };
 
-        let mut numbers = numbers(stamps, about, given.is_some()).map_err(gap)?;
-        let (mut first, mut period) = fit(stamps, &numbers, about, given.is_some());
+        let mut numbers = numbers(stamps, about, given).map_err(gap)?;
+        let (mut first, mut period) = fit(stamps, &numbers, about, given);
         // A period that jitter and gaps falsified may have lost count once or twice.
-        if given.is_none() {
+        if !given {
             numbers = self::numbers(stamps, period, false).map_err(gap)?;
             (first, period) = fit(stamps, &numbers, period, false);
         }
@@ -79,22 +106,13 @@ impl Uniform {
             let due = first + number as f64 * period;
             let off = (time - due).abs();
             if off > 0.5 * period {
-                let (_, found) = fit(stamps, &numbers, period, false);
-                let drift = (found - period).abs() * numbers.len() as f64;
-                if given.is_some() && drift > 0.5 * period {
-                    return error(
-                        line,
-                        format!("a row every {} s", nanoseconds(found)),
-                        format!("sample_period_s = {period} as in run.toml"),
-                        "Correct sample_period_s, or leave it out.",
-                    );
-                }
-                return error(
-                    line,
-                    format!("time {time} s at sample {}", number + 1),
-                    format!("{} s at {period} s a sample", nanoseconds(due)),
+                return Err(FileError::new(
+                    file,
+                    Place::Line(line),
+                    format_args!("time {time} s at sample {}", number + 1),
+                    format_args!("{} s at {period} s a sample", nanoseconds(due)),
                     "Correct sample_period_s, or resample the record to a uniform clock.",
-                );
+                ));
             }
             squares += off * off;
             largest = largest.max(off);
@@ -105,6 +123,7 @@ impl Uniform {
             numbers,
             jitter_rms: (squares / stamps.len() as f64).sqrt(),
             jitter_max: largest,
+            off_given: None,
         })
     }
 }
@@ -200,6 +219,26 @@ mod tests {
         assert_eq!(clock.numbers, (0..20_000).collect::<Vec<_>>());
         assert!((clock.period / period - 1.0).abs() < 1e-6);
         assert!((clock.jitter_rms - 1e-3 / 12f64.sqrt()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_given_period_holds_within_jitter_and_yields_to_stamps_beyond() {
+        let jitter = |k: usize| 0.3 * (scatter(k) - 0.5);
+        let stamps: Vec<_> = (0..20_000)
+            .map(|k| (7.0 + 0.01 * (k as f64 + jitter(k)), 2 + k as u64))
+            .collect();
+        for (given, off) in [
+            (0.01, None),
+            (0.010_001, Some(-1e-4)),
+            (0.0099, Some(0.0101)),
+        ] {
+            let clock = Uniform::new(Path::new("imu.csv"), &stamps, Some(given)).unwrap();
+            assert_eq!(clock.numbers, (0..20_000).collect::<Vec<_>>());
+            assert!((clock.period / 0.01 - 1.0).abs() < 1e-7);
+            assert_eq!(clock.off_given.is_some(), off.is_some(), "{given}");
+            let found = clock.off_given.unwrap_or(0.0);
+            assert!((found - off.unwrap_or(0.0)).abs() < 1e-6, "{given} {found}");
+        }
     }
 
     #[test]

@@ -11,6 +11,9 @@ pub struct LogFacts {
     pub jitter_rms: f64,
     /// The largest of these differences, s.
     pub jitter_max: f64,
+    /// The stamps' period over the one that was stated less one, where they contradict each other and
+    /// the stamps were taken.
+    pub off_stated_period: Option<f64>,
     /// The columns that hold each triad's body axes right, front, up, as they stand in the file.
     pub columns: PerSensor<[ColumnFacts; 3]>,
     /// The temperature column, if there is one.

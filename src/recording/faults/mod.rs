@@ -1,18 +1,21 @@
 //! What is wrong with a log's rows, and what was done about it.
 
+mod chance;
 mod interpolation;
 mod notes;
 mod repair;
 mod saturated;
+mod spikes;
 mod stuck;
 
 use std::ops::Range;
 
 use crate::imu::Sensor;
 use crate::recording::{ColumnFacts, ImuSamples};
+use chance::Limit;
 pub(crate) use notes::notes;
 pub(crate) use repair::{Repaired, Rows};
-use saturated::Column;
+use spikes::spikes;
 
 /// Samples of a record that are not what the instrument sensed.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,13 +42,21 @@ pub enum FaultKind {
     Duplicate,
     /// At the end of the axis' range, so that the truth may be beyond.
     Saturated,
-    /// The same value again and again, while others change.
+    /// The same value again and again, while the axis' noise or motion goes on.
     Stuck,
+    /// A single sample to which neither what is before nor what is after leads.
+    Spike,
 }
 
 impl FaultKind {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Missing, Self::Duplicate, Self::Saturated, Self::Stuck];
+    pub const ALL: [Self; 5] = [
+        Self::Missing,
+        Self::Duplicate,
+        Self::Saturated,
+        Self::Stuck,
+        Self::Spike,
+    ];
 
     /// In a word.
     pub fn name(self) -> &'static str {
@@ -54,6 +65,7 @@ impl FaultKind {
             Self::Duplicate => "duplicate",
             Self::Saturated => "saturated",
             Self::Stuck => "stuck",
+            Self::Spike => "spike",
         }
     }
 }
@@ -100,67 +112,73 @@ struct Found {
     rows: Range<usize>,
 }
 
-/// Looks for saturated and stuck values in the columns of gyro x, y, z and accelerometer x, y, z.
+/// Looks for saturated and stuck values and spikes in the columns of gyro x, y, z and accelerometer
+/// x, y, z.
 fn find(
     columns: &[Vec<f64>; 6],
     facts: &[ColumnFacts; 6],
     full_scale: &[Option<f64>; 6],
+    pulses: bool,
 ) -> Vec<Found> {
+    let limit = Limit::of_rows(columns[0].len());
     let mut found = Vec::new();
-    let mut add = |kind, column, rows: &Range<usize>| {
-        let rows = rows.clone();
-        found.push(Found { kind, column, rows });
-    };
-    let mut saturated = [const { Vec::new() }; 6];
-    for (k, facts) in facts.iter().enumerate() {
-        let column = Column {
-            values: &columns[k],
+    let steps = std::array::from_fn(|k| facts[k].step.unwrap_or_else(|| last_digit(&columns[k])));
+    let spikes = spikes(
+        &std::array::from_fn(|k| columns[k].as_slice()),
+        &steps,
+        limit,
+    );
+    for (column, (values, facts)) in columns.iter().zip(facts).enumerate() {
+        let spikes = &spikes[column];
+        let repeats = stuck::Column {
+            values,
+            step: steps[column],
+            pulses,
+        };
+        let stuck = repeats.stuck(limit);
+        let range = saturated::Column {
+            values,
             smallest: facts.smallest,
             largest: facts.largest,
             step: facts.step,
-            full_scale: full_scale[k],
+            full_scale: full_scale[column],
+            spikes,
+            stuck: &stuck,
         };
-        saturated[k] = column.saturated();
-        saturated[k]
-            .iter()
-            .for_each(|rows| add(FaultKind::Saturated, k, rows));
-    }
-    let all = std::array::from_fn(|k| columns[k].as_slice());
-    let stuck = stuck::stuck(&all, &std::array::from_fn(|k| facts[k].step));
-    for (k, runs) in stuck.iter().enumerate() {
-        for run in runs {
-            let known = |rows: &Range<usize>| rows.start < run.end && run.start < rows.end;
-            if saturated[k].iter().any(known) {
-                continue;
-            }
-            let value = columns[k][run.start];
-            let at_end = [facts[k].smallest, facts[k].largest].contains(&value);
-            if at_end && !is_level(&columns[k], run) {
-                // The value before it is at the end of the range as well.
-                add(FaultKind::Saturated, k, &(run.start - 1..run.end));
-            } else {
-                add(FaultKind::Stuck, k, run);
-            }
-        }
+        let saturated = range.saturated();
+        // The row before a run has its value.
+        let free = |rows: &Range<usize>| {
+            !saturated
+                .iter()
+                .any(|known| known.start < rows.end && rows.start < known.end)
+        };
+        let spikes = spikes.iter().map(|&row| row..row + 1);
+        let spikes = spikes.filter(free).map(|rows| (FaultKind::Spike, rows));
+        let stuck = stuck.iter().cloned().filter(free);
+        let stuck = stuck.map(|rows| (FaultKind::Stuck, rows));
+        let kinds: Vec<_> = spikes.chain(stuck).collect();
+        let saturated = saturated
+            .into_iter()
+            .map(|rows| (FaultKind::Saturated, rows));
+        found.extend(
+            saturated
+                .chain(kinds)
+                .map(|(kind, rows)| Found { kind, column, rows }),
+        );
     }
     found
 }
 
-/// Rows on either side of a run that tell whether its value is one of theirs …
-const BESIDE: usize = 16;
-/// … within this many times what they change by from row to row.
-const OF_LEVEL: f64 = 3.0;
-
-/// Whether a run lies on a level that goes on beside it, as that of a steady turn; at the end of a range
-/// the truth comes from below and goes back there.
-fn is_level(column: &[f64], run: &Range<usize>) -> bool {
-    let value = column[run.start];
-    let before = &column[run.start.saturating_sub(1 + BESIDE)..run.start - 1];
-    let after = &column[run.end..column.len().min(run.end + BESIDE)];
-    [before, after].into_iter().all(|side| {
-        let count = side.len().max(1) as f64;
-        let off = side.iter().map(|other| value - other).sum::<f64>() / count;
-        let changes = side.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        off.abs() <= OF_LEVEL * changes.sum::<f64>() / count
-    })
+/// What a column of numbers with so many digits resolves at its largest values, by the smallest change
+/// relative to the value: a last digit is up to ten times that.
+fn last_digit(values: &[f64]) -> f64 {
+    let changes = values.windows(2).filter(|pair| pair[0] != pair[1]);
+    let relative = changes.map(|pair| (pair[1] - pair[0]).abs() / pair[0].abs().max(pair[1].abs()));
+    let largest = values
+        .iter()
+        .fold(0.0, |largest, value| value.abs().max(largest));
+    match relative.reduce(f64::min) {
+        Some(least) => 10.0 * least * largest,
+        None => 0.0,
+    }
 }

@@ -61,6 +61,8 @@ impl ImuSamples {
         let plural = if count == 1 { "" } else { "s" };
         let said = match kind {
             FaultKind::Duplicate => "there twice",
+            FaultKind::Spike if count == 1 => "a spike",
+            FaultKind::Spike => "spikes",
             FaultKind::Missing | FaultKind::Saturated | FaultKind::Stuck => kind.name(),
         };
         let mut columns: Vec<&str> = Vec::new();

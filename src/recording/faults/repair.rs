@@ -22,6 +22,8 @@ pub(crate) struct Rows<'a> {
     pub facts: &'a [ColumnFacts; 6],
     /// In the file's quantity.
     pub full_scale: [Option<f64>; 6],
+    /// Whether rows are whole pulses, what is left over being carried into the next.
+    pub pulses: bool,
     /// The body axis of each column.
     pub body_axes: [usize; 6],
     /// Rad and m/s for one of the file's quantity.
@@ -51,7 +53,7 @@ fn sensor(column: usize) -> Sensor {
 impl Rows<'_> {
     /// Looks for faults and bridges them.
     pub fn repair(self) -> Repaired {
-        let found = find(&self.columns, self.facts, &self.full_scale);
+        let found = find(&self.columns, self.facts, &self.full_scale, self.pulses);
         let mut faults = self.missing();
         faults.extend(self.duplicates.iter().map(|&(row, line)| Fault {
             kind: FaultKind::Duplicate,

@@ -4,18 +4,9 @@ use std::ops::Range;
 
 use crate::statistics::median;
 
-/// Registers that a column of whole numbers may come from. Shorter ones are left to the spikes, for
-/// their ends are values as any other.
+/// Registers that a column may come from. The extreme of a column is at the end of these by chance once in
+/// 2¹⁵ columns or less; those of shorter ones are values as any other.
 const BITS: [i32; 3] = [16, 24, 32];
-/// A spike is no longer than this many rows.
-const LONGEST_SPIKE: usize = 20;
-/// Rows on either side with which it is compared.
-const AROUND: usize = 8;
-/// It stands out by more than this many times the largest change from row to row there.
-const STANDS_OUT: f64 = 8.0;
-
-/// Less than this part of the whole range is no change: the last digits of a number.
-const LEAST: f64 = 1e-6;
 
 /// What is known of a column.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +18,10 @@ pub(super) struct Column<'a> {
     pub step: Option<f64>,
     /// What the instrument's data sheet says.
     pub full_scale: Option<f64>,
+    /// Rows that stand out from both sides.
+    pub spikes: &'a [usize],
+    /// Rows that repeat the one before them.
+    pub stuck: &'a [Range<usize>],
 }
 
 impl Column<'_> {
@@ -53,7 +48,9 @@ impl Column<'_> {
     /// The ends of the range, if rows are there that only an end explains.
     fn ends(&self) -> Vec<f64> {
         let extremes = [self.smallest, self.largest];
-        let sure = extremes.map(|end| self.is_register_end(end) || self.is_reached_by_spikes(end));
+        let sure = extremes.map(|end| {
+            self.is_register_end(end) || self.is_reached_by_spikes(end) || self.stops_motion(end)
+        });
         // The range is symmetric, but for a step.
         let slack = 1.5 * self.step.unwrap_or(0.0) + 1e-9 * self.largest.abs();
         let mirrored = (self.smallest + self.largest).abs() <= slack;
@@ -76,44 +73,41 @@ impl Column<'_> {
     }
 
     fn is_register_end(&self, end: f64) -> bool {
-        let whole = self.step.is_some_and(|step| step.fract() == 0.0) && end.fract() == 0.0;
-        whole
-            && BITS.into_iter().any(|bits| {
-                let half = 2f64.powi(bits - 1);
-                // Raw registers have their zero in the middle.
-                let offset = || {
-                    let middle = 0.5 * half..=1.5 * half;
-                    self.median().is_some_and(|median| middle.contains(&median))
-                };
-                [half - 1.0, 1.0 - half, -half].contains(&end)
-                    || ([0.0, 2.0 * half - 1.0].contains(&end) && offset())
-            })
-    }
-
-    fn is_reached_by_spikes(&self, end: f64) -> bool {
-        let runs = self.rows(|value| value == end);
-        let count: usize = runs.iter().map(Range::len).sum();
-        let spikes = runs.iter().filter(|run| self.is_spike(run));
-        let in_spikes: usize = spikes.map(Range::len).sum();
-        in_spikes >= 2 && 2 * in_spikes >= count
-    }
-
-    /// Whether the values on both sides change far less among themselves than from them to these.
-    fn is_spike(&self, run: &Range<usize>) -> bool {
-        let end = self.values[run.start];
-        let before = &self.values[run.start.saturating_sub(AROUND)..run.start];
-        let after = &self.values[run.end..self.values.len().min(run.end + AROUND)];
-        let (Some(last), Some(first)) = (before.last(), after.first()) else {
+        let Some(step) = self.step else {
             return false;
         };
-        let changes = [before, after].into_iter().flat_map(|side| side.windows(2));
-        let largest = changes
-            .filter(|pair| pair[0] != end && pair[1] != end)
-            .map(|pair| (pair[1] - pair[0]).abs())
-            .fold(self.step.unwrap_or(0.0), f64::max)
-            .max(LEAST * (self.largest - self.smallest));
-        let out = (end - last).abs().min((end - first).abs());
-        run.len() <= LONGEST_SPIKE && out > STANDS_OUT * largest
+        BITS.into_iter().any(|bits| {
+            let half = 2f64.powi(bits - 1);
+            // Raw registers have their zero in the middle.
+            let offset = || {
+                let middle = 0.5 * half..=1.5 * half;
+                self.median()
+                    .is_some_and(|median| middle.contains(&(median / step)))
+            };
+            // A grid that is known from rounded digits is known to its last step.
+            let is = |register: f64| (end / step - register).abs() < 0.5;
+            [half - 1.0, 1.0 - half, -half].into_iter().any(is)
+                || ([0.0, 2.0 * half - 1.0].into_iter().any(is) && offset())
+        })
+    }
+
+    /// Single samples that no motion leads to differ from one another, unless they are where the range
+    /// ends.
+    fn is_reached_by_spikes(&self, end: f64) -> bool {
+        self.spikes
+            .iter()
+            .filter(|&&k| self.values[k] == end)
+            .count()
+            >= 2
+    }
+
+    /// Whether an axis is stuck there, with a truth that comes from one side and goes back to it.
+    fn stops_motion(&self, end: f64) -> bool {
+        let at_end = |run: &&Range<usize>| self.values[run.start] == end;
+        self.stuck
+            .iter()
+            .filter(at_end)
+            .any(|run| !is_level(self.values, run, self.step.unwrap_or(0.0)))
     }
 
     fn rows(&self, is_end: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
@@ -132,12 +126,42 @@ impl Column<'_> {
     }
 }
 
+/// Rows beside a run whose mean is compared with it.
+const BESIDE: usize = 16;
+/// σ within which they agree: a steady turn has its axis at the end of what the record holds as well.
+const AGREE: f64 = 3.0;
+
+/// Whether a run lies on a level that goes on beside it, as that of a steady turn; at the end of a range
+/// the truth comes from one side and goes back there.
+fn is_level(values: &[f64], run: &Range<usize>, step: f64) -> bool {
+    let value = values[run.start];
+    let before = &values[run.start.saturating_sub(1 + BESIDE)..run.start - 1];
+    let after = &values[run.end..values.len().min(run.end + BESIDE)];
+    [before, after].into_iter().all(|side| {
+        let count = side.len().max(1) as f64;
+        let off = side.iter().map(|other| value - other).sum::<f64>() / count;
+        // Half of the squared changes from row to row is the variance of white noise, whatever the level.
+        let changes = side.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
+        let variance = 0.5 * changes.sum::<f64>() / count + step * step / 12.0;
+        off * off <= AGREE * AGREE * variance
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::chance::Limit;
+    use super::super::spikes::spikes;
     use super::*;
 
     fn saturated(values: &[f64], step: Option<f64>, full_scale: Option<f64>) -> Vec<Range<usize>> {
+        let rest = vec![0.0; values.len()];
+        let mut columns = [rest.as_slice(); 6];
+        columns[0] = values;
+        let limit = Limit::of_rows(values.len());
+        let [spikes, ..] = spikes(&columns, &[step.unwrap_or(0.0); 6], limit);
         let column = Column {
+            spikes: &spikes,
+            stuck: &[],
             values,
             smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
             largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
@@ -153,7 +177,7 @@ mod tests {
             let t = f64::from(k);
             amplitude * (t / 300.0).sin() + 3.0 * (12.9898 * t).sin()
         };
-        (0..5000).map(|k| value(k).round()).collect()
+        (0..50_000).map(|k| value(k).round()).collect()
     }
 
     #[test]

@@ -2,56 +2,54 @@
 
 use std::ops::Range;
 
-/// A run by chance may be this probable.
-const CHANCE: f64 = 1e-9;
-/// How often an axis changes is seen in this many rows on either side.
-const AROUND: usize = 500;
-/// Where all axes repeat in more than this part of the rows, noise is not seen and a standing table
-/// looks as a stuck axis does.
-const NOISE_FREE: f64 = 0.1;
-/// A run by chance is not longer than this many times the longest of the others around.
-const LONGER: usize = 4;
-/// The same on a level by which a rate may drift: pulses then repeat ever longer, then ever shorter.
-const LONGER_ON_LEVEL: usize = 12;
-/// Fewer rows on the level tell nothing of that.
-const FEWEST: usize = 50;
-/// An axis that leaves its value by no more than this many steps of its grid may stand on it, or drift
-/// by it: what it does on another level says nothing of that, only rows within so many steps do.
-const QUIET_STEPS: f64 = 1.5;
-const SAME_LEVEL_STEPS: f64 = 3.5;
-/// Rows on either side of a run whose mean …
-const BESIDE: usize = 32;
-/// … is this many times further from its value than that of a rate which touches it, …
-const MORE_THAN_TOUCHING: f64 = 3.0;
-/// Or the means of so many such blocks on either side differ by less than this many steps, …
-const BLOCKS: usize = 6;
-const STANDS: f64 = 0.125;
-/// … a run is this many times longer than all others there, …
-const LONGER_WHERE_STANDING: usize = 6;
-/// … and so far that the sum over the run is wrong by this many steps. Pulses are right to a few, however
-/// long they repeat.
-const WRONG_STEPS: f64 = 8.0;
+use nalgebra::{DMatrix, DVector};
+use statrs::function::erf::erf;
 
-/// For each column the rows that repeat the one before them so long that it is no chance, the first
-/// of equal values left out. `steps` are those of the columns' grids.
-pub(super) fn stuck(columns: &[&[f64]; 6], steps: &[Option<f64>; 6]) -> [Vec<Range<usize>>; 6] {
-    let mut found = [const { Vec::new() }; 6];
-    let rows = columns[0].len();
-    let frozen = (1..rows).filter(|&k| columns.iter().all(|x| x[k] == x[k - 1]));
-    if frozen.count() as f64 > NOISE_FREE * rows as f64 {
-        return found;
-    }
-    for (axis, column) in columns.iter().enumerate() {
-        let changes = |k: usize| columns.iter().any(|x| x[k] != x[k - 1]);
-        for run in runs(column) {
-            let repeats = run.len();
-            // The least that can be too long where nothing repeats in all rows around.
-            if repeats >= 3 && is_stuck(column, &run, steps[axis]) && run.clone().any(changes) {
-                found[axis].push(run);
-            }
+use super::chance::Limit;
+
+/// What repeats of a column are judged by.
+pub(super) struct Column<'a> {
+    pub values: &'a [f64],
+    /// What values differ by at least; zero if they are all the same.
+    pub step: f64,
+    /// Whether values are whole pulses, what is left over being carried into the next.
+    pub pulses: bool,
+}
+
+/// Rows in which noise is measured at one level.
+const BLOCK: usize = 64;
+/// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
+const STUCK_PART: f64 = 0.1;
+/// Rows whose sum is hardly rounded.
+const SUM: usize = 4;
+/// Rows next to a run.
+const NEXT: usize = 4 * SUM;
+/// σ within which a value is one of a level's.
+const OF_LEVEL: f64 = 3.0;
+/// Parts of the record in which repeats of repeats are counted.
+const PARTS: usize = 32;
+
+impl Column<'_> {
+    /// The rows that repeat the one before them so long that a sound axis would not, the first of
+    /// equal values left out.
+    ///
+    /// A sound axis repeats its value because its noise stays within a step of the grid, so that
+    /// it has to be improbable in one of three ways, each whatever the rate was meanwhile or wherever
+    /// it was just before and after: by the noise that the axis always has, by the level on which it
+    /// is, or by the motion that goes on across.
+    pub fn stuck(&self, limit: Limit) -> Vec<Range<usize>> {
+        if self.step <= 0.0 {
+            return Vec::new();
         }
+        let by_noise = limit.nats / self.repeat_probability().recip().ln();
+        let mut stuck = runs(self.values);
+        stuck.retain(|run| {
+            run.len() as f64 > by_noise
+                || self.leaves_its_level(run, limit)
+                || self.interrupts_a_motion(run, limit)
+        });
+        stuck
     }
-    found
 }
 
 /// Stretches of rows each equal to the one before.
@@ -69,199 +67,404 @@ fn runs(column: &[f64]) -> Vec<Range<usize>> {
     runs
 }
 
-fn is_stuck(column: &[f64], run: &Range<usize>, step: Option<f64>) -> bool {
-    let value = column[run.start];
-    let leaves = |k: Option<usize>| {
-        k.and_then(|k| column.get(k))
-            .map_or(0.0, |other| (other - value).abs())
-    };
-    // The row before the run has its value. Both sides outwards.
-    let before = run.start.saturating_sub(1 + AROUND)..run.start - 1;
-    let after = run.end..column.len().min(run.end + AROUND);
-    let sides: [Vec<f64>; 2] = [
-        column[before.clone()].iter().rev().copied().collect(),
-        column[after.clone()].to_vec(),
-    ];
-    let step = step.filter(|step| {
-        let left = leaves(before.end.checked_sub(1)).max(leaves(Some(after.start)));
-        left <= QUIET_STEPS * step
-    });
-    let mut seen = Seen::default();
-    let Some(step) = step else {
-        sides.iter().for_each(|side| seen.add(side));
-        return run.len() > LONGER * seen.longest && seen.chance(run.len()) < CHANCE;
-    };
-    let sides = sides.map(|mut side| {
-        let on_level = |other: &f64| (other - value).abs() <= SAME_LEVEL_STEPS * step;
-        side.truncate(side.iter().take_while(|other| on_level(other)).count());
-        seen.add(&side);
-        side
-    });
-    let by_chance = seen.chance(run.len()) > CHANCE
-        || run.len() < LONGER_ON_LEVEL * seen.longest
-        || seen.pairs < FEWEST;
-    !by_chance || contradicts_its_level(value, run.len(), &sides, step, seen.longest)
-}
+impl Column<'_> {
+    /// The largest probability that a sample repeats the one before, wherever the true value lies.
+    ///
+    /// By the noise at rest a value stays within its step most probably if the truth is in the middle
+    /// of it (Anderson's inequality). Noise that is correlated stays longer; it shows in how often
+    /// repeats are repeated.
+    fn repeat_probability(&self) -> f64 {
+        let variance = self.noise_at_rest();
+        let white = erf((8.0 * variance).sqrt().recip());
+        // Pulses count an angle that walks: it stays between two edges of a step with the largest
+        // eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
+        let walk = -0.5 * std::f64::consts::PI.powi(2) * variance
+            / (1.0 + 1.1652 * variance.sqrt()).powi(2);
+        let by_noise = match self.pulses && variance < 0.25 {
+            true => white.min(walk.exp()),
+            false => white,
+        };
+        by_noise.max(self.repeats_of_repeats())
+    }
 
-/// Whether rows on the level of a value do not stay on it for so many repeats, and those next to them have
-/// another mean.
-///
-/// A rate that only touches the level, `a t²` off, makes a pulse of another size when `a T³ / 12 = 1`
-/// over a run of T rows, and is `12 (T/2 + t)² / T³` off in steps t rows beside it.
-///
-/// Where a table stands the rate stays, and no more is needed than that.
-fn contradicts_its_level(
-    value: f64,
-    repeats: usize,
-    levels: &[Vec<f64>; 2],
-    step: f64,
-    longest: usize,
-) -> bool {
-    let (mut stays, mut at_value) = (0.0, 0.0);
-    let mut least = f64::INFINITY;
-    let mut means = Vec::new();
-    for level in levels {
-        for pair in level.windows(2).filter(|pair| pair[0] == value) {
-            at_value += 1.0;
-            stays += f64::from(u8::from(pair[1] == value));
+    /// Variance of white noise that the axis always has, steps², not more than it is: what the grid can
+    /// make of a slow motion without noise is taken off.
+    fn noise_at_rest(&self) -> f64 {
+        let origin = self.values[0];
+        let of_block = |block: &[f64]| {
+            let (mean, slope, variance) = line(block);
+            let level = (mean - origin) / self.step;
+            let passed = 0.5 * (slope * BLOCK as f64 / self.step).abs();
+            // The middle between two steps is where values change between them most.
+            let nearest = ((level - 0.5).round() + 0.5 - level).abs() - passed;
+            let fraction = 0.5 - nearest.max(0.0);
+            variance / self.step.powi(2) - self.of_grid().max(fraction * (1.0 - fraction))
+        };
+        let mut variances: Vec<f64> = self.values.chunks_exact(BLOCK).map(of_block).collect();
+        if variances.is_empty() {
+            return 0.0;
         }
-        let blocks = level.chunks_exact(BESIDE).take(BLOCKS);
-        let of_level: Vec<f64> = blocks
-            .map(|block| block.iter().sum::<f64>() / (BESIDE as f64 * step))
-            .collect();
-        let Some(next) = of_level.first() else {
+        let rank = (STUCK_PART * variances.len() as f64) as usize;
+        let (_, variance, _) = variances.select_nth_unstable_by(rank, f64::total_cmp);
+        variance.max(0.0)
+    }
+
+    /// Variance that rounding adds to noise, steps².
+    fn of_grid(&self) -> f64 {
+        if self.pulses { 1.0 / 6.0 } else { 1.0 / 12.0 }
+    }
+
+    /// Of all repeats those that are repeated, in the parts of the record where most are; the longest run
+    /// of each part is left out, for the axis may be stuck there.
+    fn repeats_of_repeats(&self) -> f64 {
+        let part = self.values.len().div_ceil(PARTS).max(BLOCK);
+        let of_part = |values: &[f64]| {
+            let lengths: Vec<usize> = runs(values).iter().map(Range::len).collect();
+            let repeats = lengths.iter().sum::<usize>() - lengths.iter().max().unwrap_or(&0);
+            let runs = lengths.len().saturating_sub(1);
+            if repeats > 0 {
+                (repeats - runs) as f64 / repeats as f64
+            } else {
+                0.0
+            }
+        };
+        let mut parts: Vec<f64> = self.values.chunks(part).map(of_part).collect();
+        let rank = ((1.0 - STUCK_PART) * parts.len() as f64) as usize;
+        *parts.select_nth_unstable_by(rank, f64::total_cmp).1
+    }
+
+    /// Whether both sides of a run stay on a level on which so many equal values are improbable.
+    ///
+    /// The rate within may be off from that beside as much as that beside changes in the same time: one
+    /// that only touches the value, `a t²` off, is off by 0.6 of that.
+    fn leaves_its_level(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let least = 8 * SUM;
+        let most = (run.len() / 2).max(least);
+        // A level may be short.
+        [least, 2 * least, most]
+            .into_iter()
+            .filter(|&half| half <= most)
+            .any(|half| self.is_off_level(run, half, limit))
+    }
+
+    /// The same with two halves of so many rows on either side.
+    fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> bool {
+        let first = run.start - 1;
+        let Some(far_before) = first.checked_sub(2 * half) else {
             return false;
         };
-        least = least.min((next - value / step).abs());
-        means.push(of_level);
-    }
-    let stands = means.iter().all(|of_level| of_level.len() == BLOCKS) && {
-        let all = || means.iter().flatten().copied();
-        all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min) < STANDS
-    };
-    let again: f64 = (stays + 1.0) / (at_value + 2.0);
-    let rows = repeats as f64;
-    let touching = 12.0 * (0.5 * (rows + BESIDE as f64)).powi(2) / rows.powi(3);
-    let unlikely = again.powf(rows) < CHANCE || repeats > LONGER_WHERE_STANDING * longest;
-    unlikely && least * rows > WRONG_STEPS && (stands || least > MORE_THAN_TOUCHING * touching)
-}
-
-/// How often rows repeat the one before.
-#[derive(Debug, Default)]
-struct Seen {
-    pairs: usize,
-    repeats: usize,
-    /// Repeats next to a repeat.
-    again: usize,
-    /// Most repeats in a row.
-    longest: usize,
-}
-
-impl Seen {
-    fn add(&mut self, rows: &[f64]) {
-        let mut row = 0;
-        for pair in rows.windows(2) {
-            let repeat = pair[0] == pair[1];
-            self.pairs += 1;
-            self.repeats += usize::from(repeat);
-            self.again += usize::from(repeat && row > 0);
-            row = if repeat { row + 1 } else { 0 };
-            self.longest = self.longest.max(row);
+        let Some(after) = self.values.get(run.end..run.end + 2 * half) else {
+            return false;
+        };
+        let before = &self.values[far_before..first];
+        let value = self.values[first];
+        let halves = [
+            &before[..half],
+            &before[half..],
+            &after[..half],
+            &after[half..],
+        ];
+        let [far_left, left, right, far_right] = halves.map(moments);
+        // The value was sound when it came, so that it is one of the level's.
+        let holds = |side: &[f64], (mean, variance): (f64, f64)| {
+            (value - mean).abs() <= self.step + OF_LEVEL * variance.sqrt()
+                && side.iter().any(|&other| other >= value)
+                && side.iter().any(|&other| other <= value)
+        };
+        if !holds(halves[1], left) || !holds(halves[2], right) {
+            return false;
         }
+        let level = 0.5 * (left.0 + right.0);
+        let off = (value - level).abs() / self.step;
+        // Where a motion came to the value or left it, the rows next to the run are on their way.
+        let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(|rows| moments(rows).0);
+        let beside = half as f64;
+        let pairs = [
+            (left.0, far_left.0, beside),
+            (right.0, far_right.0, beside),
+            (left.0, right.0, beside),
+            (left.0, next[0], NEXT as f64),
+            (right.0, next[1], NEXT as f64),
+        ];
+        // Sums of pulses are right to a step, so that means may differ by as much without a change.
+        let changes = pairs.map(|(one, other, rows)| {
+            let rounded = 1.0 / beside + 1.0 / rows;
+            (one - other).abs() / self.step - if self.pulses { rounded } else { 0.0 }
+        });
+        let change = changes.into_iter().fold(0.0, f64::max);
+        // Rounding averages out in sums, which leaves noise and what is left of the motion.
+        let sums = |side: &[f64]| {
+            let sums: Vec<f64> = side
+                .chunks_exact(SUM)
+                .map(|rows| rows.iter().sum())
+                .collect();
+            moments(&sums).1
+        };
+        let variance =
+            halves.map(sums).iter().sum::<f64>() / (4.0 * SUM as f64 * self.step.powi(2));
+        let variance = variance.max(self.of_grid() / SUM as f64);
+        let length = run.len() as f64;
+        let noise = (variance * (1.0 / length + 0.5 / beside)).sqrt();
+        let freedom = 4.0 * ((half / SUM) as f64 - 1.0);
+        off > change + 1.0 / length + 1.0 / beside + limit.of_student(freedom) * noise
     }
 
-    /// Of a run with so many repeats. A repeat may make the next more probable, as where a table
-    /// stands and noise is below the grid.
-    fn chance(&self, repeats: usize) -> f64 {
-        let once = (self.repeats as f64 + 1.0) / (self.pairs as f64 + 2.0);
-        let again = (self.again as f64 + once) / (self.repeats as f64 + 1.0);
-        once * once.max(again).powf(repeats as f64 - 1.0)
+    /// Whether a motion goes on across a run as if the run were not there, by the likelihood ratio of a
+    /// cubic through both sides and of two parabolas that stop at the run's value and start from it.
+    fn interrupts_a_motion(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let value = self.values[run.start];
+        let resumes = self.values.get(run.end).map(|next| (next - value).abs());
+        // Otherwise at most two steps are lost.
+        if resumes.is_none_or(|off| off * run.len() as f64 <= 4.0 * self.step) {
+            return false;
+        }
+        [8, 16, 32, 64]
+            .into_iter()
+            .filter(|&points| run.len() <= points)
+            .any(|points| self.is_crossed(run, points, limit) == Some(true))
     }
+
+    fn is_crossed(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
+        let value = self.values[run.start];
+        let before = run.start.checked_sub(points)?..run.start;
+        let after = run.end..run.end + points;
+        self.values.get(after.clone())?;
+        let in_steps = |k: usize| (self.values[k] - value) / self.step;
+        let middle = 0.5 * (run.start + run.end) as f64;
+        let scale = (points as f64 + 0.5 * run.len() as f64).recip();
+        let time = |k: usize| (k as f64 - middle) * scale;
+        let sides: Vec<usize> = before.clone().chain(after.clone()).collect();
+        let cubic = |k: usize| [1.0, time(k), time(k).powi(2), time(k).powi(3)];
+        // The last sample before the run is sound, too.
+        let last = points - 1;
+        let others: Vec<usize> = sides
+            .iter()
+            .copied()
+            .filter(|&k| k != before.end - 1)
+            .collect();
+        let across = fit(&others, cubic, in_steps)?;
+        let at = |k: usize| {
+            let terms = cubic(k).into_iter().zip(across.0.iter());
+            terms.map(|(term, factor)| term * factor).sum::<f64>()
+        };
+        let rounding = self.of_grid() * sides.len() as f64;
+        let left_over = across.1.max(rounding);
+        let off = in_steps(sides[last]) - at(sides[last]);
+        if off.abs() > limit.sigmas * (left_over / others.len() as f64).sqrt() {
+            return Some(false);
+        }
+        let lost: f64 = run.clone().map(at).sum();
+        let crossed = (left_over + off * off).max(rounding);
+        let (stop, start) = (time(before.end - 1), time(run.end - 1));
+        let powers = |t: f64| [t, t * t, t * t * t];
+        let stops = |k: usize| powers(time(k) - stop);
+        let starts = |k: usize| powers(time(k) - start);
+        let stopped = fit(&before.clone().collect::<Vec<_>>(), stops, in_steps)?.1
+            + fit(&after.clone().collect::<Vec<_>>(), starts, in_steps)?.1;
+        let ratio = points as f64 * (stopped.max(rounding) / crossed).ln();
+        let noise = crossed / sides.len() as f64;
+        // In steps, what rounding and what the cubic leaves over allow.
+        let length = run.len() as f64;
+        let is_lost = |lost: f64, variance: f64| {
+            lost > 2.0 + limit.sigmas * (variance * length * length + noise * length).sqrt()
+        };
+        // Each side by itself must lead away from the run's value, to where the cubic is.
+        let count = points as f64;
+        let apart = 0.5 * (count + length);
+        let leads = |values: Vec<f64>, forth: f64| {
+            let (mean, slope, variance) = line(&values);
+            let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
+            let lost = length * (mean + forth * slope * apart) * lost.signum();
+            is_lost(lost, variance.max(self.of_grid()) * spread)
+        };
+        Some(
+            ratio > limit.nats
+                && is_lost(lost.abs(), 0.0)
+                && leads(before.map(in_steps).collect(), 1.0)
+                && leads(after.map(in_steps).collect(), -1.0),
+        )
+    }
+}
+
+/// Factors of the terms by least squares and the sum of squares left over.
+fn fit<const N: usize>(
+    rows: &[usize],
+    terms: impl Fn(usize) -> [f64; N],
+    value: impl Fn(usize) -> f64,
+) -> Option<(DVector<f64>, f64)> {
+    let design = DMatrix::from_fn(rows.len(), N, |row, term| terms(rows[row])[term]);
+    let values = DVector::from_fn(rows.len(), |row, _| value(rows[row]));
+    let normal = design.tr_mul(&design).cholesky()?;
+    let factors = normal.solve(&design.tr_mul(&values));
+    let left_over = (values - design * &factors).norm_squared();
+    Some((factors, left_over))
+}
+
+/// Mean and slope of a line through values, and the variance about it.
+fn line(values: &[f64]) -> (f64, f64, f64) {
+    let count = values.len() as f64;
+    let middle = 0.5 * (count - 1.0);
+    let mean = values.iter().sum::<f64>() / count;
+    let moments = values.iter().enumerate();
+    let moment: f64 = moments.map(|(k, value)| (k as f64 - middle) * value).sum();
+    let slope = moment * 12.0 / (count * (count * count - 1.0));
+    let off = |(k, value): (usize, &f64)| (value - mean - slope * (k as f64 - middle)).powi(2);
+    let squares: f64 = values.iter().enumerate().map(off).sum();
+    (mean, slope, squares / count)
+}
+
+/// Mean and variance.
+fn moments(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, squares / (count - 1.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
 
-    /// Six columns of noise on a grid of one, with this σ.
-    fn noise(sigma: f64) -> Vec<Vec<f64>> {
-        let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut column = || {
-            let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-            (0..20_000)
-                .map(|_| (sigma * normal() + 0.3).round())
-                .collect()
+    const ROWS: usize = 20_000;
+
+    /// White noise of a σ in steps, about a level.
+    fn noise(seed: u64, sigma: f64, level: f64) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |_| {
+            let normal: f64 = StandardNormal.sample(&mut random);
+            level + sigma * normal
         };
-        (0..6).map(|_| column()).collect()
+        (0..ROWS).map(&mut draw).collect()
     }
 
-    fn find(columns: &[Vec<f64>]) -> [Vec<Range<usize>>; 6] {
-        let columns = std::array::from_fn(|k| columns[k].as_slice());
-        stuck(&columns, &[Some(1.0); 6])
+    fn rounded(values: &[f64]) -> Vec<f64> {
+        values.iter().map(|value| value.round()).collect()
+    }
+
+    /// Whole pulses, the rest carried.
+    fn pulses(values: &[f64]) -> Vec<f64> {
+        let mut sum = 0.0f64;
+        let mut count = |value: &f64| {
+            let before = sum.round();
+            sum += value;
+            sum.round() - before
+        };
+        values.iter().map(&mut count).collect()
+    }
+
+    fn find(values: &[f64], pulses: bool) -> Vec<Range<usize>> {
+        let column = Column {
+            values,
+            step: 1.0,
+            pulses,
+        };
+        column.stuck(Limit::of_rows(values.len()))
+    }
+
+    fn hold(values: &mut [f64], rows: Range<usize>) {
+        let value = values[rows.start];
+        values[rows].fill(value);
+    }
+
+    #[track_caller]
+    fn assert_found(values: &[f64], pulses: bool, rows: Range<usize>) {
+        let found = find(values, pulses);
+        let [run] = found.as_slice() else {
+            panic!("{found:?}");
+        };
+        // Equal values beside belong to it.
+        assert!(run.start.abs_diff(rows.start + 1) <= 5, "{run:?}");
+        assert!((rows.end..rows.end + 5).contains(&run.end), "{run:?}");
     }
 
     #[test]
-    fn an_axis_that_stands_still_is_found_and_no_other() {
-        for sigma in [0.5, 1.0, 10.0] {
-            let mut columns = noise(sigma);
-            assert!(find(&columns).iter().all(Vec::is_empty), "σ {sigma}");
-            let held = columns[2][7000];
-            columns[2][7000..7100].fill(held);
-            let found = find(&columns);
-            let [run] = found[2].as_slice() else {
-                panic!("σ {sigma}: {found:?}");
-            };
-            assert!(run.start <= 7001 && (7100..7110).contains(&run.end));
-            assert_eq!(found.iter().map(Vec::len).sum::<usize>(), 1);
+    fn an_axis_without_its_noise_is_found() {
+        for sigma in [0.7, 1.0, 10.0, 1000.0] {
+            let sound = rounded(&noise(5, sigma, 0.3));
+            assert_eq!(find(&sound, false), [], "σ {sigma}");
+            let mut values = sound.clone();
+            hold(&mut values, 7000..7100);
+            assert_found(&values, false, 7000..7100);
         }
     }
 
     #[test]
-    fn pulses_that_stop_to_change_while_the_table_stands_are_found() {
-        for (rate, held) in [(2.34, 3.0), (1.11, 1.0)] {
-            let mut columns = noise(1.0);
-            for (k, value) in columns[0].iter_mut().enumerate() {
-                let angle = |k: usize| (rate * k as f64).round();
-                *value = angle(k + 1) - angle(k);
+    fn a_grid_coarser_than_noise_repeats_as_it_likes() {
+        for (seed, sigma) in [0.0, 0.05, 0.1, 0.2, 0.3, 0.5].into_iter().enumerate() {
+            for level in [0.0, 0.1, 0.25, 0.5] {
+                // Dwells at many levels, one of them in the middle of a step.
+                let drift = |k: usize| (k / 2000) as f64 * 1.37;
+                let truth = noise(seed as u64, sigma, level);
+                let dwells: Vec<f64> = (0..ROWS).map(|k| truth[k] + drift(k)).collect();
+                assert_eq!(find(&rounded(&dwells), false), [], "σ {sigma} {level}");
+                assert_eq!(find(&pulses(&dwells), true), [], "σ {sigma} {level}");
             }
-            assert!(find(&columns).iter().all(Vec::is_empty));
-            columns[0][7000..7100].fill(held);
-            assert_eq!(find(&columns)[0].len(), 1, "{rate}");
         }
     }
 
     #[test]
-    fn a_grid_that_is_coarser_than_noise_is_no_fault() {
-        for sigma in [0.05, 0.2] {
-            assert!(find(&noise(sigma)).iter().all(Vec::is_empty), "σ {sigma}");
+    fn noise_that_is_correlated_repeats_longer() {
+        let mut values = noise(3, 1.0, 0.2);
+        for k in 1..ROWS {
+            values[k] = 0.95 * values[k - 1] + 0.05 * 6.0 * values[k];
         }
+        assert_eq!(find(&rounded(&values), false), []);
     }
 
     #[test]
-    fn a_rate_that_drifts_through_a_step_is_no_fault() {
-        // Pulses of an angle whose rate passes 10 a row, where they come in tens for a long time.
-        let mut columns = noise(1.0);
-        let angle = |k: usize| 10.0 * k as f64 + 2e-6 * (k as f64 - 10_000.0).powi(2);
-        for (k, value) in columns[0].iter_mut().enumerate() {
-            *value = angle(k + 1).round() - angle(k).round();
+    fn pulses_of_a_rate_near_a_whole_number_are_sound_and_others_do_not_repeat() {
+        for rate in [2.0, 2.003, 2.02, 2.34] {
+            let sound = pulses(&noise(7, 0.02, rate));
+            assert_eq!(find(&sound, true), [], "{rate}");
         }
-        assert!(find(&columns).iter().all(Vec::is_empty));
+        let mut values = pulses(&noise(7, 0.02, 2.34));
+        hold(&mut values, 7000..7100);
+        assert_found(&values, true, 7000..7100);
+    }
+
+    #[test]
+    fn a_rate_that_drifts_through_a_step_or_touches_it_is_sound() {
+        for truth in [
+            &(|k: usize| 10.0 + 4e-6 * (k as f64 - 10_000.0)) as &dyn Fn(usize) -> f64,
+            &|k| 10.0 + 1e-8 * (k as f64 - 10_000.0).powi(2),
+            &|k| 10.0 + 1e-6 * (k as f64 - 10_000.0).powi(2),
+            &|k| 10.0 + 1e-4 * (k as f64 - 10_000.0).powi(2),
+        ] {
+            let truth: Vec<f64> = (0..ROWS).map(truth).collect();
+            assert_eq!(find(&pulses(&truth), true), []);
+            assert_eq!(find(&rounded(&truth), false), []);
+        }
     }
 
     #[test]
     fn a_quiet_dwell_between_turns_is_no_fault() {
-        // A turn, a dwell so near the middle of a step that nothing is seen of noise, and a turn.
-        let mut columns = noise(1.0);
-        for (k, value) in columns[0].iter_mut().enumerate() {
-            let turned = 9800.0 - k as f64;
-            *value = match k {
-                0..9800 => turned.round(),
-                9800..10_200 => 0.0,
-                _ => (turned + 400.0).round(),
-            };
+        for dwell in [20, 100, 400] {
+            for back in [-1.0, 1.0] {
+                let truth = |k: usize| match k {
+                    0..9800 => 9800.0 - k as f64,
+                    k if k < 9800 + dwell => 0.0,
+                    k => back * (k - 9800 - dwell) as f64,
+                };
+                let values: Vec<f64> = (0..ROWS).map(truth).collect();
+                assert_eq!(find(&values, true), [], "{dwell} {back}");
+            }
         }
-        assert!(find(&columns).iter().all(Vec::is_empty));
+    }
+
+    #[test]
+    fn an_axis_that_stops_within_a_smooth_motion_is_found() {
+        // A component of gravity while a table turns at 45 °/s, 100 Hz.
+        let truth = |k: usize| 9800.0 * (0.0079 * k as f64).sin();
+        let mut values: Vec<f64> = (0..ROWS).map(truth).collect();
+        values = pulses(&values);
+        assert_eq!(find(&values, true), []);
+        for length in [20, 50] {
+            let mut values = values.clone();
+            hold(&mut values, 7010..7010 + length);
+            assert_found(&values, true, 7010..7010 + length);
+        }
     }
 }

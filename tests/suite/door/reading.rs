@@ -147,6 +147,24 @@ fn time_stamps_may_name_any_moment_of_a_sample_and_be_rounded() {
 }
 
 #[test]
+fn stamps_rule_over_a_period_that_they_contradict_and_it_is_said_what_that_means() {
+    for (stated, ppm) in [
+        (1.0 / 128.0, None),
+        (1.000_1 / 128.0, Some("99.99 ppm less")),
+    ] {
+        let run = reread(
+            |text| text.replace("0.0078125\n", &format!("{stated}\n")),
+            plain,
+        );
+        assert!((run.recording.imu.period * 128.0 - 1.0).abs() < 1e-9);
+        let said =
+            |note: &String| note.contains("sample_period_s") && note.contains(ppm.unwrap_or("ppm"));
+        let notes = &run.recording.notes;
+        assert_eq!(notes.iter().any(said), ppm.is_some(), "{notes:?}");
+    }
+}
+
+#[test]
 fn axis_angles_multiply_from_the_outer_axis_in() {
     let run = reread(
         |text| {

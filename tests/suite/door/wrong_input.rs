@@ -363,10 +363,6 @@ fn each_wrong_file_has_its_message() {
         + &(1..=200)
             .map(|k| format!("{:.2},1,1,1,1,1,1\n", f64::from(k) * 0.02))
             .collect::<String>();
-    let drifting: String = header.to_owned()
-        + &(1..=200)
-            .map(|k| format!("{:.4},1,1,1,1,1,1\n", f64::from(k) * 0.0101))
-            .collect::<String>();
     let parted: String = header.to_owned()
         + &(1..=200)
             .map(|k| f64::from(k) * 0.01 + if k > 100 { 98.99 } else { 0.0 })
@@ -380,11 +376,6 @@ fn each_wrong_file_has_its_message() {
             "imu.csv",
             &twice_as_slow,
             "steps of 0.02 s & sample_period_s",
-        ),
-        (
-            "imu.csv",
-            &drifting,
-            "a row every 0.0101 s & sample_period_s",
         ),
         ("imu.csv", &parted, "line 102 & gap & 1 s to 100 s & split"),
         ("table.csv", &table_elsewhere, "90 s to 92 s & overlap"),
