@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
     /// What is stated.
-    #[default]
     Stated,
     /// What is stated unless the data contradict it, which right figures do in one run of a thousand;
     /// else what the data show.
+    #[default]
     Auto,
     /// What the data show, around what is stated.
     Learnt,

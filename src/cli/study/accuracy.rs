@@ -52,8 +52,8 @@ pub struct Accuracy {
     /// Error terms to simulate and not to estimate
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     unmodelled: Vec<TermArgument>,
-    /// Which noise the filter uses
-    #[arg(long, value_enum, default_value_t = Noise::default())]
+    /// Which noise the filter uses; what a scenario states is right
+    #[arg(long, value_enum, default_value_t = Noise::Stated)]
     noise: Noise,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
