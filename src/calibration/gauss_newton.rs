@@ -16,6 +16,7 @@ use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
 use super::parameters::parameter_name;
 use super::pass::{Gate, Mode, PassResult, pass};
+use super::prior_distance::far_from_prior;
 use super::problem::Problem;
 use crate::imu::Sensor;
 use crate::run::Aiding;
@@ -162,6 +163,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             sources: noise.sources.clone(),
         });
     }
+    findings.extend(far_from_prior(&outcome.model, &outcome.estimate));
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();
     let by = "this path";
