@@ -171,9 +171,9 @@ impl Legs<'_> {
     }
 
     /// The sample edge nearest to each of some readings, with its attitude.
-    fn readings<'t>(
+    fn readings(
         &self,
-        table: &'t TableLog,
+        table: &TableLog,
         readings: Range<usize>,
     ) -> impl Iterator<Item = (usize, Matrix3<f64>)> {
         let times = table.time.iter().zip(&table.attitude);
