@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::mounting::Mounting;
 use crate::imu::Sensor;
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
@@ -68,6 +69,9 @@ pub enum CalibrationError {
         /// What it is.
         term: &'static str,
     },
+    /// Axes that are swapped, reversed or left-handed.
+    #[error("{0}")]
+    Mounting(Box<Mounting>),
     /// Samples that no error within the prior explains, or absurd noise figures.
     #[error(
         "the filter diverged at {time:.2} s: samples and run.toml do not fit each other; check latitude, \

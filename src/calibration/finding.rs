@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::innovation::Inconsistency;
 use super::noise::SourceFigures;
+use super::prior_cause::PriorCause;
 use crate::imu::InstallationForm;
 use crate::units::DEGREE;
 
@@ -104,6 +105,10 @@ pub enum Finding {
         sigmas: f64,
         /// Their names.
         parameters: Vec<String>,
+        /// Of each, its distance from the prior's mean in the prior's σ.
+        distances: Vec<f64>,
+        /// What most likely made it.
+        causes: Vec<PriorCause>,
     },
     /// Labelled sections that were not used, for a part of them is lost.
     SectionsLost {
@@ -229,11 +234,24 @@ impl fmt::Display for Finding {
                  would explain most (NIS {nis_without:.2} → {nis_with:.2}): use --with {term}, then look \
                  again."
             ),
-            Self::FarFromPrior { sigmas, parameters } => write!(
-                f,
-                "More than {sigmas} σ of [imu.prior] away from it: {}. Check labels, units and prior.",
-                parameters.join(", ")
-            ),
+            Self::FarFromPrior {
+                sigmas,
+                parameters,
+                distances,
+                causes,
+            } => {
+                let each = parameters.iter().zip(distances);
+                let each: Vec<String> = each
+                    .map(|(name, distance)| format!("{name} by {distance:+.0} σ"))
+                    .collect();
+                let causes: Vec<String> = causes.iter().map(PriorCause::to_string).collect();
+                write!(
+                    f,
+                    "More than {sigmas} σ of [imu.prior] away from it: {}. Likely: {}.",
+                    each.join(", "),
+                    causes.join("; ")
+                )
+            }
             Self::SectionsLost { labels } => write!(
                 f,
                 "Not used, for a part of it is lost: section {}.",

@@ -18,6 +18,7 @@ use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
 use super::parameters::{ParameterMatrix, parameter_name};
 use super::pass::{Gate, Mode, PassResult, pass};
+use super::prior_distance::far_from_prior;
 use super::problem::Problem;
 use crate::imu::Sensor;
 use crate::run::Aiding;
@@ -189,6 +190,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             sources: noise.sources.clone(),
         });
     }
+    findings.extend(far_from_prior(&outcome.model, &outcome.estimate));
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();
     let by = "this path";

@@ -27,6 +27,7 @@ mod iterations;
 mod layout;
 mod linearisation;
 pub(crate) mod model;
+mod mounting;
 mod nees;
 mod noise;
 mod observability;
@@ -34,6 +35,8 @@ mod options;
 mod outcome;
 mod parameters;
 mod pass;
+mod prior_cause;
+mod prior_distance;
 mod problem;
 mod quality;
 mod record;
@@ -70,6 +73,7 @@ pub use innovation::{
 };
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::{Model, MotionNoise};
+pub use mounting::Mounting;
 pub use nees::{Nees, nees};
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use observability::{AttitudePart, Direction, Observability, Part};
@@ -80,6 +84,7 @@ pub use parameters::{
     parameter, parameter_name, sensor_and_parameter, to_vector,
 };
 pub use pass::Epoch;
+pub use prior_cause::PriorCause;
 pub use problem::Problem;
 pub use quality::{Measures, Quality, Spread};
 pub use record::truth_record;

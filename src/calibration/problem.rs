@@ -153,10 +153,14 @@ impl<'a> Problem<'a> {
         self.run
     }
 
+    /// All runs, in order.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &'a Run> {
+        std::iter::once(self.run).chain(self.others.iter().copied())
+    }
+
     /// What the readers of the runs' files found.
     pub(super) fn notes(&self) -> impl Iterator<Item = &String> {
-        let runs = std::iter::once(&self.run).chain(&self.others);
-        runs.flat_map(|run| &run.recording.notes)
+        self.runs().flat_map(|run| &run.recording.notes)
     }
 
     /// What is observed at the end of a step, in order.

@@ -6,6 +6,7 @@ use super::error_term_test::{ErrorTermTest, test_error_terms};
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::gauss_newton::{Progress, estimate};
+use super::mounting::Mounting;
 use super::outcome::Outcome;
 use super::problem::Problem;
 use super::quality::Quality;
@@ -30,11 +31,14 @@ pub struct Assessment {
 }
 
 impl Problem<'_> {
-    /// Solves it by a method.
+    /// Solves it by a method, unless a mounting other than the stated one is found: then by none.
     ///
     /// # Errors
     /// [`CalibrationError`] where the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
+        if let Some(mounting) = Mounting::contradicted(self) {
+            return Err(CalibrationError::Mounting(Box::new(mounting)));
+        }
         Ok(match method {
             Method::Ekf => Solution::Filter(Box::new(estimate(self, progress)?)),
             Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),

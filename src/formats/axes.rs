@@ -5,6 +5,8 @@
 
 use nalgebra::Vector3;
 
+use crate::imu::AxisOrder;
+
 /// What x, y, z of a file are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BodyAxes {
@@ -27,6 +29,15 @@ impl BodyAxes {
             Self::Rfu => [(0, 1.0), (1, 1.0), (2, 1.0)],
             Self::Frd => [(1, 1.0), (0, 1.0), (2, -1.0)],
             Self::Flu => [(1, -1.0), (0, 1.0), (2, 1.0)],
+        }
+    }
+
+    /// From the file's axes to right-front-up.
+    pub fn order(self) -> AxisOrder {
+        let sources = self.sources();
+        AxisOrder {
+            source: sources.map(|(axis, _)| axis),
+            reversed: sources.map(|(_, sign)| sign < 0.0),
         }
     }
 

@@ -12,6 +12,8 @@ use flate2::read::MultiGzDecoder;
 use super::error::{FileError, Place, list, nearest};
 use lines::Lines;
 
+use crate::recording::FileColumn;
+
 /// What the names of such files end in, each also with `.gz` behind it.
 const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
 
@@ -132,6 +134,18 @@ impl CsvFile {
                 },
             )),
         }
+    }
+
+    /// The same of a name that a minus may precede, which turns the sign of the column's values; a column
+    /// that is called so with its minus is itself meant.
+    pub fn signed_column(&mut self, name: &str) -> Result<(usize, FileColumn), FileError> {
+        let literal = self.header.iter().any(|known| known == name);
+        let bare = name.strip_prefix('-').filter(|_| !literal);
+        let column = FileColumn {
+            name: bare.unwrap_or(name).to_owned(),
+            reversed: bare.is_some(),
+        };
+        Ok((self.column(&column.name)?, column))
     }
 
     /// Goes to the next row; false at the end of the file.

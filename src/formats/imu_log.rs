@@ -11,7 +11,8 @@ use super::error::FileError;
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
-use crate::recording::{ColumnFacts, ImuSamples, LogFacts, TemperatureFacts, stretches_between};
+use crate::recording::{ColumnFacts, FileColumn, ImuSamples, LogFacts, NamedColumns};
+use crate::recording::{TemperatureFacts, stretches_between};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
@@ -61,6 +62,7 @@ pub(super) struct ImuLog<'a> {
 /// What the file holds.
 struct Content {
     stamps: Vec<(f64, u64)>,
+    triads: PerSensor<[FileColumn; 3]>,
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
     columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
@@ -73,6 +75,7 @@ impl ImuLog<'_> {
     pub fn read(&self) -> Result<ImuSamples, FileError> {
         let Content {
             stamps,
+            triads,
             columns,
             duplicates,
             temperature,
@@ -85,10 +88,10 @@ impl ImuLog<'_> {
         };
         let body_axes = std::array::from_fn(|column| self.axes.body_axis(column % 3));
         let sensor = |column: usize| Sensor::ALL[column / 3];
-        let names = [self.triads.gyro, self.triads.accel].concat();
+        let named = |k: usize| &triads.get(sensor(k))[k % 3];
         let unit = |k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]];
         let units = std::array::from_fn(unit);
-        let facts = std::array::from_fn(|k| ColumnFacts::of(names[k], &columns[k], units[k]));
+        let facts = std::array::from_fn(|k| ColumnFacts::of(&named(k).name, &columns[k], units[k]));
         let rows = Rows {
             columns,
             facts: &facts,
@@ -111,9 +114,13 @@ impl ImuLog<'_> {
         let samples = PerSensor::from_fn(|sensor| {
             let nominal = self.nominal.get(sensor).0;
             let [x, y, z] = std::array::from_fn(|axis| &columns[3 * sensor as usize + axis]);
+            let signs = triads.get(sensor).each_ref();
+            let signs = Vector3::from(signs.map(|column| if column.reversed { -1.0 } else { 1.0 }));
             let rows = x.iter().zip(y).zip(z);
             let sample = |((&x, &y), &z)| {
-                let row = self.axes.vector(Vector3::new(x, y, z));
+                let row = self
+                    .axes
+                    .vector(Vector3::new(x, y, z).component_mul(&signs));
                 (row * seconds).component_div(&nominal)
             };
             rows.map(sample).collect::<Vec<_>>()
@@ -146,6 +153,12 @@ impl ImuLog<'_> {
                 jitter_max: clock.jitter_max,
                 off_stated_period: clock.off_given,
                 columns: of_axes,
+                named: NamedColumns {
+                    time: self.clock.column.map(str::to_owned),
+                    triads,
+                    temperature: self.temperature.map(str::to_owned),
+                    axes: self.axes.order(),
+                },
                 temperature,
             }),
         })
@@ -154,11 +167,18 @@ impl ImuLog<'_> {
     fn content(&self) -> Result<Content, FileError> {
         let mut csv = CsvFile::open(&self.file)?;
         let mut stamps = self.clock.start(&mut csv)?;
-        let mut places = [0; 6];
-        let names = [self.triads.gyro, self.triads.accel];
-        for (place, name) in places.iter_mut().zip(names.as_flattened()) {
-            *place = csv.column(name)?;
-        }
+        let mut triad = |[x, y, z]: [&str; 3]| -> Result<_, FileError> {
+            Ok([
+                csv.signed_column(x)?,
+                csv.signed_column(y)?,
+                csv.signed_column(z)?,
+            ])
+        };
+        let found = PerSensor {
+            gyro: triad(self.triads.gyro)?,
+            accel: triad(self.triads.accel)?,
+        };
+        let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
         let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
 
         let mut columns = [const { Vec::new() }; 6];
@@ -193,8 +213,13 @@ impl ImuLog<'_> {
                 "Record a run with dwells and turns.",
             ));
         }
+        let PerSensor { gyro, accel } = found;
         Ok(Content {
             stamps,
+            triads: PerSensor {
+                gyro: gyro.map(|(_, column)| column),
+                accel: accel.map(|(_, column)| column),
+            },
             columns,
             duplicates,
             temperature: TemperatureFacts::of(&temperatures),

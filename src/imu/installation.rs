@@ -102,10 +102,12 @@ impl InstallationForm {
     /// Splits a sensitivity matrix `A = K C` into scale factors and installation angles (design §4).
     ///
     /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and the half
-    /// difference of the two entries of a pair, and is wrong by the pair's half sum.
+    /// difference of the two entries of a pair, and is wrong by the pair's half sum. The sign of a scale
+    /// factor is that of its diagonal entry in every form: an axis that senses against its body axis has
+    /// a negative one.
     pub fn split(self, a: &Matrix3<f64>) -> (SVector<f64, 3>, SVector<f64, ANGLES>) {
         let scale = match self {
-            Self::General => SVector::from_fn(|i, _| a.row(i).norm()),
+            Self::General => SVector::from_fn(|i, _| a.row(i).norm().copysign(a[(i, i)])),
             Self::SixAngle | Self::ThreeAngle => a.diagonal(),
         };
         let c = SMatrix::<f64, 3, 3>::from_fn(|i, j| a[(i, j)] / scale[i]);
@@ -177,7 +179,8 @@ mod tests {
     fn split_inverts_the_product_in_every_form() {
         for form in InstallationForm::ALL {
             let at = angles(form);
-            let k = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.1, 0.9, 1.3));
+            // The second axis senses against its body axis.
+            let k = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.1, -0.9, 1.3));
             let (scale, found) = form.split(&(k * form.matrix(&at)));
             assert_relative_eq!(scale, k.diagonal(), epsilon = 1e-14);
             assert_relative_eq!(found, at, epsilon = 1e-14);

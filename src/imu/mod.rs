@@ -8,6 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
+mod axis_order;
 mod body_frame;
 mod installation;
 mod instrument;
@@ -16,6 +17,7 @@ mod signal;
 mod terms;
 mod triad;
 
+pub use axis_order::AxisOrder;
 pub use body_frame::BodyFrame;
 pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;

@@ -1,6 +1,6 @@
 //! What a log looks like, before anything is made of it.
 
-use crate::imu::PerSensor;
+use crate::imu::{AxisOrder, PerSensor, Sensor};
 
 /// The instrument's file in figures, in its own units.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +16,62 @@ pub struct LogFacts {
     pub off_stated_period: Option<f64>,
     /// The columns that hold each triad's body axes right, front, up, as they stand in the file.
     pub columns: PerSensor<[ColumnFacts; 3]>,
+    /// The columns as `run.toml` names them.
+    pub named: NamedColumns,
     /// The temperature column, if there is one.
     pub temperature: Option<TemperatureFacts>,
+}
+
+/// The columns as `run.toml` names them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedColumns {
+    /// Of time, if it is named.
+    pub time: Option<String>,
+    /// Of both triads, along the axes of the file.
+    pub triads: PerSensor<[FileColumn; 3]>,
+    /// Of temperature, if it is named.
+    pub temperature: Option<String>,
+    /// From the file's axes to right-front-up.
+    pub axes: AxisOrder,
+}
+
+/// A column of a triad.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileColumn {
+    /// Its name in the file.
+    pub name: String,
+    /// Whether its values are read with their sign turned round.
+    pub reversed: bool,
+}
+
+impl NamedColumns {
+    /// The line of `run.toml` that reads the samples of each triad in another order, given along
+    /// right-front-up.
+    pub fn line(&self, orders: &PerSensor<AxisOrder>) -> String {
+        let mut fields = Vec::new();
+        let quoted = |name: &str| toml::Value::from(name).to_string();
+        fields.extend(
+            self.time
+                .iter()
+                .map(|name| format!("time = {}", quoted(name))),
+        );
+        for sensor in Sensor::ALL {
+            let of_file = self
+                .axes
+                .inverse()
+                .after(&orders.get(sensor).after(&self.axes));
+            let columns = self.triads.get(sensor);
+            let names = [0, 1, 2].map(|axis| {
+                let FileColumn { name, reversed } = &columns[of_file.source[axis]];
+                let minus = *reversed != of_file.reversed[axis];
+                quoted(&format!("{}{name}", if minus { "-" } else { "" }))
+            });
+            fields.push(format!("{} = [{}]", sensor.name(), names.join(", ")));
+        }
+        let temperature = self.temperature.iter();
+        fields.extend(temperature.map(|name| format!("temperature = {}", quoted(name))));
+        format!("columns = {{ {} }}", fields.join(", "))
+    }
 }
 
 /// One column of samples.
@@ -127,5 +181,42 @@ mod tests {
     fn a_number_of_all_digits_is_on_no_grid() {
         let values: Vec<f64> = (0..1000).map(|k| f64::from(k).sin()).collect();
         assert_eq!(ColumnFacts::of("gx", &values, 1.0).step, None);
+    }
+
+    #[test]
+    fn columns_are_named_along_the_axes_of_the_file() {
+        let column = |name: &str| FileColumn {
+            name: name.to_owned(),
+            reversed: name == "wz",
+        };
+        // Front, right, down.
+        let named = NamedColumns {
+            time: Some("t".to_owned()),
+            triads: PerSensor {
+                gyro: ["wx", "wy", "wz"].map(column),
+                accel: ["fx", "fy", "fz"].map(column),
+            },
+            temperature: None,
+            axes: AxisOrder {
+                source: [1, 0, 2],
+                reversed: [false, false, true],
+            },
+        };
+        let as_it_is = named.line(&PerSensor {
+            gyro: AxisOrder::IDENTITY,
+            accel: AxisOrder::IDENTITY,
+        });
+        let expected =
+            r#"columns = { time = "t", gyro = ["wx", "wy", "-wz"], accel = ["fx", "fy", "fz"] }"#;
+        assert_eq!(as_it_is, expected);
+        // Right is to be what comes in as up: y of the file is what it gives as −z.
+        let turned = named.line(&PerSensor {
+            gyro: AxisOrder {
+                source: [2, 1, 0],
+                reversed: [false; 3],
+            },
+            accel: AxisOrder::IDENTITY,
+        });
+        assert!(turned.contains(r#"gyro = ["wx", "wz", "-wy"]"#), "{turned}");
     }
 }

@@ -8,7 +8,7 @@ mod samples;
 mod segment;
 
 pub use faults::{Bridge, Fault, FaultKind};
-pub use log_facts::{ColumnFacts, LogFacts, TemperatureFacts};
+pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
 pub(crate) use samples::stretches_between;
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};

@@ -6,6 +6,7 @@ mod outlook;
 mod rest;
 mod turn;
 
+use crate::calibration::{Mounting, Options, Problem};
 use crate::imu::{PerSensor, Sensor};
 use crate::run::Run;
 use crate::units::DEGREE;
@@ -27,6 +28,8 @@ pub struct Survey {
     pub labels: Vec<LabelCheck>,
     /// What each method could see.
     pub methods: Vec<MethodOutlook>,
+    /// A mounting that the record shows in place of the stated one.
+    pub mounting: Option<Mounting>,
     /// How long it stands.
     pub standing: Standing,
     /// Step of each axis' grid, rad/s or m/s², where the file's values lie on one.
@@ -56,6 +59,7 @@ impl Survey {
             turns: turn::turns(run, &rests),
             labels: label::checks(run, &rests),
             methods: outlook::methods(run),
+            mounting: Mounting::contradicted(&Problem::new(run, &Options::default())),
             standing: Standing {
                 total: durations().sum(),
                 longest: durations().fold(0.0, f64::max),

@@ -19,6 +19,7 @@ mod init;
 #[cfg(unix)]
 mod interrupted;
 mod modules;
+mod mounting;
 mod navigate;
 mod navigation;
 mod observability;

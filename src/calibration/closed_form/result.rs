@@ -4,6 +4,7 @@ use super::super::estimate::Estimate;
 use super::super::finding::Finding;
 use super::super::model::Model;
 use super::super::parameters::{OBSERVED_BELOW, parameter_name};
+use super::super::prior_distance::far_from_prior;
 use crate::imu::{BodyFrame, PerSensor};
 
 /// Where the inputs of a closed form are known from.
@@ -44,32 +45,18 @@ pub struct ClosedForm {
     pub findings: Vec<Finding>,
 }
 
-/// Parameters further from their prior than this many of its σ contradict it.
-const CONTRADICTS: f64 = 5.0;
-
 /// Parameters that are hardly better known than before, and those that the prior does not allow, if
 /// there are any.
 pub(super) fn remarks(model: &Model, estimate: &Estimate, reference: Reference) -> Vec<Finding> {
     let sigma = estimate.sigma();
-    let off = estimate.vector() - model.prior_mean;
-    let far = |&i: &usize| {
-        let prior = model.prior_sigma[i];
-        prior > 0.0 && off[i].abs() > CONTRADICTS * prior.hypot(sigma[i])
-    };
     let hidden = |&i: &usize| {
         let prior = model.prior_sigma[i];
         prior > 0.0 && sigma[i] > OBSERVED_BELOW * prior
     };
-    let named = |which: &dyn Fn(&usize) -> bool| -> Vec<String> {
-        let those = estimate.estimated().filter(which);
-        let names = those.filter_map(|index| parameter_name(estimate.form(), index));
-        names.collect()
-    };
-    let (far, hidden) = (named(&far), named(&hidden));
-    let far = (!far.is_empty()).then_some(Finding::FarFromPrior {
-        sigmas: CONTRADICTS,
-        parameters: far,
-    });
+    let names = estimate.estimated().filter(hidden);
+    let hidden: Vec<String> = names
+        .filter_map(|index| parameter_name(estimate.form(), index))
+        .collect();
     let hidden = (!hidden.is_empty()).then_some(Finding::NotObserved {
         by: match reference {
             Reference::Table => "these positions",
@@ -78,5 +65,8 @@ pub(super) fn remarks(model: &Model, estimate: &Estimate, reference: Reference) 
         },
         parameters: hidden,
     });
-    far.into_iter().chain(hidden).collect()
+    far_from_prior(model, estimate)
+        .into_iter()
+        .chain(hidden)
+        .collect()
 }

@@ -1,6 +1,7 @@
 //! What has to be said of a run before it is calibrated.
 
 use super::super::number::{count, three_digits, value};
+use crate::calibration::Mounting;
 use crate::imu::AXES;
 use crate::recording::LabelledMotion;
 use crate::run::Run;
@@ -85,11 +86,20 @@ pub(super) fn log(run: &Run, survey: &Survey) -> String {
 /// What to look at and what to change, a sentence or two each.
 pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = run.recording.notes.clone();
+    findings.extend(survey.mounting.iter().map(of_mounting));
     findings.extend(of_units(run, survey));
     findings.extend(survey.labels.iter().filter_map(of_label));
     findings.extend(of_motion(survey));
     findings.extend(of_methods(survey));
     findings
+}
+
+/// What the methods refuse, in a sentence.
+fn of_mounting(mounting: &Mounting) -> String {
+    let said = mounting.to_string();
+    let mut letters = said.chars();
+    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
+    first.into_iter().chain(letters).collect()
 }
 
 /// Signs of a wrong unit, scale or frame.

@@ -94,3 +94,15 @@ fn positions_in_a_plane_are_refused() {
     let truth = triad(InstallationForm::General);
     assert!(six_position_triad(&six(&truth, 9.8)[..4], InstallationForm::General).is_none());
 }
+
+#[test]
+fn an_axis_that_senses_against_its_body_axis_keeps_its_sign() {
+    for form in InstallationForm::ALL {
+        let mut truth = triad(form);
+        truth.scale.y = -truth.scale.y;
+        let (found, covariance) = six_position_triad(&six(&truth, 9.8), form).unwrap();
+        assert_relative_eq!(found.scale, truth.scale, epsilon = 1e-9);
+        assert!(covariance[(1, 1)] > 0.0);
+        assert_relative_eq!(found.bias, truth.bias, epsilon = 1e-9);
+    }
+}

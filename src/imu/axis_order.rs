@@ -1,0 +1,123 @@
+//! The 48 ways in which three axes can be ordered and reversed.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// A signed permutation of three axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AxisOrder {
+    /// For each axis of the result the axis of the argument that it is …
+    pub source: [usize; 3],
+    /// … and whether that is reversed.
+    pub reversed: [bool; 3],
+}
+
+impl AxisOrder {
+    /// As they are.
+    pub const IDENTITY: Self = Self {
+        source: [0, 1, 2],
+        reversed: [false; 3],
+    };
+
+    /// All 48, the first being the identity.
+    pub fn all() -> impl Iterator<Item = Self> {
+        const ORDERS: [[usize; 3]; 6] = [
+            [0, 1, 2],
+            [1, 0, 2],
+            [0, 2, 1],
+            [2, 1, 0],
+            [1, 2, 0],
+            [2, 0, 1],
+        ];
+        ORDERS.into_iter().flat_map(|source| {
+            (0..8).map(move |signs| Self {
+                source,
+                reversed: [0, 1, 2].map(|axis| signs >> axis & 1 == 1),
+            })
+        })
+    }
+
+    /// The factor of an axis of the result, 1 or −1.
+    pub fn sign(&self, axis: usize) -> f64 {
+        if self.reversed[axis] { -1.0 } else { 1.0 }
+    }
+
+    /// A vector with its components so ordered and reversed.
+    pub fn apply(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
+    }
+
+    /// As a matrix.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| match column == self.source[row] {
+            true => self.sign(row),
+            false => 0.0,
+        })
+    }
+
+    /// The order that is this one after another.
+    pub fn after(&self, first: &Self) -> Self {
+        Self {
+            source: self.source.map(|axis| first.source[axis]),
+            reversed: [0, 1, 2]
+                .map(|axis| self.reversed[axis] != first.reversed[self.source[axis]]),
+        }
+    }
+
+    /// The order that undoes it.
+    pub fn inverse(&self) -> Self {
+        let mut inverse = Self::IDENTITY;
+        for axis in 0..3 {
+            inverse.source[self.source[axis]] = axis;
+            inverse.reversed[self.source[axis]] = self.reversed[axis];
+        }
+        inverse
+    }
+
+    /// The same with every axis reversed.
+    pub fn opposite(&self) -> Self {
+        Self {
+            reversed: self.reversed.map(|reversed| !reversed),
+            ..*self
+        }
+    }
+
+    /// Whether right-handed axes stay right-handed: whether it is a rotation.
+    pub fn is_rotation(&self) -> bool {
+        self.matrix().determinant() > 0.0
+    }
+
+    /// Number of axes that do not stay as they are.
+    pub fn changed(&self) -> usize {
+        let changed = |&axis: &usize| self.source[axis] != axis || self.reversed[axis];
+        (0..3).filter(changed).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_48_of_which_24_are_rotations() {
+        let all: Vec<AxisOrder> = AxisOrder::all().collect();
+        assert_eq!(all.len(), 48);
+        assert_eq!(all[0], AxisOrder::IDENTITY);
+        for (k, order) in all.iter().enumerate() {
+            assert!(!all[..k].contains(order));
+        }
+        assert_eq!(all.iter().filter(|order| order.is_rotation()).count(), 24);
+    }
+
+    #[test]
+    fn orders_are_their_matrices() {
+        let v = Vector3::new(1.0, 2.0, 3.0);
+        for a in AxisOrder::all() {
+            assert_eq!(a.apply(&v), a.matrix() * v);
+            assert_eq!(a.inverse().matrix(), a.matrix().transpose());
+            assert_eq!(a.opposite().matrix(), -a.matrix());
+            for b in AxisOrder::all() {
+                assert_eq!(a.after(&b).matrix(), a.matrix() * b.matrix());
+            }
+        }
+    }
+}
