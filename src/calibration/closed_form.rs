@@ -27,7 +27,7 @@ pub use table::six_position_of;
 /// positions is the paper's half sums and half differences where they are exactly opposite.
 ///
 /// # Errors
-/// [`CalibrationError`] if the positions do not determine the twelve numbers of a triad.
+/// [`CalibrationError`] if nothing is at rest. What the positions do not determine keeps its prior.
 pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let sections = &problem.run().recording.segments;
     let reference = if problem.model.aiding == Aiding::Table {

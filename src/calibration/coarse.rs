@@ -16,6 +16,7 @@ use super::linearisation::{AttitudePrior, Linearisation, singular};
 use super::problem::Problem;
 use crate::attitude::exp;
 use crate::imu::TermVector;
+pub(super) use equations::{Equations, gauss_newton};
 use turns::Turned;
 
 /// Where the filter begins.
@@ -55,7 +56,7 @@ impl CoarseStart {
 /// with the heading from the rates at rest.
 ///
 /// # Errors
-/// [`CalibrationError`] if there are fewer than two dwells, or data and prior do not fit each other.
+/// [`CalibrationError`] if there is no dwell, or data and prior do not fit each other.
 pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> {
     enough(problem)?;
     if let Some(attitudes) = attitudes_of_table(problem) {
@@ -120,7 +121,7 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
 
 fn enough(problem: &Problem) -> Result<(), CalibrationError> {
     match problem.dwells().count() {
-        found @ (0 | 1) => Err(CalibrationError::TooFewDwells { found, needed: 2 }),
+        0 => Err(CalibrationError::NoDwells),
         _ => Ok(()),
     }
 }

@@ -15,18 +15,14 @@ pub enum CalibrationError {
          --aiding table out"
     )]
     NoTable,
-    /// Not enough standing positions.
+    /// Nothing at rest.
     #[error(
-        "dwells found: {found}, expected: at least {needed}; the instrument must stand for a second or \
-         more between turns; check the table's log, and reading_sigma_arcsec if it is noisier than \
-         stated; without a log, the gyros' prior bias and noise figures"
+        "no dwell was found, expected: one at least, better one with each axis up and each down; the \
+         instrument must stand for a second or more between turns; check the table's log, and \
+         reading_sigma_arcsec if it is noisier than stated; without a log, the gyros' prior bias and noise \
+         figures"
     )]
-    TooFewDwells {
-        /// Dwells found.
-        found: usize,
-        /// Dwells needed.
-        needed: usize,
-    },
+    NoDwells,
     /// A prior of σ zero or an estimate that went astray.
     #[error(
         "the sensitivity matrix K·C of the {} became singular: the data and [imu.prior.{0}] \
@@ -36,27 +32,13 @@ pub enum CalibrationError {
         /// Which triad.
         sensor: Sensor,
     },
-    /// Dwells that do not span what is to be found.
+    /// Labelled sections of which none can be used.
     #[error(
-        "the {} dwells used for the {} do not determine its three scale factors, installation and \
-         biases: positions with every body axis up and down (accelerometers) or along Earth rate \
-         (gyros) are needed", .dwells, .sensor.name()
+        "of the sections {} none tells how the instrument stands or turns, or a part of each is lost; \
+         name positions and turns such as `x_up`, `x_down`, `rot_x+360`, or leave [segments] out and let \
+         every dwell and turn count", quoted(.labels)
     )]
-    Degenerate {
-        /// Which triad.
-        sensor: Sensor,
-        /// Dwells used.
-        dwells: usize,
-    },
-    /// Labelled sections that do not tell what is to be found.
-    #[error(
-        "the sections {} do not determine the twelve numbers of the {}: needed are {}; add such sections \
-         to [segments], or leave [segments] out and let every dwell and turn count",
-        quoted(.labels), .sensor.name(), needed(*.sensor)
-    )]
-    TooFewSections {
-        /// Which triad.
-        sensor: Sensor,
+    NoSections {
         /// Labels of the sections.
         labels: Vec<String>,
     },
@@ -86,13 +68,6 @@ pub enum CalibrationError {
 fn quoted(labels: &[String]) -> String {
     let quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
     quoted.join(", ")
-}
-
-fn needed(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "a position and a turn about each axis, such as `z_up`, `rot_x+360`",
-        Sensor::Accel => "each axis up and down, such as `x_up`, `x_down`",
-    }
 }
 
 /// Why calibrations cannot be compared.

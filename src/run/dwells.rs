@@ -88,7 +88,12 @@ impl Run {
     fn labelled_dwells(&self) -> Vec<Dwell> {
         let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
         let positions = self.recording.segments.iter().filter(|s| stands(s.motion));
-        positions.map(Dwell::of_segment).collect()
+        // A row at the edge of a section may be of the one beside it.
+        let inside = positions.map(|segment| Dwell {
+            samples: segment.samples.start + 1..segment.samples.end.saturating_sub(1),
+            position: None,
+        });
+        inside.filter(|dwell| !dwell.samples.is_empty()).collect()
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {

@@ -65,11 +65,12 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
             }
         }
     }
-    let undetermined = |sensor| CalibrationError::TooFewSections {
-        sensor,
-        labels: run.recording.labels(),
-    };
-    let estimate = both_triads(&positions, model.form).map_err(undetermined)?;
+    if positions.gyro.is_empty() {
+        return Err(CalibrationError::NoSections {
+            labels: run.recording.labels(),
+        });
+    }
+    let estimate = both_triads(&positions, problem)?;
     let mut findings = remarks(model, &estimate, Reference::Labels);
     if !lost.is_empty() {
         findings.push(Finding::SectionsLost { labels: lost });

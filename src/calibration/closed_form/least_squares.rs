@@ -4,11 +4,16 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
+use super::super::coarse::{Equations, gauss_newton};
+use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
-use super::super::parameters::{ParameterMatrix, parameter};
+use super::super::linearisation::singular;
+use super::super::parameters::{ParameterMatrix, from_vector, parameter};
+use super::super::problem::Problem;
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
+use crate::run::Aiding;
 
 /// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,15 +34,20 @@ const SMALLEST_EIGENVALUE: f64 = 1e-4;
 /// Relative σ of an output for which no noise is stated.
 const NOISELESS: f64 = 1e-9;
 
-/// Both triads from positions; the triad that they do not determine if they fail.
+/// Both triads from positions; with what is known beforehand where they do not determine a triad.
 pub(super) fn both_triads(
     positions: &PerSensor<Vec<Position>>,
-    form: InstallationForm,
-) -> Result<Estimate, Sensor> {
+    problem: &Problem,
+) -> Result<Estimate, CalibrationError> {
+    let form = problem.model.form;
     let mut covariance = ParameterMatrix::zeros();
     let mut triads = PerSensor::from_fn(|_| Triad::ideal(form));
     for sensor in Sensor::ALL {
-        let (triad, of_triad) = six_position_triad(positions.get(sensor), form).ok_or(sensor)?;
+        let positions = positions.get(sensor);
+        let (triad, of_triad) = match six_position_triad(positions, form) {
+            Some(determined) => determined,
+            None => with_prior(problem, sensor, positions)?,
+        };
         *triads.get_mut(sensor) = triad;
         let first = parameter(sensor, 0);
         covariance
@@ -45,6 +55,39 @@ pub(super) fn both_triads(
             .copy_from(&of_triad);
     }
     Ok(Estimate { triads, covariance })
+}
+
+/// One triad from positions and its prior, with the covariance of its parameters.
+fn with_prior(
+    problem: &Problem,
+    sensor: Sensor,
+    positions: &[Position],
+) -> Result<(Triad, SMatrix<f64, PER_TRIAD, PER_TRIAD>), CalibrationError> {
+    // Inputs are along the axes of table or labels, so that no angle is a choice of the body frame.
+    let mut model = problem.model.clone();
+    model.aiding = Aiding::Table;
+    let model = model.in_form(problem.run(), model.form);
+    let equations = |triads: &PerSensor<Triad>| {
+        let triad = triads.get(sensor);
+        let response = triad.response();
+        let mut equations = Equations::new(&model, triads, &[sensor]);
+        for position in positions {
+            let error = position.output - triad.output(&position.input);
+            for axis in 0..3 {
+                let input = position.input.push(1.0);
+                let row = TriadVector::from_fn(|k, _| (response[k] * input)[axis]);
+                equations.add(&[(sensor, row)], error[axis], position.variance[axis]);
+            }
+        }
+        Ok(equations)
+    };
+    let prior = from_vector(model.form, &model.prior_mean);
+    let triads = gauss_newton(prior, equations)?;
+    let covariance = equations(&triads)?.covariance();
+    let first = parameter(sensor, 0);
+    let covariance = covariance.ok_or_else(|| singular(&triads))?;
+    let of_triad = covariance.fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
+    Ok((*triads.get(sensor), of_triad.into_owned()))
 }
 
 /// One triad from positions: least squares for `A = K C` and `D` row by row, then the form's split.

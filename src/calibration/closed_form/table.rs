@@ -34,11 +34,10 @@ pub fn six_position_of(
         of_six.iter().for_each(|&k| used[k] = true);
         *chosen.get_mut(sensor) = of_six.iter().map(|&k| all[k]).collect();
     }
-    let degenerate = |sensor| CalibrationError::Degenerate {
-        sensor,
-        dwells: chosen.get(sensor).len(),
-    };
-    let estimate = both_triads(&chosen, model.form).map_err(degenerate)?;
+    if chosen.gyro.is_empty() {
+        return Err(CalibrationError::NoDwells);
+    }
+    let estimate = both_triads(&chosen, problem)?;
     let standing_time = dwells
         .iter()
         .zip(used)

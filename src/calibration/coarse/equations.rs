@@ -22,7 +22,7 @@ const STEPS: usize = 6;
 const SMALL: f64 = 1e-6;
 
 /// Linear equations for the step δθ of the estimated parameters, each row divided by its σ.
-pub(super) struct Equations {
+pub(in crate::calibration) struct Equations {
     /// Indices of the parameters to be estimated.
     unknown: Vec<usize>,
     rows: Vec<(ParameterVector, f64)>,
@@ -30,7 +30,11 @@ pub(super) struct Equations {
 
 impl Equations {
     /// The prior's equations, for these triads.
-    pub(super) fn new(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
+    pub(in crate::calibration) fn new(
+        model: &Model,
+        at: &PerSensor<Triad>,
+        sensors: &[Sensor],
+    ) -> Self {
         let at = to_vector(at);
         let mut equations = Self {
             unknown: Vec::new(),
@@ -54,7 +58,12 @@ impl Equations {
     }
 
     /// An equation `error = Σ row δθ` of triads' parameters, its error of this variance.
-    pub(super) fn add(&mut self, rows: &[(Sensor, TriadVector)], error: f64, variance: f64) {
+    pub(in crate::calibration) fn add(
+        &mut self,
+        rows: &[(Sensor, TriadVector)],
+        error: f64,
+        variance: f64,
+    ) {
         let mut whole = ParameterVector::zeros();
         for (sensor, row) in rows {
             whole
@@ -65,7 +74,7 @@ impl Equations {
     }
 
     /// Three equations `error = Φ δθ` with rows of a block from `first` on.
-    pub(super) fn add_block(
+    pub(in crate::calibration) fn add_block(
         &mut self,
         block: &Block,
         first: usize,
@@ -88,7 +97,7 @@ impl Equations {
     }
 
     /// Covariance of the unknown parameters; zero for all others. `None` if they are not determined.
-    pub(super) fn covariance(&self) -> Option<ParameterMatrix> {
+    pub(in crate::calibration) fn covariance(&self) -> Option<ParameterMatrix> {
         let n = self.unknown.len();
         let information = DMatrix::from_fn(n, n, |i, j| {
             let (i, j) = (self.unknown[i], self.unknown[j]);
@@ -106,13 +115,13 @@ impl Equations {
 
     /// Mean square of the errors, each over its σ and the prior's included; one if nothing but noise is
     /// left.
-    pub(super) fn misfit(&self) -> f64 {
+    pub(in crate::calibration) fn misfit(&self) -> f64 {
         let sum: f64 = self.rows.iter().map(|(_, error)| error.powi(2)).sum();
         sum / (self.rows.len() - self.unknown.len()) as f64
     }
 
     /// The step δθ of least squares.
-    pub(super) fn solve(&self) -> ParameterVector {
+    pub(in crate::calibration) fn solve(&self) -> ParameterVector {
         let a = Mat::from_fn(self.rows.len(), self.unknown.len(), |i, j| {
             self.rows[i].0[self.unknown[j]]
         });
@@ -127,7 +136,7 @@ impl Equations {
 }
 
 /// Steps from a first point on, each by equations made there, until they are small.
-pub(super) fn gauss_newton(
+pub(in crate::calibration) fn gauss_newton(
     from: PerSensor<Triad>,
     equations: impl Fn(&PerSensor<Triad>) -> Result<Equations, CalibrationError>,
 ) -> Result<PerSensor<Triad>, CalibrationError> {
