@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 use super::error_term::ErrorTerm;
 use super::parameters::{OBSERVED_BELOW, PARAMETERS};
 use crate::imu::{TERM_PARAMETERS, Term, TermVector};
-use crate::turntable::{TABLE_GEOMETRY, table_geometry_name};
+use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY, table_geometry_name};
 
 /// Number of parameters of both kinds.
 pub const AUXILIARY: usize = TABLE_GEOMETRY + TERM_PARAMETERS;
@@ -16,6 +16,9 @@ pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
 pub type AuxiliaryMatrix = SMatrix<f64, AUXILIARY, AUXILIARY>;
 /// Covariance of the parameters of both triads (rows) with them.
 pub type CrossMatrix = SMatrix<f64, PARAMETERS, AUXILIARY>;
+
+/// Index among the auxiliary parameters of the first of the table's axes.
+pub(super) const OF_AXES: usize = TABLE_GEOMETRY - AXIS_ERRORS;
 
 /// Which kind of parameter stands at an index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,8 +41,14 @@ impl AuxiliaryKind {
     /// The error term that it belongs to.
     pub fn error_term(self) -> ErrorTerm {
         match self {
-            Self::Table(0..3) => ErrorTerm::TableBase,
-            Self::Table(_) => ErrorTerm::TableAxes,
+            Self::Table(0..OF_AXES) => ErrorTerm::TableBase,
+            Self::Table(k) => {
+                let of_axes = k - OF_AXES;
+                let kind = AxisError::ALL
+                    .into_iter()
+                    .find(|kind| kind.range().contains(&of_axes));
+                ErrorTerm::TableAxes(kind.unwrap_or(AxisError::Encoder))
+            }
             Self::Term(term, _) => ErrorTerm::Instrument(term),
         }
     }

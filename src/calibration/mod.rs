@@ -56,7 +56,7 @@ pub use comparison::{Comparison, Named, Side, compare};
 pub use correction::{Calibrated, Correction, CorrectionError};
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
-pub use error_term_test::{ErrorTermTest, test_error_terms};
+pub use error_term_test::{ErrorTermTest, Role, test_error_terms};
 pub use estimate::Estimate;
 pub use finding::Finding;
 pub use form::FormTest;

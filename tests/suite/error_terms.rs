@@ -20,7 +20,7 @@ fn calibrated(problem: &Problem) -> (Outcome, Vec<ErrorTermTest>) {
 
 #[test]
 fn the_most_significant_error_term_is_the_one_that_is_there_and_none_where_none_is() {
-    most_significant_is(vec![Some(ORDER), Some(ErrorTerm::TableAxes), None]);
+    most_significant_is(vec![Some(ORDER), Some(ErrorTerm::TableAxes(AxisError::Tilt)), None]);
 }
 
 #[test]
