@@ -260,7 +260,11 @@ mod tests {
         let outcome = estimate(&problem, &|_| {}).unwrap();
         let tests = test_error_terms(&problem, &outcome).unwrap();
         let with = Fit::of(&once_more(&problem, &outcome, &[]).unwrap());
-        for term in [order, ErrorTerm::TableBase, ErrorTerm::TableAxes(AxisError::Tilt)] {
+        for term in [
+            order,
+            ErrorTerm::TableBase,
+            ErrorTerm::TableAxes(AxisError::Tilt),
+        ] {
             let mut other = problem.model.clone();
             other.switch_off(term);
             let other = problem.with_model(other);
@@ -299,9 +303,9 @@ mod tests {
             let tried = joint.with(&[term]).unwrap();
             let gain = without.cost - with.cost;
             println!("{term:?}: {gain} {}", without.cost - tried.cost);
-            assert_relative_eq!(without.cost - tried.cost, gain, max_relative = 1e-3);
+            assert_relative_eq!(without.cost - tried.cost, gain, epsilon = 0.01);
             for p in 0..PARAMETERS {
-                assert_relative_eq!(tried.variance[p], with.variance[p], max_relative = 1e-4);
+                assert_relative_eq!(tried.variance[p], with.variance[p], max_relative = 1e-3);
             }
         }
     }

@@ -43,8 +43,7 @@ mod solution;
 mod standstill;
 
 pub use auxiliary::{
-    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryMatrix, AuxiliaryVector, auxiliary_name,
-    auxiliary_vector,
+    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
 pub use batch::batch_estimate;
 pub use bound::{Bound, bound};

@@ -210,10 +210,7 @@ impl Model {
             }
             ErrorTerm::TableBase => self.geometry.base = Vector3::zeros(),
             ErrorTerm::TableAxes(kind) => {
-                self.geometry
-                    .axes
-                    .rows_range_mut(kind.range())
-                    .fill(0.0);
+                self.geometry.axes.rows_range_mut(kind.range()).fill(0.0);
             }
             ErrorTerm::Instrument(term) => {
                 for parameter in term.parameters() {

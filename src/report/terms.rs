@@ -37,7 +37,9 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
 pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
         ErrorTerm::Instrument(term) => term.unit(),
-        ErrorTerm::TableBase | ErrorTerm::TableAxes(_) | ErrorTerm::GaussMarkovBias => ("″", ARCSEC),
+        ErrorTerm::TableBase | ErrorTerm::TableAxes(_) | ErrorTerm::GaussMarkovBias => {
+            ("″", ARCSEC)
+        }
     }
 }
 

@@ -20,10 +20,10 @@ use crate::imu::{
 };
 use crate::recording::{ImuSamples, Recording, TableLog};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::turntable::{Imperfection, Motion, Moves, TableError};
 use crate::turntable::{
     AxisAngles, AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across, axis_angles,
 };
+use crate::turntable::{Imperfection, Motion, Moves, TableError};
 
 /// A run and what it was made from.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,8 +13,7 @@ const ACROSS: usize = 2;
 /// Cosine and sine of an axis' angle, then of twice that angle.
 pub const PHASES: usize = 4;
 /// Number of errors of the axes, of all kinds.
-pub const AXIS_ERRORS: usize =
-    ACROSS * (AXES - 1) + AXES * PHASES * ACROSS + AXES * PHASES;
+pub const AXIS_ERRORS: usize = ACROSS * (AXES - 1) + AXES * PHASES * ACROSS + AXES * PHASES;
 /// Errors of the base and of the axes.
 pub const TABLE_GEOMETRY: usize = 3 + AXIS_ERRORS;
 /// How the attitude turns in the navigation frame with each error of the axes.
@@ -60,7 +59,8 @@ impl AxisError {
         let mut all = SVector::<f64, AXIS_ERRORS>::zeros();
         let range = self.range();
         let has = (axes.min(AXES).saturating_sub(first) * each).min(range.len());
-        all.rows_range_mut(range.start..range.start + has).fill(sigma);
+        all.rows_range_mut(range.start..range.start + has)
+            .fill(sigma);
         all
     }
 }

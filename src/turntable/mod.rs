@@ -17,8 +17,8 @@ mod table;
 pub use accuracy::TableAccuracy;
 pub use chain::Kinematics;
 pub use geometry::{
-    AXIS_ERRORS, AxisAngles, AxisError, AxisResponse, PHASES, TABLE_GEOMETRY, TableGeometry, across,
-    axis_angles, axis_response, phases, table_geometry_name,
+    AXIS_ERRORS, AxisAngles, AxisError, AxisResponse, PHASES, TABLE_GEOMETRY, TableGeometry,
+    across, axis_angles, axis_response, phases, table_geometry_name,
 };
 pub use motion::Motion;
 pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};

@@ -104,9 +104,8 @@ mod tests {
     #[test]
     fn what_data_hardly_show_takes_little_to_be_significant_and_counts_as_few_states() {
         let prior = [1.0; 4];
-        let covariance = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[
-            0.01, 0.5, 0.99, 0.99,
-        ]));
+        let covariance =
+            DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[0.01, 0.5, 0.99, 0.99]));
         let evidence = Evidence::new(20.0, &covariance, &prior);
         assert_relative_eq!(evidence.states, 1.51 / 0.99, max_relative = 1e-12);
         let chance = (-0.5 * evidence.significance()).exp();

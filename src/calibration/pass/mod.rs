@@ -20,8 +20,8 @@ use initial_attitude::InitialAttitude;
 pub(super) use measurement::Measurement;
 pub(super) use mode::{Gate, Mode};
 pub use result::Epoch;
-pub(super) use result::{PassResult, Tried};
 use result::Sums;
+pub(super) use result::{PassResult, Tried};
 use stretch::OneStretch;
 pub(super) use stretch::navigator;
 

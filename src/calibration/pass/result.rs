@@ -10,7 +10,9 @@ use crate::calibration::innovation::Innovation;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::observability::AttitudeCovariance;
-use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector};
+use crate::calibration::parameters::{
+    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
+};
 use crate::imu::TermVector;
 use crate::turntable::TABLE_GEOMETRY;
 
@@ -84,7 +86,11 @@ impl Sums {
         }
     }
 
-    pub fn result(mut self, prior_sigma: AuxiliaryVector, earlier: &[InitialAttitude]) -> PassResult {
+    pub fn result(
+        mut self,
+        prior_sigma: AuxiliaryVector,
+        earlier: &[InitialAttitude],
+    ) -> PassResult {
         let tried = self.filter.sensitivity.take().map(|sensitivity| {
             let states = self.filter.layout.parameters();
             let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();

@@ -140,7 +140,9 @@ impl<'a> Source<'a> {
                      deg/s"
                 }
                 Term::AccelThirdOrder => "q f^3 along its axis to f",
-                Term::AccelCrossCoupling => "q times the product of these two of f along its axis to f",
+                Term::AccelCrossCoupling => {
+                    "q times the product of these two of f along its axis to f"
+                }
             };
             Some(format!("{name} = {value:e} {}, adds {adds}", si_unit(term)))
         };

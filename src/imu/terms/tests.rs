@@ -75,11 +75,35 @@ fn the_response_is_the_derivative_of_what_is_added() {
         for k in 0..TERM_PARAMETERS {
             let mut step = TermVector::zeros();
             step[k] = 1e-5;
-            let difference =
-                sensed.added(sensor, &(q + step)) - sensed.added(sensor, &(q - step));
+            let difference = sensed.added(sensor, &(q + step)) - sensed.added(sensor, &(q - step));
             // The offset turns its own response by q ω, which is left out.
             let off = (response.column(k) - difference / 2e-5).norm();
             assert!(off < 1e-2, "{k}: {off}");
         }
+    }
+}
+
+#[test]
+fn an_asymmetry_adds_the_same_in_both_senses_of_turn_and_a_nonlinearity_the_opposite() {
+    let turning = |rate: f64| Sensed {
+        rate: Vector3::new(rate, 0.0, 0.0),
+        ..any()
+    };
+    let added = |term: Term, k: usize, rate: f64| {
+        let mut q = TermVector::zeros();
+        q[term.parameters().start + k] = 1e-6;
+        turning(rate).added(Sensor::Gyro, &q).x
+    };
+    for rate in [0.5 * REFERENCE_RATE, -0.5 * REFERENCE_RATE] {
+        let scaled = |factor: f64| 1e-6 * factor * REFERENCE_RATE;
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-18, "{a} {b}");
+        close(added(Term::GyroAsymmetry, 0, rate), scaled(0.5));
+        close(added(Term::GyroSecondOrder, 0, rate), scaled(0.25));
+        let sense = rate.signum();
+        close(added(Term::GyroNonlinearity, 0, rate), sense * scaled(0.25));
+        close(
+            added(Term::GyroNonlinearity, 3, rate),
+            sense * scaled(0.125),
+        );
     }
 }
