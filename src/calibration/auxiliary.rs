@@ -1,21 +1,20 @@
 //! Constants that are estimated beside scale factors, installation and biases: errors of the table's
 //! own geometry, then parameters of the instrument's error terms.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SVector};
 
 use super::error_term::ErrorTerm;
 use super::parameters::{OBSERVED_BELOW, PARAMETERS};
 use crate::imu::{TERM_PARAMETERS, Term, TermVector};
-use crate::turntable::{TABLE_GEOMETRY, table_geometry_name};
+use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY, table_geometry_name};
 
 /// Number of parameters of both kinds.
 pub const AUXILIARY: usize = TABLE_GEOMETRY + TERM_PARAMETERS;
 /// A vector of them: table (see [`crate::turntable::TableGeometry`]), then terms (see [`Term`]).
 pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
-/// A matrix of them.
-pub type AuxiliaryMatrix = SMatrix<f64, AUXILIARY, AUXILIARY>;
-/// Covariance of the parameters of both triads (rows) with them.
-pub type CrossMatrix = SMatrix<f64, PARAMETERS, AUXILIARY>;
+
+/// Index among the auxiliary parameters of the first of the table's axes.
+pub(super) const OF_AXES: usize = TABLE_GEOMETRY - AXIS_ERRORS;
 
 /// Which kind of parameter stands at an index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,8 +37,14 @@ impl AuxiliaryKind {
     /// The error term that it belongs to.
     pub fn error_term(self) -> ErrorTerm {
         match self {
-            Self::Table(0..3) => ErrorTerm::TableBase,
-            Self::Table(_) => ErrorTerm::TableAxes,
+            Self::Table(0..OF_AXES) => ErrorTerm::TableBase,
+            Self::Table(k) => {
+                let of_axes = k - OF_AXES;
+                let kind = AxisError::ALL
+                    .into_iter()
+                    .find(|kind| kind.range().contains(&of_axes));
+                ErrorTerm::TableAxes(kind.unwrap_or(AxisError::Encoder))
+            }
             Self::Term(term, _) => ErrorTerm::Instrument(term),
         }
     }
@@ -73,10 +78,10 @@ const INSEPARABLE: f64 = 0.99;
 pub struct Auxiliary {
     /// The estimates, rad for the table, SI for terms.
     pub values: AuxiliaryVector,
-    /// Their covariance.
-    pub covariance: AuxiliaryMatrix,
-    /// Covariance of the parameters of both triads with them.
-    pub cross: CrossMatrix,
+    /// Their covariance, [`AUXILIARY`] square.
+    pub covariance: DMatrix<f64>,
+    /// Covariance of the parameters of both triads (rows) with them.
+    pub cross: DMatrix<f64>,
     /// 1σ of each before the run, around zero.
     pub prior_sigma: AuxiliaryVector,
 }
@@ -85,8 +90,8 @@ impl Default for Auxiliary {
     fn default() -> Self {
         Self {
             values: AuxiliaryVector::zeros(),
-            covariance: AuxiliaryMatrix::zeros(),
-            cross: CrossMatrix::zeros(),
+            covariance: DMatrix::zeros(AUXILIARY, AUXILIARY),
+            cross: DMatrix::zeros(PARAMETERS, AUXILIARY),
             prior_sigma: AuxiliaryVector::zeros(),
         }
     }
@@ -95,7 +100,7 @@ impl Default for Auxiliary {
 impl Auxiliary {
     /// 1σ of each.
     pub fn sigma(&self) -> AuxiliaryVector {
-        self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
+        AuxiliaryVector::from_fn(|k, _| self.covariance[(k, k)].max(0.0).sqrt())
     }
 
     /// Whether a term of the instrument was estimated.

@@ -1,7 +1,7 @@
 //! Error terms: what may be estimated beside scale factors, installation and biases.
 
 use crate::imu::Term;
-use crate::turntable::AXIS_TILTS;
+use crate::turntable::AxisError;
 
 /// An error of instrument or table that is estimated where it is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -10,23 +10,31 @@ pub enum ErrorTerm {
     GaussMarkovBias,
     /// Level and north of the table's base.
     TableBase,
-    /// Tilts of the table's axes within the outermost.
-    TableAxes,
+    /// Errors of the table's axes: tilts of those within the outermost, wobble, encoders.
+    TableAxes(AxisError),
     /// A term of the instrument's error model.
     Instrument(Term),
 }
 
 impl ErrorTerm {
-    /// Every error term.
-    pub const ALL: [Self; 8] = [
+    /// Every error term. Of two that explain a record equally well, the one that stands first here is
+    /// the more usual.
+    pub const ALL: [Self; 15] = [
         Self::GaussMarkovBias,
         Self::TableBase,
-        Self::TableAxes,
+        Self::TableAxes(AxisError::Tilt),
         Self::Instrument(Term::AccelSecondOrder),
         Self::Instrument(Term::AccelAsymmetry),
         Self::Instrument(Term::SizeEffect),
         Self::Instrument(Term::TimeOffset),
         Self::Instrument(Term::GSensitivity),
+        Self::Instrument(Term::GyroAsymmetry),
+        Self::Instrument(Term::GyroSecondOrder),
+        Self::Instrument(Term::GyroNonlinearity),
+        Self::Instrument(Term::AccelThirdOrder),
+        Self::Instrument(Term::AccelCrossCoupling),
+        Self::TableAxes(AxisError::Wobble),
+        Self::TableAxes(AxisError::Encoder),
     ];
 
     /// Those that are constant over a run.
@@ -40,7 +48,9 @@ impl ErrorTerm {
         match self {
             Self::GaussMarkovBias => "gauss-markov-bias",
             Self::TableBase => "table-base",
-            Self::TableAxes => "table-axes",
+            Self::TableAxes(AxisError::Tilt) => "table-axes",
+            Self::TableAxes(AxisError::Wobble) => "table-wobble",
+            Self::TableAxes(AxisError::Encoder) => "table-encoder",
             Self::Instrument(term) => term.name(),
         }
     }
@@ -50,7 +60,7 @@ impl ErrorTerm {
         match self {
             Self::GaussMarkovBias => 6,
             Self::TableBase => 3,
-            Self::TableAxes => AXIS_TILTS,
+            Self::TableAxes(kind) => kind.range().len(),
             Self::Instrument(term) => term.parameters().len(),
         }
     }

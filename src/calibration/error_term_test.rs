@@ -1,22 +1,22 @@
-//! What each error term costs in σ, and what it explains of the data.
+//! What each error term costs in σ, what it explains of the data, and which one explains them best.
 //!
-//! One pass more, with every error term that the runs can hold, answers for all constant ones: its
-//! estimates and their covariance, given that some of them are zero, are those of a pass without them.
-//! Varying biases are not constant; they take a pass of their own.
+//! The last pass once more answers for all constant ones: those that are on are taken off by conditioning
+//! on zero, those that are off are tried beside it (see [`super::pass`]). Varying biases are not constant;
+//! they take a pass of their own.
 
-use nalgebra::{DMatrix, DVector, Dyn, linalg::Cholesky};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+mod evidence;
+mod joint;
 
-use super::auxiliary::{AUXILIARY, AuxiliaryKind};
 use super::error::CalibrationError;
 use super::error_term::ErrorTerm;
 use super::finding::Finding;
 use super::group::Group;
-use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterVector};
-use super::pass::{Gate, Mode, PassResult, pass};
+use super::pass::PassResult;
 use super::problem::Problem;
+use evidence::ln_survival;
+use joint::{Fit, Joint, once_more};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,18 +31,38 @@ pub struct ErrorTermTest {
     /// By how much the cost, −2 ln of likelihood and prior, falls with it; for varying biases, which
     /// are not constant, −2 ln of the likelihood of the whole record.
     pub gain: f64,
-    /// What the gain stays below but for a chance of one in ten thousand if its errors are not
-    /// there: χ² with as many degrees as it has parameters; a ratio of likelihoods exceeds ten thousand
-    /// with no more than that chance.
+    /// What the gain stays below, if its errors are not there, but for its share of one false alarm in a
+    /// thousand runs: χ² with as many degrees as it has states that the data show; a ratio of
+    /// likelihoods exceeds 1/p with no more chance than p.
     pub limit: f64,
+    /// −2 ln of the chance of such a gain if its errors are not there: what terms of any number of states
+    /// are compared by.
+    pub significance: f64,
+    /// What it is to the record.
+    pub role: Role,
     /// Cost per scalar observation, which is NIS, without it …
     pub without: f64,
     /// … and with it.
     pub with: f64,
 }
 
-/// Chance that a term is found significant whose errors are not there. A run tries up to eight.
-const FALSE_ALARM: f64 = 1e-4;
+/// What an error term that is off is to a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Nothing: it is on, or the record does not show it, or another explains what it would.
+    None,
+    /// The likeliest explanation of what the record shows.
+    Likeliest,
+    /// An explanation that cannot be told from the likeliest.
+    Alternative,
+    /// Significant, too, where the likeliest is on.
+    Further,
+}
+
+/// Chance that a run without errors of any term shows one; each term that is tried has the same share.
+const FALSE_ALARM: f64 = 1e-3;
+/// Of two explanations, one that is less than so many times as likely is not told from the other.
+const ODDS: f64 = 20.0;
 
 impl ErrorTermTest {
     /// Whether the data show it.
@@ -50,22 +70,30 @@ impl ErrorTermTest {
         self.gain > self.limit
     }
 
-    /// Of error terms that are off and that the data show, the one that explains most: the others may
-    /// explain what is left once it is on.
+    /// Of error terms that are off and that the data show, the one that is the likeliest, with those that
+    /// cannot be told from it and those that are significant beside it.
     pub fn most_significant(tests: &[Self]) -> Option<Finding> {
-        let shown = tests.iter().filter(|test| !test.on && test.significant());
-        let most = shown.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+        let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
+        let names = |role: Role| {
+            let of_role = tests.iter().filter(|test| test.role == role);
+            of_role.map(|test| test.term.name()).collect()
+        };
         Some(Finding::ErrorTermSignificant {
-            term: most.term.name(),
-            gain: most.gain,
-            limit: most.limit,
-            nis_without: most.without,
-            nis_with: most.with,
+            term: likeliest.term.name(),
+            alternatives: names(Role::Alternative),
+            further: names(Role::Further),
+            gain: likeliest.gain,
+            limit: likeliest.limit,
+            nis_without: likeliest.without,
+            nis_with: likeliest.with,
         })
     }
 }
 
 /// The effect of every error term that the runs of a problem can hold.
+///
+/// Where the noise was learnt, terms are tried with the stated noise, too: errors that are not modelled
+/// look like noise to a fit of noise alone. One that explains more than the learnt noise does is the cause.
 ///
 /// Source: for the test, Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.5; for
 /// conditioning, Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and
@@ -77,11 +105,26 @@ pub fn test_error_terms(
     problem: &Problem,
     outcome: &Outcome,
 ) -> Result<Vec<ErrorTermTest>, CalibrationError> {
-    let problem = &outcome.with_noise(problem);
+    if outcome.noise.learnt {
+        let stated = tests(problem, outcome)?;
+        let likeliest = stated.iter().find(|test| test.role == Role::Likeliest);
+        if likeliest.is_some_and(|test| test.significance > significance_of_noise(outcome)) {
+            return Ok(stated);
+        }
+    }
+    tests(&outcome.with_noise(problem), outcome)
+}
+
+/// −2 ln of the chance that stated noise which is right gives as much to the learnt one.
+fn significance_of_noise(outcome: &Outcome) -> f64 {
+    let noise = &outcome.noise;
+    let ratio = noise.test.and_then(|test| test.ratio).unwrap_or(0.0);
+    -2.0 * ln_survival(noise.sources.len().max(1) as f64, ratio)
+}
+
+fn tests(problem: &Problem, outcome: &Outcome) -> Result<Vec<ErrorTermTest>, CalibrationError> {
     let model = &problem.model;
     let scalars = 3.0 * outcome.innovations.len() as f64;
-    let mut everything = model.clone();
-    ErrorTerm::constant().for_each(|term| everything.switch_on(term));
     let varying = ErrorTerm::GaussMarkovBias;
     let mut otherwise = model.clone();
     if model.has(varying) {
@@ -89,100 +132,101 @@ pub fn test_error_terms(
     } else {
         otherwise.switch_on(varying);
     }
-    let again = |model: Model| once_more(&problem.with_model(model), outcome);
-    let (joint, otherwise) = rayon::join(|| again(everything), || again(otherwise));
-    let (joint, otherwise) = (Joint(joint?), otherwise?);
+    let (joint, otherwise) = rayon::join(
+        || Joint::new(problem, outcome),
+        || once_more(&problem.with_model(otherwise), outcome, &[]),
+    );
+    let (joint, otherwise) = (joint?, otherwise?);
+    let tried = ErrorTerm::ALL
+        .into_iter()
+        .filter(|&term| model.can_have(term));
+    let tried: Vec<ErrorTerm> = tried.collect();
+    let off = tried.iter().filter(|&&term| !model.has(term)).count();
+    let chance = FALSE_ALARM / off.max(1) as f64;
     let test = |term: ErrorTerm, with: &Fit, without: &Fit| ErrorTermTest {
         term,
         on: model.has(term),
         sigma_factors: sigma_factors(&with.variance, &without.variance),
         gain: without.cost - with.cost,
-        limit: ChiSquared::new(term.states() as f64)
-            .map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - FALSE_ALARM)),
+        limit: f64::INFINITY,
+        significance: 0.0,
+        role: Role::None,
         without: without.cost / scalars,
         with: with.cost / scalars,
     };
-
-    let mut tests = Vec::new();
-    if let Some(own) = joint.given(|term| model.has(term)) {
-        let deviance = own.cost + outcome.log_determinant;
-        let other_deviance = otherwise.cost + otherwise.log_determinant;
-        let otherwise = Fit::of(&otherwise);
-        let (with, without, gain) = if model.has(varying) {
-            (&own, &otherwise, other_deviance - deviance)
+    let own = Fit::of(&joint.own);
+    let of_constant = |term: ErrorTerm| {
+        let (with, without, evidence) = if model.has(term) {
+            let (without, evidence) = joint.without(term)?;
+            (Fit::of(&joint.own), without, evidence)
         } else {
-            (&otherwise, &own, deviance - other_deviance)
+            let evidence = joint.evidence(term, &[])?;
+            (joint.with(&[term])?, Fit::of(&joint.own), evidence)
         };
-        tests.push(ErrorTermTest {
+        Some(ErrorTermTest {
+            limit: evidence.limit(chance),
+            significance: evidence.significance(),
+            ..test(term, &with, &without)
+        })
+    };
+    let of_varying = || {
+        let deviance = |result: &PassResult| result.cost + result.log_determinant;
+        let change = deviance(&joint.own) - deviance(&otherwise);
+        let otherwise = Fit::of(&otherwise);
+        let (with, without, gain) = match model.has(varying) {
+            true => (&own, &otherwise, -change),
+            false => (&otherwise, &own, change),
+        };
+        ErrorTermTest {
             gain,
-            limit: -2.0 * FALSE_ALARM.ln(),
+            limit: -2.0 * chance.ln(),
+            significance: gain,
             ..test(varying, with, without)
-        });
-    }
-    for term in ErrorTerm::constant().filter(|&term| model.can_have(term)) {
-        let on = |other: ErrorTerm| model.has(other) && other != term;
-        let fits = joint
-            .given(|other| on(other) || other == term)
-            .zip(joint.given(on));
-        tests.extend(fits.map(|(with, without)| test(term, &with, &without)));
-    }
+        }
+    };
+    let mut tests: Vec<ErrorTermTest> = tried
+        .into_iter()
+        .filter_map(|term| match term {
+            ErrorTerm::GaussMarkovBias => Some(of_varying()),
+            _ => of_constant(term),
+        })
+        .collect();
+    decide(&mut tests, &joint, chance);
     Ok(tests)
 }
 
-/// The last pass of a calibration with another model.
-fn once_more(problem: &Problem, outcome: &Outcome) -> Result<PassResult, CalibrationError> {
-    let mode = Mode::Held(Gate::As(&outcome.innovations));
-    pass(
-        problem,
-        &outcome.prior_attitudes,
-        &outcome.linearised_at,
-        mode,
-    )
-}
-
-/// How well a calibration fits, and variance of the parameters of both triads.
-struct Fit {
-    cost: f64,
-    variance: ParameterVector,
-}
-
-impl Fit {
-    fn of(result: &PassResult) -> Self {
-        Self {
-            cost: result.cost,
-            variance: result.covariance.diagonal(),
+/// Gives each test its role: the likeliest explanation first, then what is left once it is on, and so on
+/// while anything is.
+fn decide(tests: &mut [ErrorTermTest], joint: &Joint, chance: f64) {
+    let shown = tests.iter_mut().filter(|t| !t.on && t.significant());
+    let Some(likeliest) = shown.max_by(|a, b| a.significance.total_cmp(&b.significance)) else {
+        return;
+    };
+    likeliest.role = Role::Likeliest;
+    let mut on = vec![likeliest.term];
+    let told_apart = likeliest.significance - 2.0 * ODDS.ln();
+    let limit = -2.0 * chance.ln();
+    while !on.contains(&ErrorTerm::GaussMarkovBias) {
+        let left = tests
+            .iter_mut()
+            .filter(|test| !test.on && !on.contains(&test.term));
+        let left = left.filter_map(|test| {
+            let evidence = joint.evidence(test.term, &on)?;
+            Some((evidence.significance(), test))
+        });
+        match left.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((significance, test)) if significance > limit => {
+                test.role = Role::Further;
+                on.push(test.term);
+            }
+            _ => break,
         }
     }
-}
-
-/// A calibration with every constant error term that the runs can hold.
-struct Joint(PassResult);
-
-impl Joint {
-    /// The calibration with those terms alone: the parameters of all others are zero. `None` if their
-    /// covariance is singular.
-    fn given(&self, on: impl Fn(ErrorTerm) -> bool) -> Option<Fit> {
-        let auxiliary = &self.0.auxiliary;
-        let is_off = |k: &usize| {
-            let term = AuxiliaryKind::of(*k).map(AuxiliaryKind::error_term);
-            auxiliary.prior_sigma[*k] > 0.0 && term.is_some_and(|term| !on(term))
-        };
-        let off: Vec<usize> = (0..AUXILIARY).filter(is_off).collect();
-        let mut fit = Fit::of(&self.0);
-        if off.is_empty() {
-            return Some(fit);
+    for test in tests {
+        let as_likely = test.significant() && test.significance > told_apart;
+        if test.role == Role::None && !test.on && as_likely {
+            test.role = Role::Alternative;
         }
-        let n = off.len();
-        let covariance = DMatrix::from_fn(n, n, |i, j| auxiliary.covariance[(off[i], off[j])]);
-        let values = DVector::from_fn(n, |i, _| auxiliary.values[off[i]]);
-        let cross = DMatrix::from_fn(n, PARAMETERS, |i, p| auxiliary.cross[(p, off[i])]);
-        let covariance: Cholesky<f64, Dyn> = covariance.cholesky()?;
-        fit.cost += values.dot(&covariance.solve(&values));
-        let known = covariance.solve(&cross);
-        for p in 0..PARAMETERS {
-            fit.variance[p] -= cross.column(p).dot(&known.column(p));
-        }
-        Some(fit)
     }
 }
 
@@ -204,6 +248,7 @@ mod tests {
     use super::*;
     use crate::imu::Term;
     use crate::simulation::Scenario;
+    use crate::turntable::AxisError;
     use approx::assert_relative_eq;
 
     #[test]
@@ -214,12 +259,16 @@ mod tests {
         let problem = Problem::new(&run, &Options::default());
         let outcome = estimate(&problem, &|_| {}).unwrap();
         let tests = test_error_terms(&problem, &outcome).unwrap();
-        let with = Fit::of(&once_more(&problem, &outcome).unwrap());
-        for term in [order, ErrorTerm::TableBase, ErrorTerm::TableAxes] {
+        let with = Fit::of(&once_more(&problem, &outcome, &[]).unwrap());
+        for term in [
+            order,
+            ErrorTerm::TableBase,
+            ErrorTerm::TableAxes(AxisError::Tilt),
+        ] {
             let mut other = problem.model.clone();
             other.switch_off(term);
             let other = problem.with_model(other);
-            let without = Fit::of(&once_more(&other, &outcome).unwrap());
+            let without = Fit::of(&once_more(&other, &outcome, &[]).unwrap());
             let test = tests.iter().find(|e| e.term == term).unwrap();
             println!("{term:?}: {} {}", test.gain, without.cost - with.cost);
             assert!(test.on);
@@ -230,6 +279,33 @@ mod tests {
                 .zip(sigma_factors(&with.variance, &without.variance))
             {
                 assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn a_term_that_is_tried_explains_what_a_pass_with_its_states_explains() {
+        let scenario = Scenario::load("demo").unwrap();
+        let run = scenario.simulate(23, 0).unwrap().run;
+        let problem = Problem::new(&run, &Options::default());
+        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let joint = Joint::new(&problem, &outcome).unwrap();
+        let without = Fit::of(&joint.own);
+        for term in [
+            ErrorTerm::Instrument(Term::SizeEffect),
+            ErrorTerm::Instrument(Term::GyroNonlinearity),
+            ErrorTerm::TableBase,
+            ErrorTerm::TableAxes(AxisError::Wobble),
+        ] {
+            let mut model = problem.model.clone();
+            model.switch_on(term);
+            let with = Fit::of(&once_more(&problem.with_model(model), &outcome, &[]).unwrap());
+            let tried = joint.with(&[term]).unwrap();
+            let gain = without.cost - with.cost;
+            println!("{term:?}: {gain} {}", without.cost - tried.cost);
+            assert_relative_eq!(without.cost - tried.cost, gain, epsilon = 0.01);
+            for p in 0..PARAMETERS {
+                assert_relative_eq!(tried.variance[p], with.variance[p], max_relative = 1e-3);
             }
         }
     }

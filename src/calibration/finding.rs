@@ -90,9 +90,14 @@ pub enum Finding {
     ErrorTermSignificant {
         /// The name by which it is switched on.
         term: &'static str,
+        /// Others that explain the data as well, so that this run cannot tell them apart.
+        alternatives: Vec<&'static str>,
+        /// Others that the data show, too, where it is on.
+        further: Vec<&'static str>,
         /// By how much it lowers the cost.
         gain: f64,
-        /// What the gain stays below in 9,999 runs of 10,000 if its errors are not there.
+        /// What the gain stays below if its errors are not there, but for its share of one false alarm in
+        /// a thousand runs.
         limit: f64,
         /// NIS of all observations without it …
         nis_without: f64,
@@ -225,15 +230,30 @@ impl fmt::Display for Finding {
             }
             Self::ErrorTermSignificant {
                 term,
+                alternatives,
+                further,
                 nis_without,
                 nis_with,
                 ..
-            } => write!(
-                f,
-                "The data show errors that are not modelled. Of the error terms that are off, {term} \
-                 would explain most (NIS {nis_without:.2} → {nis_with:.2}): use --with {term}, then look \
-                 again."
-            ),
+            } => {
+                write!(
+                    f,
+                    "The data show errors that are not modelled. Of the error terms that are off, {term} \
+                     would explain most (NIS {nis_without:.2} → {nis_with:.2}): use --with {term}, then \
+                     look again."
+                )?;
+                if !alternatives.is_empty() {
+                    write!(
+                        f,
+                        " Cannot be told apart from it on this path: {}.",
+                        alternatives.join(", ")
+                    )?;
+                }
+                if !further.is_empty() {
+                    write!(f, " Significant beside it: {}.", further.join(", "))?;
+                }
+                Ok(())
+            }
             Self::FarFromPrior {
                 sigmas,
                 parameters,

@@ -14,7 +14,7 @@
 //! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
 //! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
-//! | table axes | one for each tilt | tilts of the table's axes across themselves, see [`crate::turntable::tilts`], rad |
+//! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ use super::model::Model;
 use super::parameters::PARAMETERS;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
 use crate::run::Aiding;
-use crate::turntable::AXIS_TILTS;
+use crate::turntable::{AXIS_ERRORS, TABLE_GEOMETRY};
 
 /// Attitude error φ.
 pub(super) const ATTITUDE: usize = 0;
@@ -49,8 +49,10 @@ pub(super) struct Layout {
     /// Whether the turn at rest is.
     turn: bool,
     base: bool,
-    /// The tilt that each state is.
-    tilts: Vec<usize>,
+    /// The error of the table's axes that each state is.
+    axes: Vec<usize>,
+    /// Auxiliary parameters that are no states but tried.
+    tried: Vec<usize>,
 }
 
 impl Layout {
@@ -71,15 +73,39 @@ impl Layout {
             table: model.position_sigma > 0.0,
             turn: model.aiding == Aiding::Velocity,
             base: model.geometry.base.amax() > 0.0,
-            tilts: (0..AXIS_TILTS)
+            axes: (0..AXIS_ERRORS)
                 .filter(|&k| model.geometry.axes[k] > 0.0)
                 .collect(),
+            tried: Vec::new(),
         }
+    }
+
+    /// The same with auxiliary parameters, in their order, that are no states but tried.
+    pub fn trying(mut self, auxiliary: &[usize]) -> Self {
+        self.tried = auxiliary.to_vec();
+        self
+    }
+
+    /// Number of auxiliary parameters that are tried.
+    pub fn tried(&self) -> usize {
+        self.tried.len()
+    }
+
+    /// Number among those tried and index among [`TERM_PARAMETERS`] of each parameter of the error terms.
+    pub fn tried_terms(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let tried = self.tried.iter().enumerate();
+        tried.filter_map(|(k, &index)| Some((k, index.checked_sub(TABLE_GEOMETRY)?)))
+    }
+
+    /// Number among those tried and index among [`TABLE_GEOMETRY`] of each error of the table.
+    pub fn tried_of_table(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let tried = self.tried.iter().copied().enumerate();
+        tried.filter(|&(_, index)| index < TABLE_GEOMETRY)
     }
 
     /// Number of states.
     pub fn size(&self) -> usize {
-        self.tilts_begin() + self.tilts.len()
+        self.axes_begin() + self.axes.len()
     }
 
     /// State and index among [`PARAMETERS`] of each estimated parameter.
@@ -134,9 +160,9 @@ impl Layout {
         self.base.then(|| self.initial_attitude() + 3)
     }
 
-    /// State and index among [`AXIS_TILTS`] of each tilt of the table's axes.
-    pub fn table_tilts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        placed(self.tilts_begin(), &self.tilts)
+    /// State and index among [`AXIS_ERRORS`] of each error of the table's axes.
+    pub fn table_axes(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        placed(self.axes_begin(), &self.axes)
     }
 
     /// The states that all stretches share.
@@ -161,7 +187,7 @@ impl Layout {
         self.varying_begin() + self.varying.len()
     }
 
-    fn tilts_begin(&self) -> usize {
+    fn axes_begin(&self) -> usize {
         self.initial_attitude() + 3 + 3 * usize::from(self.base)
     }
 }

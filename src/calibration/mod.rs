@@ -47,8 +47,7 @@ mod solution;
 mod standstill;
 
 pub use auxiliary::{
-    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryMatrix, AuxiliaryVector, auxiliary_name,
-    auxiliary_vector,
+    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
 pub use batch::batch_estimate;
 pub use bound::{Bound, bound};
@@ -61,7 +60,7 @@ pub use correction::{Calibrated, Correction, CorrectionError};
 pub use dwell_scatter::DwellScatter;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
-pub use error_term_test::{ErrorTermTest, test_error_terms};
+pub use error_term_test::{ErrorTermTest, Role, test_error_terms};
 pub use estimate::Estimate;
 pub use finding::Finding;
 pub use form::FormTest;

@@ -12,7 +12,7 @@ use crate::imu::{
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
-use crate::turntable::{AXIS_TILTS, TableGeometry};
+use crate::turntable::{AxisError, TableGeometry};
 use crate::units::ARCSEC;
 
 /// 1σ of a table's level where nothing better is known, rad.
@@ -20,7 +20,7 @@ pub(crate) const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
 /// 1σ of its north.
 pub(crate) const USUAL_NORTH: f64 = 60.0 * ARCSEC;
 /// 1σ of each tilt of its axes.
-pub(crate) const USUAL_TILT: f64 = 10.0 * ARCSEC;
+const USUAL_TILT: f64 = 10.0 * ARCSEC;
 /// Correlation time of a varying bias where nothing better is known, s.
 const USUAL_CORRELATION: f64 = 100.0;
 /// How many times what white noise averages to in a correlation time a bias then varies by, 1σ.
@@ -73,7 +73,7 @@ impl Model {
         let aiding = options.aiding.unwrap_or_else(|| run.aiding());
         let table = run.observed_table(aiding);
         let accuracy = table.map(|_| run.table).unwrap_or_default();
-        let tilts = table.and_then(|table| table.tilts.first().copied());
+        let axes = table.and_then(|table| table.axes.first());
         let mut model = Self {
             form: options.form,
             aiding,
@@ -87,10 +87,7 @@ impl Model {
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
             geometry: accuracy.geometry,
-            table_axes: tilts.map_or(0, |tilts| {
-                let read = |k: &usize| tilts.column(*k).norm() > 0.0;
-                1 + (0..AXIS_TILTS).filter(read).count() / 2
-            }),
+            table_axes: axes.map_or(0, |axes| axes.iter().flatten().count()),
         };
         model.set_form(run, options.form);
         for &term in &options.terms {
@@ -163,17 +160,17 @@ impl Model {
                 Sensor::ALL.into_iter().any(varies)
             }
             ErrorTerm::TableBase => self.geometry.base != Vector3::zeros(),
-            ErrorTerm::TableAxes => self.geometry.axes.amax() > 0.0,
+            ErrorTerm::TableAxes(kind) => self.geometry.has(kind),
             ErrorTerm::Instrument(term) => term.parameters().any(|k| self.term_sigma[k] > 0.0),
         }
     }
 
-    /// Whether the run can hold an error term: those of the table need its log, and tilts the angles of
+    /// Whether the run can hold an error term: those of the table need its log, and those of its axes the angles of
     /// its axes.
     pub fn can_have(&self, term: ErrorTerm) -> bool {
         match term {
             ErrorTerm::TableBase => self.aiding == Aiding::Table,
-            ErrorTerm::TableAxes => self.table_axes > 0,
+            ErrorTerm::TableAxes(kind) => kind.of_table(self.table_axes, 1.0).amax() > 0.0,
             ErrorTerm::GaussMarkovBias | ErrorTerm::Instrument(_) => true,
         }
     }
@@ -193,8 +190,9 @@ impl Model {
             ErrorTerm::TableBase => {
                 self.geometry.base = Vector3::new(USUAL_LEVEL, USUAL_LEVEL, USUAL_NORTH);
             }
-            ErrorTerm::TableAxes => {
-                self.geometry.axes = TableGeometry::tilts_of(self.table_axes, USUAL_TILT);
+            ErrorTerm::TableAxes(kind) => {
+                let sigma = usual_axis_error(kind, self.position_sigma);
+                self.geometry.axes += kind.of_table(self.table_axes, sigma);
             }
             ErrorTerm::Instrument(term) => {
                 for parameter in term.parameters() {
@@ -213,13 +211,24 @@ impl Model {
                 }
             }
             ErrorTerm::TableBase => self.geometry.base = Vector3::zeros(),
-            ErrorTerm::TableAxes => self.geometry.axes.fill(0.0),
+            ErrorTerm::TableAxes(kind) => {
+                self.geometry.axes.rows_range_mut(kind.range()).fill(0.0);
+            }
             ErrorTerm::Instrument(term) => {
                 for parameter in term.parameters() {
                     self.term_sigma[parameter] = 0.0;
                 }
             }
         }
+    }
+}
+
+/// 1σ of each error of a table's axes where nothing better is known, rad, on a table with this position
+/// error: what of a table's accuracy repeats with angle may be as large as what does not.
+pub(crate) fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
+    match kind {
+        AxisError::Tilt => USUAL_TILT,
+        AxisError::Wobble | AxisError::Encoder => position_sigma.max(ARCSEC),
     }
 }
 

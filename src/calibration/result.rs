@@ -247,7 +247,8 @@ pub struct BlockRecord {
     pub sigma_factors: [Option<f64>; 6],
     /// By how much the cost, −2 ln of likelihood and prior, falls with it.
     pub merit_gain: f64,
-    /// What that stays below in 9999 runs of 10000 where the block's errors are not there.
+    /// What that stays below where the block's errors are not there, but for its share of one false alarm
+    /// in a thousand runs.
     pub merit_gain_limit: f64,
     /// Whether it is more, so that the data ask for the block.
     pub asked_for: bool,

@@ -9,7 +9,7 @@ use crate::imu::{Sensor, Triad};
 use crate::navigation::State;
 use crate::recording::TableLog;
 use crate::run::{Dwell, Run};
-use crate::turntable::Tilts;
+use crate::turntable::{AxisResponse, axis_response};
 
 /// Samples that one block of the error model covers.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,8 +26,8 @@ pub(super) struct AtRest {
     pub first: bool,
     /// Mean of the table's readings during the whole dwell, `C_b_n`; none without a table.
     pub attitude: Option<Matrix3<f64>>,
-    /// How the table's attitude turns with tilts of its axes, where they are known.
-    pub tilts: Option<Tilts>,
+    /// How the table's attitude turns with errors of its axes, where their angles are known.
+    pub axes: Option<AxisResponse>,
     /// Mean output of the accelerometers during the whole dwell.
     pub accel: Vector3<f64>,
     /// Mean of the table's readings during the step, and how many they were.
@@ -68,8 +68,9 @@ pub(super) fn steps(
             unread.start += 1;
         }
         let accel = dwell.mean(Sensor::Accel, run).output;
-        let tilts = table.zip(position);
-        let tilts = tilts.and_then(|(table, p)| table.tilts.get(p.readings.start).copied());
+        let axes = table.zip(position);
+        let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
+        let axes = axes.map(axis_response);
         let mut first = true;
         cut(dwell.samples.clone(), longer * length, |samples| {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
@@ -84,7 +85,7 @@ pub(super) fn steps(
                     first,
                     attitude: position.map(|p| p.attitude),
                     accel,
-                    tilts,
+                    axes,
                     reading,
                 }),
             });

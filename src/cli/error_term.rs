@@ -7,6 +7,7 @@ use clap::error::ErrorKind;
 use turncal::calibration::{ErrorTerm, Problem};
 use turncal::imu::Term;
 use turncal::run;
+use turncal::turntable::AxisError;
 
 use super::calibrate::Aiding;
 
@@ -32,7 +33,13 @@ impl ValueEnum for TermArgument {
         let value = PossibleValue::new(self.0.name()).help(match self.0 {
             ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
             ErrorTerm::TableBase => "Level and north of the table",
-            ErrorTerm::TableAxes => "Non-orthogonality of the table's axes",
+            ErrorTerm::TableAxes(AxisError::Tilt) => "Non-orthogonality of the table's axes",
+            ErrorTerm::TableAxes(AxisError::Wobble) => {
+                "Wobble of the table's axes, once and twice a turn"
+            }
+            ErrorTerm::TableAxes(AxisError::Encoder) => {
+                "Errors of the table's encoders, once and twice a turn"
+            }
             ErrorTerm::Instrument(Term::AccelSecondOrder) => {
                 "Accelerometers: square of specific force"
             }
@@ -46,6 +53,19 @@ impl ValueEnum for TermArgument {
                 "Accelerometers: delay of their samples behind the gyros'"
             }
             ErrorTerm::Instrument(Term::GSensitivity) => "Gyros: sensitivity to specific force",
+            ErrorTerm::Instrument(Term::GyroAsymmetry) => {
+                "Gyros: another scale factor in each sense of turn"
+            }
+            ErrorTerm::Instrument(Term::GyroSecondOrder) => "Gyros: square of angular rate",
+            ErrorTerm::Instrument(Term::GyroNonlinearity) => {
+                "Gyros: scale factor that changes with the magnitude of angular rate"
+            }
+            ErrorTerm::Instrument(Term::AccelThirdOrder) => {
+                "Accelerometers: third power of specific force"
+            }
+            ErrorTerm::Instrument(Term::AccelCrossCoupling) => {
+                "Accelerometers: products of specific force along two axes"
+            }
         });
         Some(match self.0 {
             ErrorTerm::GaussMarkovBias => value.alias("wandering-bias"),
@@ -58,7 +78,7 @@ impl TermArgument {
     /// Ends the program, with its status for wrong usage, if this is an error of the table and the table is
     /// not observed.
     pub fn needs_table(self, aiding: Option<Aiding>) {
-        let of_table = matches!(self.0, ErrorTerm::TableBase | ErrorTerm::TableAxes);
+        let of_table = matches!(self.0, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
         if of_table && aiding == Some(Aiding::Velocity) {
             let message = format!(
                 "--aiding velocity does not observe the table, so {} makes no difference; leave one of them \

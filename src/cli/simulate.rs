@@ -48,9 +48,9 @@ impl Simulate {
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             eprintln!(
-                "note: the axes of the simulated table are not orthogonal, which the quaternions of its log \
-                 cannot tell: a calibration from these files will claim too small σ of installation. \
-                 turncal study accuracy estimates their tilts."
+                "note: the axes of the simulated table have errors of their own (non-orthogonality, wobble, \
+                 encoders), which the quaternions of its log cannot tell: a calibration from these files \
+                 will claim too small σ of installation. turncal study accuracy estimates them."
             );
         }
         eprintln!(

@@ -10,11 +10,18 @@ use super::error::FileError;
 use super::fields::Fields;
 use crate::attitude;
 use crate::recording::{ImuSamples, TableLog};
-use crate::turntable::{TableAccuracy, TableGeometry, Tilts, tilts};
+use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
 
 /// Four components printed to four decimals meet it. What is off by more is no quaternion.
 const NORM_TOLERANCE: f64 = 1e-4;
+
+/// Keys of the 1σ of errors of the axes, in the order of [`AxisError::ALL`].
+const AXIS_KEYS: [&str; AxisError::ALL.len()] = [
+    "nonorthogonality_sigma_arcsec",
+    "wobble_sigma_arcsec",
+    "encoder_sigma_arcsec",
+];
 
 /// How a row gives `C_b_n`; `C` is a column's name or its index.
 pub(super) enum AttitudeColumns<C> {
@@ -124,8 +131,8 @@ impl AttitudeColumns<usize> {
         }
     }
 
-    /// How the attitude turns with tilts of the axes; none for a quaternion.
-    fn tilts(&self, csv: &CsvFile) -> Result<Option<Tilts>, FileError> {
+    /// The angles of the axes; none for a quaternion.
+    fn axes(&self, csv: &CsvFile) -> Result<Option<AxisAngles>, FileError> {
         let Self::Angles(angles) = self else {
             return Ok(None);
         };
@@ -133,7 +140,7 @@ impl AttitudeColumns<usize> {
             .iter()
             .map(|&(column, axis)| Ok((axis, csv.number(column)? * DEGREE)))
             .collect();
-        Ok(Some(tilts(axes?)))
+        Ok(Some(axis_angles(axes?)))
     }
 }
 
@@ -163,7 +170,9 @@ impl<'a> TableLogFile<'a> {
             "reading_sigma_arcsec",
             "level_sigma_arcsec",
             "north_sigma_arcsec",
-            "nonorthogonality_sigma_arcsec",
+            AXIS_KEYS[0],
+            AXIS_KEYS[1],
+            AXIS_KEYS[2],
             "time_sigma_ms",
         ];
         let Some(fields) = top.table("turntable", &known)? else {
@@ -185,24 +194,25 @@ impl<'a> TableLogFile<'a> {
             let field = fields.get(name).map(|field| field.positive()).transpose()?;
             Ok(field.unwrap_or(0.0) * ARCSEC)
         };
-        let nonorthogonality = "nonorthogonality_sigma_arcsec";
-        if let (Some(field), AttitudeColumns::Quaternion(_)) =
-            (fields.get(nonorthogonality), &attitude)
-        {
-            return Err(field.error(
-                "it with `angles` only, for a quaternion does not tell the axes apart",
-                "Remove it, or give the angles of the table's axes.",
-            ));
+        let mut axes = TableGeometry::default().axes;
+        for (kind, key) in AxisError::ALL.into_iter().zip(AXIS_KEYS) {
+            match (&attitude, fields.get(key)) {
+                (AttitudeColumns::Angles(angles), Some(_)) => {
+                    axes += kind.of_table(angles.len(), optional(key)?);
+                }
+                (AttitudeColumns::Quaternion(_), Some(field)) => {
+                    return Err(field.error(
+                        "it with `angles` only, for a quaternion does not tell the axes apart",
+                        "Remove it, or give the angles of the table's axes.",
+                    ));
+                }
+                (_, None) => (),
+            }
         }
         let level = optional("level_sigma_arcsec")?;
         let geometry = TableGeometry {
             base: Vector3::new(level, level, optional("north_sigma_arcsec")?),
-            axes: match &attitude {
-                AttitudeColumns::Angles(angles) => {
-                    TableGeometry::tilts_of(angles.len(), optional(nonorthogonality)?)
-                }
-                AttitudeColumns::Quaternion(_) => TableGeometry::default().axes,
-            },
+            axes,
         };
         let sigma = |name| -> Result<f64, FileError> {
             Ok(fields.need(name, "a 1σ in seconds of arc")?.positive()? * ARCSEC)
@@ -226,7 +236,7 @@ impl<'a> TableLogFile<'a> {
         let columns = self.attitude.find(&mut csv)?;
 
         let mut attitude: Vec<Matrix3<f64>> = Vec::new();
-        let mut tilts = Vec::new();
+        let mut axes = Vec::new();
         while csv.advance()? {
             let reading = columns.reading(&csv)?;
             match stamps.look(&csv)? {
@@ -235,7 +245,7 @@ impl<'a> TableLogFile<'a> {
                 Stamp::Same => return Err(Stamps::same(&csv)),
                 Stamp::Later => attitude.push(reading),
             }
-            tilts.extend(columns.tilts(&csv)?);
+            axes.extend(columns.axes(&csv)?);
         }
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();
         let (first, last) = match time.as_slice() {
@@ -259,7 +269,7 @@ impl<'a> TableLogFile<'a> {
         Ok(TableLog {
             time,
             attitude,
-            tilts,
+            axes,
         })
     }
 }

@@ -261,7 +261,7 @@ reading_sigma_arcsec = {reading:?}    # white, each reading
             position = short(run.table.position_sigma / ARCSEC),
             reading = short(run.table.reading_sigma / ARCSEC),
         ));
-        // The quaternion does not tell the axes apart, so their tilts cannot be had from the file.
+        // The quaternion does not tell the axes apart, so their errors cannot be had from the file.
         let base = run.table.geometry.base;
         for (name, sigma) in [("level", base.x), ("north", base.z)] {
             if sigma > 0.0 {

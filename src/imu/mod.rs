@@ -23,7 +23,7 @@ pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;
 pub use noise_keys::NoiseKeys;
 pub use signal::{GaussMarkov, Noise, NoiseSource, Output, Pulses};
-pub use terms::{Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
+pub use terms::{REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 
 /// Names of the body axes, in order.

@@ -5,19 +5,23 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::{AXES, Sensor};
 use crate::attitude::exp;
-use crate::units::{DEG_PER_H, MICRO_G, PPM, STANDARD_GRAVITY};
+use crate::units::{DEG_PER_H, DEGREE, MICRO_G, PPM, STANDARD_GRAVITY};
 
 /// Number of parameters of all terms.
-pub const TERM_PARAMETERS: usize = 22;
+pub const TERM_PARAMETERS: usize = 46;
 /// The parameters of all terms, in the order of [`Term::ALL`]; zero where a term is off.
 pub type TermVector = SVector<f64, TERM_PARAMETERS>;
 /// What each parameter adds to the input of a triad.
 pub type TermResponse = SMatrix<f64, 3, TERM_PARAMETERS>;
 
+/// Rate at which nonlinearity of the gyros is stated, 100 °/s, in rad/s.
+pub const REFERENCE_RATE: f64 = 100.0 * DEGREE;
+
 /// An error term.
 ///
-/// Source: IEEE Std 1293-2018, §5.3 (accelerometers: second order, asymmetry); IEEE Std 952-2020, §5
-/// (gyros: acceleration sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect,
+/// Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
+/// asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
+/// scale factor); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect,
 /// time offset).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Term {
@@ -34,7 +38,33 @@ pub enum Term {
     TimeOffset,
     /// Gyros add `Q f`, Q row by row, in rad/s per m/s².
     GSensitivity,
+    /// Gyros add `q_i |ω_i|`: another scale factor in one sense of turn than in the other.
+    GyroAsymmetry,
+    /// Gyros add `q_i ω_i² / ω_r`, which is even in the rate; ω_r is [`REFERENCE_RATE`].
+    GyroSecondOrder,
+    /// Gyros add `q_i |ω_i| ω_i / ω_r + c_i ω_i³ / ω_r²`, which are odd in the rate: the scale factor
+    /// changes with its magnitude. Three q, then three c.
+    GyroNonlinearity,
+    /// Accelerometers add `q_i f_i³`; q in s⁴/m².
+    AccelThirdOrder,
+    /// Accelerometers add `q_i1 f_x f_y + q_i2 f_x f_z + q_i3 f_y f_z`; q in s²/m.
+    AccelCrossCoupling,
 }
+
+/// Products of two components of specific force, in the order of the parameters of
+/// [`Term::AccelCrossCoupling`].
+const PRODUCTS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+
+/// Index of the first parameter of each term.
+const FIRST: [usize; Term::ALL.len()] = {
+    let mut first = [0; Term::ALL.len()];
+    let mut k = 1;
+    while k < first.len() {
+        first[k] = first[k - 1] + Term::ALL[k - 1].size();
+        k += 1;
+    }
+    first
+};
 
 /// How a body moves in a sample, along body axes.
 #[derive(Debug, Clone, Copy)]
@@ -51,12 +81,17 @@ pub struct Sensed {
 
 impl Term {
     /// Every term, in the order of the parameters.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 10] = [
         Self::AccelSecondOrder,
         Self::AccelAsymmetry,
         Self::SizeEffect,
         Self::TimeOffset,
         Self::GSensitivity,
+        Self::GyroAsymmetry,
+        Self::GyroSecondOrder,
+        Self::GyroNonlinearity,
+        Self::AccelThirdOrder,
+        Self::AccelCrossCoupling,
     ];
 
     /// The name that files and commands use.
@@ -67,14 +102,23 @@ impl Term {
             Self::SizeEffect => "size-effect",
             Self::TimeOffset => "time-offset",
             Self::GSensitivity => "g-sensitivity",
+            Self::GyroAsymmetry => "gyro-asymmetry",
+            Self::GyroSecondOrder => "gyro-second-order",
+            Self::GyroNonlinearity => "gyro-nonlinearity",
+            Self::AccelThirdOrder => "accel-third-order",
+            Self::AccelCrossCoupling => "accel-cross-coupling",
         }
     }
 
     /// The unit of its parameters in files and reports: its name, and its value in SI.
     pub fn unit(self) -> (&'static str, f64) {
         match self {
-            Self::AccelSecondOrder => ("µg/g²", MICRO_G / STANDARD_GRAVITY.powi(2)),
-            Self::AccelAsymmetry => ("ppm", PPM),
+            Self::AccelSecondOrder | Self::AccelCrossCoupling => {
+                ("µg/g²", MICRO_G / STANDARD_GRAVITY.powi(2))
+            }
+            Self::AccelThirdOrder => ("µg/g³", MICRO_G / STANDARD_GRAVITY.powi(3)),
+            Self::AccelAsymmetry | Self::GyroAsymmetry => ("ppm", PPM),
+            Self::GyroSecondOrder | Self::GyroNonlinearity => ("ppm at 100 °/s", PPM),
             Self::SizeEffect => ("mm", 1e-3),
             Self::TimeOffset => ("ms", 1e-3),
             Self::GSensitivity => ("°/h/g", DEG_PER_H / STANDARD_GRAVITY),
@@ -87,6 +131,8 @@ impl Term {
         let in_unit = match self {
             Self::AccelSecondOrder => 100.0,
             Self::AccelAsymmetry => 100.0,
+            Self::AccelThirdOrder | Self::AccelCrossCoupling => 100.0,
+            Self::GyroAsymmetry | Self::GyroSecondOrder | Self::GyroNonlinearity => 100.0,
             Self::SizeEffect => 100.0,
             Self::TimeOffset => 10.0,
             Self::GSensitivity => 1.0,
@@ -95,22 +141,28 @@ impl Term {
     }
 
     /// Indices of its parameters.
-    pub fn parameters(self) -> std::ops::Range<usize> {
-        let size = |term| match term {
-            Self::AccelSecondOrder | Self::AccelAsymmetry => 3,
-            Self::SizeEffect => 6,
+    pub const fn parameters(self) -> std::ops::Range<usize> {
+        let first = FIRST[self as usize];
+        first..first + self.size()
+    }
+
+    const fn size(self) -> usize {
+        match self {
+            Self::AccelSecondOrder | Self::AccelAsymmetry | Self::AccelThirdOrder => 3,
+            Self::GyroAsymmetry | Self::GyroSecondOrder => 3,
+            Self::SizeEffect | Self::GyroNonlinearity => 6,
             Self::TimeOffset => 1,
-            Self::GSensitivity => 9,
-        };
-        let before = Self::ALL.into_iter().take_while(|&term| term != self);
-        let first = before.map(size).sum();
-        first..first + size(self)
+            Self::GSensitivity | Self::AccelCrossCoupling => 9,
+        }
     }
 
     /// Whose input it changes.
     pub fn sensor(self) -> Sensor {
         match self {
-            Self::GSensitivity => Sensor::Gyro,
+            Self::GSensitivity
+            | Self::GyroAsymmetry
+            | Self::GyroSecondOrder
+            | Self::GyroNonlinearity => Sensor::Gyro,
             _ => Sensor::Accel,
         }
     }
@@ -132,6 +184,19 @@ impl Term {
             Self::SizeEffect => format!("accel.lever_arm.{}{}", AXES[k / 3], AXES[k % 3]),
             Self::TimeOffset => "accel.time_offset".to_owned(),
             Self::GSensitivity => format!("gyro.g_sensitivity.{}{}", AXES[k / 3], AXES[k % 3]),
+            Self::GyroAsymmetry => format!("gyro.asymmetry.{}", AXES[k]),
+            Self::GyroSecondOrder => format!("gyro.second_order.{}", AXES[k]),
+            Self::GyroNonlinearity => {
+                let kind = ["odd_quadratic", "third_order"][k / 3];
+                format!("gyro.{kind}.{}", AXES[k % 3])
+            }
+            Self::AccelThirdOrder => format!("accel.third_order.{}", AXES[k]),
+            // Accelerometer, then the components of specific force that are multiplied.
+            Self::AccelCrossCoupling => {
+                let (one, other) = PRODUCTS[k % 3];
+                let product = [AXES[one], AXES[other]].map(String::from).concat();
+                format!("accel.cross_coupling.{}.{product}", AXES[k / 3])
+            }
         })
     }
 }
@@ -139,28 +204,13 @@ impl Term {
 impl Sensed {
     /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².
     pub fn added(&self, sensor: Sensor, q: &TermVector) -> Vector3<f64> {
-        let of = |term: Term| q.rows_range(term.parameters());
-        let f = &self.force;
+        // All but the time offset are linear in their parameters.
+        let linear = self.linear_response(sensor) * q;
         match sensor {
-            Sensor::Gyro => {
-                let q = of(Term::GSensitivity);
-                Vector3::from_fn(|row, _| {
-                    (0..3).map(|column| q[3 * row + column] * f[column]).sum()
-                })
-            }
+            Sensor::Gyro => linear,
             Sensor::Accel => {
-                let (second, asymmetry) = (of(Term::AccelSecondOrder), of(Term::AccelAsymmetry));
-                let (arms, turning) = (of(Term::SizeEffect), self.of_lever_arm());
-                let later = exp(-self.turn(of(Term::TimeOffset)[0])) * f - f;
-                Vector3::from_fn(|axis, _| {
-                    let arm = |component: usize| arms[3 * axis + component];
-                    let of_arm = if axis < 2 {
-                        (0..3).map(|c| turning[(axis, c)] * arm(c)).sum()
-                    } else {
-                        0.0
-                    };
-                    second[axis] * f[axis].powi(2) + asymmetry[axis] * f[axis].abs() + of_arm
-                }) + later
+                let offset = q[Term::TimeOffset.parameters().start];
+                linear + exp(-self.turn(offset)) * self.force - self.force
             }
         }
     }
@@ -168,33 +218,51 @@ impl Sensed {
     /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter, where the parameters are
     /// these. Only that of the time offset depends on them.
     pub fn response(&self, sensor: Sensor, q: &TermVector) -> TermResponse {
+        let mut response = self.linear_response(sensor);
+        if sensor == Sensor::Accel {
+            let offset = Term::TimeOffset.parameters().start;
+            let rate = self.rate_over_earth + self.angular_acceleration * q[offset];
+            response
+                .column_mut(offset)
+                .copy_from(&-rate.cross(&self.force));
+        }
+        response
+    }
+
+    /// `∂t/∂q` of one triad for all terms but the time offset.
+    fn linear_response(&self, sensor: Sensor) -> TermResponse {
         let mut response = TermResponse::zeros();
-        let f = &self.force;
-        match sensor {
-            Sensor::Gyro => {
-                let first = Term::GSensitivity.parameters().start;
-                for row in 0..3 {
+        let (f, rate) = (&self.force, &self.rate);
+        let turning = self.of_lever_arm();
+        for axis in 0..3 {
+            let mut set = |term: Term, k: usize, value: f64| {
+                response[(axis, term.parameters().start + k)] = value;
+            };
+            match sensor {
+                Sensor::Gyro => {
                     for column in 0..3 {
-                        response[(row, first + 3 * row + column)] = f[column];
+                        set(Term::GSensitivity, 3 * axis + column, f[column]);
                     }
+                    let (w, relative) = (rate[axis], rate[axis] / REFERENCE_RATE);
+                    set(Term::GyroAsymmetry, axis, w.abs());
+                    set(Term::GyroSecondOrder, axis, w * relative);
+                    set(Term::GyroNonlinearity, axis, w * relative.abs());
+                    set(Term::GyroNonlinearity, 3 + axis, w * relative * relative);
                 }
-            }
-            Sensor::Accel => {
-                let turning = self.of_lever_arm();
-                for axis in 0..3 {
-                    let at = |term: Term, k: usize| (axis, term.parameters().start + k);
-                    response[at(Term::AccelSecondOrder, axis)] = f[axis] * f[axis];
-                    response[at(Term::AccelAsymmetry, axis)] = f[axis].abs();
+                Sensor::Accel => {
+                    set(Term::AccelSecondOrder, axis, f[axis].powi(2));
+                    set(Term::AccelAsymmetry, axis, f[axis].abs());
+                    set(Term::AccelThirdOrder, axis, f[axis].powi(3));
+                    for (k, &(one, other)) in PRODUCTS.iter().enumerate() {
+                        set(Term::AccelCrossCoupling, 3 * axis + k, f[one] * f[other]);
+                    }
                     if axis < 2 {
                         for component in 0..3 {
-                            response[at(Term::SizeEffect, 3 * axis + component)] =
-                                turning[(axis, component)];
+                            let value = turning[(axis, component)];
+                            set(Term::SizeEffect, 3 * axis + component, value);
                         }
                     }
                 }
-                let offset = Term::TimeOffset.parameters().start;
-                let rate = self.rate_over_earth + self.angular_acceleration * q[offset];
-                response.column_mut(offset).copy_from(&-rate.cross(f));
             }
         }
         response
@@ -213,88 +281,4 @@ impl Sensed {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// With nothing special about it.
-    fn any() -> Sensed {
-        Sensed {
-            rate: Vector3::new(0.1, -0.2, 0.3),
-            rate_over_earth: Vector3::new(0.3, -0.2, 0.1),
-            angular_acceleration: Vector3::new(1.0, 2.0, 3.0),
-            force: Vector3::new(4.0, -5.0, 6.0),
-        }
-    }
-
-    #[test]
-    fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
-        let sensed = any();
-        let mut names: Vec<String> = (0..TERM_PARAMETERS)
-            .map_while(Term::parameter_name)
-            .collect();
-        names.sort();
-        names.dedup();
-        assert_eq!(names.len(), TERM_PARAMETERS);
-        assert_eq!(Term::parameter_name(TERM_PARAMETERS), None);
-        let q = TermVector::zeros();
-        for parameter in 0..TERM_PARAMETERS {
-            let sensor = Term::of(parameter).unwrap().sensor();
-            for of in Sensor::ALL {
-                let responds = sensed.response(of, &q).column(parameter).norm() > 0.0;
-                assert_eq!(responds, of == sensor, "{parameter}");
-            }
-        }
-    }
-
-    #[test]
-    fn an_accelerometer_on_an_arm_senses_centripetal_and_tangential_acceleration() {
-        // 2 rad/s about z, faster by 3 rad/s², accelerometer x at 0.1 m along x and 0.2 m along y.
-        let sensed = Sensed {
-            rate: Vector3::new(0.0, 0.0, 2.0),
-            rate_over_earth: Vector3::new(0.0, 0.0, 2.0),
-            angular_acceleration: Vector3::new(0.0, 0.0, 3.0),
-            force: Vector3::new(1.0, 0.0, 0.0),
-        };
-        let mut q = TermVector::zeros();
-        q[Term::SizeEffect.parameters().start] = 0.1;
-        q[Term::SizeEffect.parameters().start + 1] = 0.2;
-        let added = sensed.added(Sensor::Accel, &q);
-        // −ω² x − ω̇ y along x, nothing along y for the accelerometer x.
-        assert!((added - Vector3::new(-4.0 * 0.1 - 3.0 * 0.2, 0.0, 0.0)).norm() < 1e-15);
-    }
-
-    #[test]
-    fn samples_of_a_later_time_sense_gravity_turned_more() {
-        let rate = Vector3::new(0.0, 0.4, 0.0);
-        let up = |t: f64| crate::attitude::exp(-rate * t) * Vector3::new(0.0, 0.0, 9.8);
-        let sensed = Sensed {
-            rate,
-            rate_over_earth: rate,
-            angular_acceleration: Vector3::zeros(),
-            force: up(1.0),
-        };
-        let offset = 0.02;
-        let mut q = TermVector::zeros();
-        q[Term::TimeOffset.parameters().start] = offset;
-        let added = sensed.added(Sensor::Accel, &q);
-        assert!((up(1.0 + offset) - up(1.0) - added).norm() < 1e-13);
-    }
-
-    #[test]
-    fn the_response_is_the_derivative_of_what_is_added() {
-        let sensed = any();
-        let q = TermVector::from_fn(|k, _| 1e-3 * (k as f64 - 7.0));
-        for sensor in Sensor::ALL {
-            let response = sensed.response(sensor, &q);
-            for k in 0..TERM_PARAMETERS {
-                let mut step = TermVector::zeros();
-                step[k] = 1e-5;
-                let difference =
-                    sensed.added(sensor, &(q + step)) - sensed.added(sensor, &(q - step));
-                // The offset turns its own response by q ω, which is left out.
-                let off = (response.column(k) - difference / 2e-5).norm();
-                assert!(off < 1e-2, "{k}: {off}");
-            }
-        }
-    }
-}
+mod tests;

@@ -193,6 +193,11 @@ struct TermsFile {
     size_effect: Option<TermFile>,
     time_offset: Option<TermFile>,
     g_sensitivity: Option<TermFile>,
+    gyro_asymmetry: Option<TermFile>,
+    gyro_second_order: Option<TermFile>,
+    gyro_nonlinearity: Option<TermFile>,
+    accel_third_order: Option<TermFile>,
+    accel_cross_coupling: Option<TermFile>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -211,6 +216,11 @@ impl TermsFile {
                 Term::SizeEffect => self.size_effect,
                 Term::TimeOffset => self.time_offset,
                 Term::GSensitivity => self.g_sensitivity,
+                Term::GyroAsymmetry => self.gyro_asymmetry,
+                Term::GyroSecondOrder => self.gyro_second_order,
+                Term::GyroNonlinearity => self.gyro_nonlinearity,
+                Term::AccelThirdOrder => self.accel_third_order,
+                Term::AccelCrossCoupling => self.accel_cross_coupling,
             };
             for parameter in term.parameters() {
                 sigma[parameter] = given.map_or(0.0, |given| given.sigma.0 * term.unit().1);

@@ -33,6 +33,8 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
             north: errors.north_arcsec.0 * ARCSEC,
             nonorthogonality: errors.nonorthogonality_arcsec.0 * ARCSEC,
             wobble: errors.wobble_arcsec.0 * ARCSEC,
+            wobble_harmonics: errors.wobble_harmonics_arcsec.0 * ARCSEC,
+            encoder_harmonics: errors.encoder_harmonics_arcsec.0 * ARCSEC,
         },
     };
     if table.axes.is_empty() {
@@ -109,6 +111,8 @@ struct ErrorsFile {
     north_arcsec: NonNegative,
     nonorthogonality_arcsec: NonNegative,
     wobble_arcsec: NonNegative,
+    wobble_harmonics_arcsec: NonNegative,
+    encoder_harmonics_arcsec: NonNegative,
 }
 
 /// A coordinate axis or any other direction, as a unit vector.

@@ -26,12 +26,21 @@ pub struct Navigator<'a> {
 }
 
 /// Error terms of the instrument that navigation knows of.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TermValues {
     /// Parameters that are on, whatever their values.
     pub on: Vec<usize>,
     /// Values of all parameters; zero where off.
     pub values: TermVector,
+}
+
+impl Default for TermValues {
+    fn default() -> Self {
+        Self {
+            on: Vec::new(),
+            values: TermVector::zeros(),
+        }
+    }
 }
 
 /// A triad, ready for use sample by sample.
@@ -91,6 +100,9 @@ impl<'a> Navigator<'a> {
         let period = self.imu.period;
         let mut increments = of_triads;
         let mut sensed = self.sensed(k, &increments, attitude);
+        if self.terms.values == TermVector::zeros() {
+            return (increments, Some(sensed));
+        }
         // Triads see u + t(u), and u is what is looked for; the second round leaves the third order.
         for _ in 0..2 {
             let added = |sensor| sensed.added(sensor, &self.terms.values) * period;

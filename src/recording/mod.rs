@@ -18,7 +18,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::turntable::Tilts;
+use crate::turntable::AxisAngles;
 
 /// One recording of one instrument.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,9 +78,8 @@ pub struct TableLog {
     pub time: Vec<f64>,
     /// Reading `C_b_n`, body to East-North-Up.
     pub attitude: Vec<Matrix3<f64>>,
-    /// How the attitude turns with tilts of the axes at each reading; empty where it does not tell the
-    /// axes apart.
-    pub tilts: Vec<Tilts>,
+    /// The axes at each reading; empty where it does not tell them apart.
+    pub axes: Vec<AxisAngles>,
 }
 
 /// A time rounded to 1 ns, so that it prints short.

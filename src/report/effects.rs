@@ -54,7 +54,7 @@ pub(super) fn explained(effects: &[ErrorTermTest]) -> Table {
         .sections([shown(true).map(row), shown(false).map(row)])
         .note(
             "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: \
-             the fall at a false-alarm rate of 1 in 10 000.",
+             the fall at a term's share of one false alarm in 1000 runs.",
         )
         .note("Terms that are off are tried with their usual σ and shown where they are significant.")
 }

@@ -185,7 +185,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         },
         linearised_at: Linearisation {
             triads: truth,
-            terms: Default::default(),
+            terms: TermVector::zeros(),
             initial_attitudes: vec![Matrix3::identity()],
         },
         passes: vec![

@@ -9,6 +9,7 @@ use crate::calibration::OBSERVED_BELOW;
 use crate::calibration::result::TermRecord;
 use crate::calibration::{Auxiliary, AuxiliaryKind, auxiliary_name};
 use crate::imu::Term;
+use crate::turntable::AxisError;
 use crate::units::ARCSEC;
 
 /// An error term in words.
@@ -16,12 +17,19 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
     match block {
         ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
         ErrorTerm::TableBase => "table level and north",
-        ErrorTerm::TableAxes => "table axes",
+        ErrorTerm::TableAxes(AxisError::Tilt) => "table axes",
+        ErrorTerm::TableAxes(AxisError::Wobble) => "table wobble",
+        ErrorTerm::TableAxes(AxisError::Encoder) => "table encoders",
         ErrorTerm::Instrument(Term::AccelSecondOrder) => "accel second order",
         ErrorTerm::Instrument(Term::AccelAsymmetry) => "accel asymmetry",
         ErrorTerm::Instrument(Term::SizeEffect) => "accel lever arm",
         ErrorTerm::Instrument(Term::TimeOffset) => "accel time offset",
         ErrorTerm::Instrument(Term::GSensitivity) => "gyro g-sensitivity",
+        ErrorTerm::Instrument(Term::GyroAsymmetry) => "gyro asymmetry",
+        ErrorTerm::Instrument(Term::GyroSecondOrder) => "gyro second order",
+        ErrorTerm::Instrument(Term::GyroNonlinearity) => "gyro nonlinearity",
+        ErrorTerm::Instrument(Term::AccelThirdOrder) => "accel third order",
+        ErrorTerm::Instrument(Term::AccelCrossCoupling) => "accel cross coupling",
     }
 }
 
@@ -29,7 +37,9 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
 pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
         ErrorTerm::Instrument(term) => term.unit(),
-        ErrorTerm::TableBase | ErrorTerm::TableAxes | ErrorTerm::GaussMarkovBias => ("″", ARCSEC),
+        ErrorTerm::TableBase | ErrorTerm::TableAxes(_) | ErrorTerm::GaussMarkovBias => {
+            ("″", ARCSEC)
+        }
     }
 }
 

@@ -309,7 +309,7 @@ mod tests {
         run.recording.table = Some(TableLog {
             attitude: time.iter().map(attitude).collect(),
             time,
-            tilts: Vec::new(),
+            axes: Vec::new(),
         });
         let dwells = run.dwells(run.aiding());
         assert_eq!(dwells.len(), 2);

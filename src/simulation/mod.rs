@@ -20,8 +20,10 @@ use crate::imu::{
 };
 use crate::recording::{ImuSamples, Recording, TableLog};
 use crate::run::{Run, SET_BY_HAND, Standstill};
+use crate::turntable::{
+    AxisAngles, AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across, axis_angles,
+};
 use crate::turntable::{Imperfection, Motion, Moves, TableError};
-use crate::turntable::{TABLE_GEOMETRY, TableAccuracy, TableGeometry, Tilts, across, tilts};
 
 /// A run and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,10 +171,27 @@ impl Scenario {
     }
 
     fn geometry(&self, imperfection: &Imperfection) -> SVector<f64, TABLE_GEOMETRY> {
-        let axes = self.table.axes.iter().zip(&imperfection.tilt).skip(1);
-        let tilts = axes.flat_map(|(axis, tilt)| across(&axis.direction).map(|a| a.dot(tilt)));
-        let mut all = imperfection.base.iter().copied().chain(tilts);
-        SVector::from_fn(|_, _| all.next().unwrap_or(0.0))
+        let axes = self.table.axes.iter().map(|axis| axis.direction);
+        let tilts = axes.clone().zip(&imperfection.tilt).skip(1);
+        let tilts = tilts.flat_map(|(axis, tilt)| across(&axis).map(|a| a.dot(tilt)));
+        let harmonics = axes.zip(&imperfection.harmonics);
+        let wobble = harmonics.clone().flat_map(|(axis, harmonics)| {
+            harmonics.map(|turn| across(&axis).map(|across| across.dot(&turn)))
+        });
+        let encoder = harmonics.flat_map(|(axis, harmonics)| harmonics.map(|turn| axis.dot(&turn)));
+        let mut geometry = TableGeometry {
+            base: imperfection.base,
+            ..TableGeometry::default()
+        };
+        let mut set = |kind: AxisError, values: &mut dyn Iterator<Item = f64>| {
+            for (k, value) in kind.range().zip(values) {
+                geometry.axes[k] = value;
+            }
+        };
+        set(AxisError::Tilt, &mut { tilts });
+        set(AxisError::Wobble, &mut wobble.flatten());
+        set(AxisError::Encoder, &mut { encoder });
+        geometry.vector()
     }
 
     fn sensed(
@@ -200,20 +219,19 @@ impl Scenario {
             .collect()
     }
 
-    /// How the table's attitude turns with tilts of its axes in the position that it has or leaves at
-    /// each time.
-    fn tilts(&self, motion: &Motion, times: &[f64]) -> Vec<Tilts> {
+    /// The table's axes in the position that it has or leaves at each time.
+    fn axes(&self, motion: &Motion, times: &[f64]) -> Vec<AxisAngles> {
         let Moves::Axes { start, steps } = &self.path.moves else {
             return Vec::new();
         };
         let axes = || self.table.axes.iter().map(|axis| axis.direction);
         let mut angles = start.clone();
-        let mut of_positions = vec![tilts(axes().zip(angles.iter().copied()))];
+        let mut of_positions = vec![axis_angles(axes().zip(angles.iter().copied()))];
         for step in steps {
             for (angle, by) in angles.iter_mut().zip(&step.angles) {
                 *angle += by;
             }
-            of_positions.push(tilts(axes().zip(angles.iter().copied())));
+            of_positions.push(axis_angles(axes().zip(angles.iter().copied())));
         }
         let at = |&time: &f64| of_positions.get(motion.position(time)).copied();
         times.iter().filter_map(at).collect()
@@ -239,7 +257,7 @@ impl Scenario {
             })
             .unzip();
         TableLog {
-            tilts: self.tilts(motion, &time),
+            axes: self.axes(motion, &time),
             time,
             attitude,
         }
@@ -253,9 +271,10 @@ impl Scenario {
             geometry: TableGeometry {
                 base: Vector3::new(errors.level, errors.level, errors.north),
                 axes: match self.path.moves {
-                    Moves::Axes { .. } => {
-                        TableGeometry::tilts_of(self.table.axes.len(), errors.nonorthogonality)
-                    }
+                    Moves::Axes { .. } => AxisError::ALL
+                        .into_iter()
+                        .map(|kind| kind.of_table(self.table.axes.len(), errors.of_axes(kind)))
+                        .sum(),
                     Moves::Body { .. } => SVector::zeros(),
                 },
             },

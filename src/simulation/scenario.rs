@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::Integrator;
 use crate::calibration::ErrorTerm;
-use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, USUAL_TILT, usual_variation};
+use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, usual_axis_error, usual_variation};
 use crate::earth::Site;
 use crate::imu::BodyFrame;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
@@ -131,14 +131,16 @@ impl Scenario {
                     noise.gauss_markov.get_or_insert(usual_variation(noise));
                 }
             }
-            ErrorTerm::TableBase | ErrorTerm::TableAxes => {
+            ErrorTerm::TableBase => {
                 let errors = &mut self.table.errors;
-                let base = errors.level == 0.0 && errors.north == 0.0;
-                if block == ErrorTerm::TableBase && base {
+                if errors.level == 0.0 && errors.north == 0.0 {
                     (errors.level, errors.north) = (USUAL_LEVEL, USUAL_NORTH);
                 }
-                if block == ErrorTerm::TableAxes && errors.nonorthogonality == 0.0 {
-                    errors.nonorthogonality = USUAL_TILT;
+            }
+            ErrorTerm::TableAxes(kind) => {
+                let errors = &mut self.table.errors;
+                if errors.of_axes(kind) == 0.0 {
+                    errors.set_of_axes(kind, usual_axis_error(kind, errors.position));
                 }
             }
             ErrorTerm::Instrument(term) => {
@@ -163,7 +165,7 @@ impl Scenario {
                 Sensor::ALL.into_iter().any(varies)
             }
             ErrorTerm::TableBase => sees_table && errors.level.max(errors.north) > 0.0,
-            ErrorTerm::TableAxes => sees_table && errors.nonorthogonality > 0.0,
+            ErrorTerm::TableAxes(kind) => sees_table && errors.of_axes(kind) > 0.0,
             ErrorTerm::Instrument(term) => {
                 let sigma = &self.instrument.term_sigma;
                 term.parameters().any(|k| sigma[k] > 0.0)

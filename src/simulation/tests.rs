@@ -1,7 +1,9 @@
 use super::*;
 use crate::attitude::log;
+use crate::calibration::ErrorTerm;
 use crate::imu::InstallationForm;
 use crate::models::{InstallationModel, Place};
+use crate::turntable::{AXIS_ERRORS, axis_response};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, PPM};
 
 fn demo() -> Scenario {
@@ -249,5 +251,33 @@ fn every_attitude_of_the_nineteen_positions_agrees_with_an_independent_simulatio
         // The gyros differ by the last digit of the Earth's rate, the accelerometers by the printing.
         assert!((imu.gyro[k] - Vector3::from(gyro)).norm() < 2e-14);
         assert!((imu.accel[k] - Vector3::from(accel)).norm() < 2e-13);
+    }
+}
+
+#[test]
+fn the_axes_of_a_table_turn_it_by_their_errors_wherever_it_stands() {
+    let mut scenario = demo();
+    for kind in AxisError::ALL {
+        scenario = scenario.with_error_term(ErrorTerm::TableAxes(kind));
+    }
+    let mut rng = Draws::Imperfection.generator(5, 0);
+    let imperfection = Imperfection::draw(&scenario.table, || StandardNormal.sample(&mut rng));
+    let motion = |imperfection: &Imperfection| {
+        Motion::new(&scenario.table, &scenario.path, imperfection).unwrap()
+    };
+    let (real, read) = (
+        motion(&imperfection),
+        motion(&Imperfection::none(&scenario.table)),
+    );
+    let errors = scenario.geometry(&imperfection);
+    let errors = errors.fixed_rows::<AXIS_ERRORS>(3);
+    assert!(errors.iter().all(|&error| error != 0.0));
+    for (start, end) in read.dwells() {
+        let time = 0.5 * (start + end);
+        let axes = scenario.axes(&read, &[time]);
+        let turned = log(&(real.at(time).attitude * read.at(time).attitude.transpose()));
+        // Of second order in some tens of seconds of arc.
+        let off = turned - axis_response(&axes[0]) * errors;
+        assert!(off.norm() < 0.01 * ARCSEC, "{time}: {off} of {turned}");
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Imperfection, Profile, Table};
+use super::{Imperfection, PHASES, Profile, Table, phases};
 use crate::attitude::exp;
 
 /// Attitude and its derivatives at one moment.
@@ -46,7 +46,7 @@ struct Joint {
     axis: Vector3<f64>,
     from: f64,
     profile: Profile,
-    wobble: Vector3<f64>,
+    harmonics: [Vector3<f64>; PHASES],
     behind: Matrix3<f64>,
 }
 
@@ -71,7 +71,7 @@ impl Chain {
                 axis,
                 from: 0.0,
                 profile,
-                wobble: Vector3::zeros(),
+                harmonics: [Vector3::zeros(); PHASES],
                 behind: Matrix3::identity(),
             }],
         }
@@ -89,8 +89,8 @@ impl Chain {
             .axes
             .iter()
             .zip(angles)
-            .zip(imperfection.tilt.iter().zip(&imperfection.wobble));
-        for (i, ((axis, &from), (tilt, &wobble))) in parts.enumerate() {
+            .zip(imperfection.tilt.iter().zip(&imperfection.harmonics));
+        for (i, ((axis, &from), (tilt, &harmonics))) in parts.enumerate() {
             let tilt = exp(*tilt);
             match profiles.get(i).filter(|profile| profile.duration() > 0.0) {
                 Some(&profile) => {
@@ -99,12 +99,16 @@ impl Chain {
                         axis: axis.direction,
                         from,
                         profile,
-                        wobble,
+                        harmonics,
                         behind: Matrix3::identity(),
                     });
                 }
                 None => {
-                    chain.fix(&(tilt * exp(wobble * from.sin()) * exp(axis.direction * from)));
+                    chain.fix(&tilt);
+                    for (harmonic, value) in harmonics.iter().zip(phases(from)) {
+                        chain.fix(&exp(harmonic * value));
+                    }
+                    chain.fix(&exp(axis.direction * from));
                 }
             }
         }
@@ -153,14 +157,20 @@ impl Chain {
         for joint in &self.joints {
             let turned = joint.profile.at(time);
             let angle = joint.from + turned.angle;
-            if joint.wobble != Vector3::zeros() {
-                let (s, c) = angle.sin_cos();
-                state.turn(
-                    &joint.wobble,
-                    s,
-                    c * turned.rate,
-                    c * turned.acceleration - s * turned.rate * turned.rate,
-                );
+            // Cosine and sine of the angle, then of twice the angle, with their derivatives.
+            let [c, s, c2, s2] = phases(angle);
+            let slopes = [-s, c, -2.0 * s2, 2.0 * c2];
+            let curvatures = [-c, -s, -4.0 * c2, -4.0 * s2];
+            for (k, value) in [c, s, c2, s2].into_iter().enumerate() {
+                if joint.harmonics[k] != Vector3::zeros() {
+                    let along_path = curvatures[k] * turned.rate * turned.rate;
+                    state.turn(
+                        &joint.harmonics[k],
+                        value,
+                        slopes[k] * turned.rate,
+                        slopes[k] * turned.acceleration + along_path,
+                    );
+                }
             }
             state.turn(&joint.axis, angle, turned.rate, turned.acceleration);
             state.times(&joint.behind);

@@ -1,25 +1,88 @@
 //! What a table is wrong by and does not read.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::attitude::exp;
 
-/// Tilts of the axes within the outermost, two for each of two at most.
-pub const AXIS_TILTS: usize = 4;
-/// Errors of the base and tilts of the axes.
-pub const TABLE_GEOMETRY: usize = 3 + AXIS_TILTS;
-/// How the attitude turns in the navigation frame with each tilt.
-pub type Tilts = SMatrix<f64, 3, AXIS_TILTS>;
+/// Axes whose errors are modelled, the outermost and those within.
+const AXES: usize = 3;
+/// Directions across an axis.
+const ACROSS: usize = 2;
+/// Cosine and sine of an axis' angle, then of twice that angle.
+pub const PHASES: usize = 4;
+/// Number of errors of the axes, of all kinds.
+pub const AXIS_ERRORS: usize = ACROSS * (AXES - 1) + AXES * PHASES * ACROSS + AXES * PHASES;
+/// Errors of the base and of the axes.
+pub const TABLE_GEOMETRY: usize = 3 + AXIS_ERRORS;
+/// How the attitude turns in the navigation frame with each error of the axes.
+pub type AxisResponse = SMatrix<f64, 3, AXIS_ERRORS>;
+/// Axes of a table, outermost first: direction when all angles are zero, and angle in rad.
+pub type AxisAngles = [Option<(Vector3<f64>, f64)>; AXES];
+
+/// A kind of error of the axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisError {
+    /// An axis within another is not at right angles to it: constant tilts in two directions across.
+    Tilt,
+    /// An axis tilts with its own angle, once and twice a turn: for each axis, for cosine and sine of
+    /// the angle and of twice the angle, in two directions across.
+    Wobble,
+    /// An encoder reads wrongly with its own angle, once and twice a turn: for each axis, for cosine
+    /// and sine of the angle and of twice the angle.
+    Encoder,
+}
+
+impl AxisError {
+    /// Every kind, in the order of their errors.
+    pub const ALL: [Self; 3] = [Self::Tilt, Self::Wobble, Self::Encoder];
+
+    /// Indices of its errors among those of the axes.
+    pub fn range(self) -> Range<usize> {
+        let wobble = ACROSS * (AXES - 1);
+        let encoder = wobble + AXES * PHASES * ACROSS;
+        match self {
+            Self::Tilt => 0..wobble,
+            Self::Wobble => wobble..encoder,
+            Self::Encoder => encoder..AXIS_ERRORS,
+        }
+    }
+
+    /// The same 1σ for its errors on a table with this many axes.
+    pub fn of_table(self, axes: usize, sigma: f64) -> SVector<f64, AXIS_ERRORS> {
+        let (first, each) = match self {
+            Self::Tilt => (1, ACROSS),
+            Self::Wobble => (0, PHASES * ACROSS),
+            Self::Encoder => (0, PHASES),
+        };
+        let mut all = SVector::<f64, AXIS_ERRORS>::zeros();
+        let range = self.range();
+        let has = (axes.min(AXES).saturating_sub(first) * each).min(range.len());
+        all.rows_range_mut(range.start..range.start + has)
+            .fill(sigma);
+        all
+    }
+}
 
 /// 1σ of errors that move a table's true attitude and not its reading; zero where they are not to be
 /// estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableGeometry {
     /// Of the base about East, North (level) and Up (north), rad.
     pub base: Vector3<f64>,
-    /// Of each tilt of an axis but the outermost, in its two directions across it, rad; zero for axes
-    /// that the table does not have.
-    pub axes: SVector<f64, AXIS_TILTS>,
+    /// Of each error of the axes, see [`AxisError::range`], rad; zero for axes that the table does not
+    /// have.
+    pub axes: SVector<f64, AXIS_ERRORS>,
+}
+
+impl Default for TableGeometry {
+    fn default() -> Self {
+        Self {
+            base: Vector3::zeros(),
+            axes: SVector::zeros(),
+        }
+    }
 }
 
 impl TableGeometry {
@@ -28,52 +91,85 @@ impl TableGeometry {
         *self != Self::default()
     }
 
-    /// The same 1σ for the tilts of a table with this many axes.
-    pub fn tilts_of(axes: usize, sigma: f64) -> SVector<f64, AXIS_TILTS> {
-        SVector::from_fn(|k, _| if k / 2 + 1 < axes { sigma } else { 0.0 })
+    /// Whether there are any of a kind.
+    pub fn has(&self, kind: AxisError) -> bool {
+        self.axes.rows_range(kind.range()).amax() > 0.0
     }
 
-    /// Of the base about East, North and Up, then of each tilt.
+    /// Of the base about East, North and Up, then of each error of the axes.
     pub fn vector(&self) -> SVector<f64, TABLE_GEOMETRY> {
         let mut all = self.base.iter().chain(&self.axes).copied();
         SVector::from_fn(|_, _| all.next().unwrap_or(0.0))
     }
 }
 
-/// The name of an error of a table in files; `None` beyond the last. Tilts are about the directions
-/// of [`across`], in the frame of the next axis outwards.
+/// The name of an error of a table in files; `None` beyond the last. Directions across an axis are
+/// those of [`across`], in the frame of the next axis outwards.
 pub fn table_geometry_name(k: usize) -> Option<String> {
-    const NAMES: [&str; TABLE_GEOMETRY] = [
-        "table.base.east",
-        "table.base.north",
-        "table.base.up",
-        "table.second_axis.tilt_1",
-        "table.second_axis.tilt_2",
-        "table.third_axis.tilt_1",
-        "table.third_axis.tilt_2",
-    ];
-    NAMES.get(k).map(|&name| name.to_owned())
+    const BASE: [&str; 3] = ["east", "north", "up"];
+    const AXIS: [&str; AXES] = ["first_axis", "second_axis", "third_axis"];
+    const PHASE: [&str; PHASES] = ["cos", "sin", "cos2", "sin2"];
+    let Some(k) = k.checked_sub(BASE.len()) else {
+        return Some(format!("table.base.{}", BASE[k]));
+    };
+    let kind = AxisError::ALL
+        .into_iter()
+        .find(|kind| kind.range().contains(&k))?;
+    let k = k - kind.range().start;
+    Some(match kind {
+        AxisError::Tilt => format!("table.{}.tilt_{}", AXIS[1 + k / ACROSS], 1 + k % ACROSS),
+        AxisError::Wobble => format!(
+            "table.{}.wobble_{}_{}",
+            AXIS[k / (PHASES * ACROSS)],
+            PHASE[k / ACROSS % PHASES],
+            1 + k % ACROSS
+        ),
+        AxisError::Encoder => format!("table.{}.encoder_{}", AXIS[k / PHASES], PHASE[k % PHASES]),
+    })
 }
 
-/// Tilts of a table whose axes, outermost first, stand at these angles in rad: an axis that is tilted
-/// in the frame of the next one outwards turns all that it carries.
+/// How the attitude of a table whose axes stand at these angles turns with errors of the axes.
 ///
-/// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …` turns in the navigation frame by
-/// `R(a₁, θ₁) t₂` and `R(a₁, θ₁) R(a₂, θ₂) t₃`.
-pub fn tilts(axes: impl IntoIterator<Item = (Vector3<f64>, f64)>) -> Tilts {
-    let mut tilts = Tilts::zeros();
+/// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …`: what turns an axis in the frame of
+/// the next one outwards turns all that it carries, in the navigation frame by `R(a₁, θ₁) t₂` and
+/// `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that goes with its angle, an error of its
+/// encoder one along it.
+pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
+    let mut response = AxisResponse::zeros();
     let mut carried = Matrix3::identity();
-    for (number, (direction, angle)) in axes.into_iter().enumerate() {
-        if let Some(first) = number.checked_sub(1).map(|inner| 2 * inner)
-            && first < AXIS_TILTS
-        {
-            let [one, other] = across(&direction);
-            tilts.set_column(first, &(carried * one));
-            tilts.set_column(first + 1, &(carried * other));
+    for (number, &(direction, angle)) in axes.iter().flatten().enumerate() {
+        let across = across(&direction).map(|across| carried * across);
+        let along = carried * direction;
+        let mut set = |kind: AxisError, k: usize, turn: Vector3<f64>| {
+            response.set_column(kind.range().start + k, &turn);
+        };
+        for (side, &across) in across.iter().enumerate() {
+            if let Some(inner) = number.checked_sub(1) {
+                set(AxisError::Tilt, ACROSS * inner + side, across);
+            }
+            for (phase, value) in phases(angle).into_iter().enumerate() {
+                let k = (PHASES * number + phase) * ACROSS + side;
+                set(AxisError::Wobble, k, across * value);
+            }
+        }
+        for (phase, value) in phases(angle).into_iter().enumerate() {
+            set(AxisError::Encoder, PHASES * number + phase, along * value);
         }
         carried *= exp(direction * angle);
     }
-    tilts
+    response
+}
+
+/// What goes with an axis' angle once and twice a turn.
+pub fn phases(angle: f64) -> [f64; PHASES] {
+    let ((s, c), (s2, c2)) = (angle.sin_cos(), (2.0 * angle).sin_cos());
+    [c, s, c2, s2]
+}
+
+/// The axes of a table at these angles, as far as their errors are modelled.
+pub fn axis_angles(axes: impl IntoIterator<Item = (Vector3<f64>, f64)>) -> AxisAngles {
+    let mut axes = axes.into_iter();
+    std::array::from_fn(|_| axes.next())
 }
 
 /// Two directions across another and each other.

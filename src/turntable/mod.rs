@@ -2,7 +2,8 @@
 //!
 //! `C_b_n = C_base R(axis₁, a₁) R(axis₂, a₂) … C_mount`, axes from the outermost to the innermost.
 //! The machine's errors are of two kinds. What it does not know (level, north, non-orthogonality,
-//! wobble) moves the true attitude but not the reading, see [`Imperfection`]; what it reads wrongly
+//! wobble, encoder errors that repeat with angle) moves the true attitude but not the reading, see
+//! [`Imperfection`]; what it reads wrongly
 //! (position error and reading noise) is left to whoever makes the readings.
 
 mod accuracy;
@@ -16,7 +17,8 @@ mod table;
 pub use accuracy::TableAccuracy;
 pub use chain::Kinematics;
 pub use geometry::{
-    AXIS_TILTS, TABLE_GEOMETRY, TableGeometry, Tilts, across, table_geometry_name, tilts,
+    AXIS_ERRORS, AxisAngles, AxisError, AxisResponse, PHASES, TABLE_GEOMETRY, TableGeometry,
+    across, axis_angles, axis_response, phases, table_geometry_name,
 };
 pub use motion::Motion;
 pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
@@ -70,7 +72,7 @@ pub enum TableError {
     },
     /// Errors of axes on a path that does not say how the axes turn.
     #[error(
-        "the path turns about body axes, which does not say how the table's axes turn; take a table without non-orthogonality and wobble, or a path in table axes"
+        "the path turns about body axes, which does not say how the table's axes turn; take a table without non-orthogonality, wobble and encoder harmonics, or a path in table axes"
     )]
     AxesUnknown,
 }

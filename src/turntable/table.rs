@@ -2,6 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::{AxisError, PHASES};
+
+/// Which of [`super::phases`] is the sine of the angle.
+const SINE: usize = 1;
+
 /// A rotation axis of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
@@ -42,6 +47,31 @@ pub struct TableErrors {
     pub nonorthogonality: f64,
     /// Amplitude of the tilt that every axis makes once per turn.
     pub wobble: f64,
+    /// Of what every axis tilts by with cosine and sine of its angle and of twice its angle, for each
+    /// direction across it.
+    pub wobble_harmonics: f64,
+    /// Of what every encoder reads wrongly with cosine and sine of its angle and of twice its angle.
+    pub encoder_harmonics: f64,
+}
+
+impl TableErrors {
+    /// 1σ of each error of the axes of a kind.
+    pub fn of_axes(&self, kind: AxisError) -> f64 {
+        match kind {
+            AxisError::Tilt => self.nonorthogonality,
+            AxisError::Wobble => self.wobble_harmonics,
+            AxisError::Encoder => self.encoder_harmonics,
+        }
+    }
+
+    /// Sets that.
+    pub fn set_of_axes(&mut self, kind: AxisError, sigma: f64) {
+        match kind {
+            AxisError::Tilt => self.nonorthogonality = sigma,
+            AxisError::Wobble => self.wobble_harmonics = sigma,
+            AxisError::Encoder => self.encoder_harmonics = sigma,
+        }
+    }
 }
 
 /// What one table really is beside its drawing: the errors that stay through a run.
@@ -51,9 +81,9 @@ pub struct Imperfection {
     pub base: Vector3<f64>,
     /// For each axis, the rotation vector in rad that tilts it in the frame of the next one outwards.
     pub tilt: Vec<Vector3<f64>>,
-    /// For each axis, the rotation vector in rad by which it tilts at a quarter turn; the tilt goes
-    /// with the sine of the angle.
-    pub wobble: Vec<Vector3<f64>>,
+    /// For each axis, the rotation vectors in rad that go with each of [`super::phases`] of its angle: across
+    /// it a wobble, along it what its encoder does not read.
+    pub harmonics: Vec<[Vector3<f64>; PHASES]>,
 }
 
 impl Imperfection {
@@ -62,8 +92,8 @@ impl Imperfection {
         let still = vec![Vector3::zeros(); table.axes.len()];
         Self {
             base: Vector3::zeros(),
-            tilt: still.clone(),
-            wobble: still,
+            tilt: still,
+            harmonics: vec![[Vector3::zeros(); PHASES]; table.axes.len()],
         }
     }
 
@@ -84,7 +114,7 @@ impl Imperfection {
                 across(&axis.direction, sigma)
             })
             .collect();
-        let wobble = table
+        let wobble: Vec<Vector3<f64>> = table
             .axes
             .iter()
             .map(|axis| {
@@ -99,12 +129,26 @@ impl Imperfection {
             normal() * errors.level,
             normal() * errors.north,
         );
-        Self { base, tilt, wobble }
+        let drawn = table.axes.iter().zip(wobble).map(|(axis, once)| {
+            let mut of_axis = [0; PHASES].map(|_| {
+                let any = Vector3::from_fn(|_, _| normal());
+                let along = axis.direction * axis.direction.dot(&any);
+                (any - along) * errors.wobble_harmonics + along * errors.encoder_harmonics
+            });
+            of_axis[SINE] += once;
+            of_axis
+        });
+        let harmonics = drawn.collect();
+        Self {
+            base,
+            tilt,
+            harmonics,
+        }
     }
 
-    /// Whether any axis is tilted or wobbles.
+    /// Whether any axis is tilted, wobbles, or has an encoder that reads wrongly.
     pub(super) fn moves_axes(&self) -> bool {
         let any = |vectors: &[Vector3<f64>]| vectors.iter().any(|v| *v != Vector3::zeros());
-        any(&self.tilt) || any(&self.wobble)
+        any(&self.tilt) || self.harmonics.iter().any(|harmonics| any(harmonics))
     }
 }

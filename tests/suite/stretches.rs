@@ -97,7 +97,7 @@ fn part(run: &Run, samples: Range<usize>) -> Run {
         TableLog {
             time: table.time[readings.clone()].to_vec(),
             attitude: table.attitude[readings.clone()].to_vec(),
-            tilts: table.tilts.get(readings).unwrap_or_default().to_vec(),
+            axes: table.axes.get(readings).unwrap_or_default().to_vec(),
         }
     });
     Run {

@@ -141,7 +141,13 @@ fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
 
 #[test]
 fn a_term_that_is_not_modelled_spoils_parameters_and_shows_in_the_innovations() {
-    for term in Term::ALL {
+    for term in [
+        Term::AccelSecondOrder,
+        Term::AccelAsymmetry,
+        Term::SizeEffect,
+        Term::TimeOffset,
+        Term::GSensitivity,
+    ] {
         let (outcome, normalised) = without_terms(term);
         let nis = outcome.consistency.all.mean;
         println!("{}: NIS {nis:.2}, {:.1} σ", term.name(), normalised.amax());

@@ -191,9 +191,9 @@ impl Pass<'_> {
         self.observe(rest.time, &velocity)?;
         if let Some((reading, count)) = &rest.at_rest.reading {
             let white = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
-            let tilts = rest.at_rest.tilts.as_ref();
+            let axes = rest.at_rest.axes.as_ref();
             let layout = &self.filter.layout;
-            let attitude = Measurement::table(layout, state, reading, tilts, white);
+            let attitude = Measurement::table(layout, state, reading, axes, white);
             self.observe(rest.time, &attitude)?;
         }
         let variance = stretch.attitude_variance(model);

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::measurement::Measurement;
+use super::sensitivity::Sensitivity;
 use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
@@ -21,6 +22,8 @@ pub(in crate::calibration) struct Filter {
     noise: PerSensor<ProcessNoise>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
+    /// What auxiliary parameters that are tried would do.
+    pub sensitivity: Option<Sensitivity>,
 }
 
 impl Filter {
@@ -42,8 +45,8 @@ impl Filter {
                 p[(base + axis, base + axis)] = model.geometry.base[axis].powi(2);
             }
         }
-        for (state, tilt) in layout.table_tilts() {
-            p[(state, state)] = model.geometry.axes[tilt].powi(2);
+        for (state, k) in layout.table_axes() {
+            p[(state, state)] = model.geometry.axes[k].powi(2);
         }
         let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
             let variation = model.noise.get(sensor).gauss_markov?;
@@ -56,7 +59,16 @@ impl Filter {
             p,
             noise: model.process_noise(),
             varying,
+            sensitivity: None,
         }
+    }
+
+    /// The same with auxiliary parameters that are no states but tried.
+    pub fn trying(mut self, auxiliary: &[usize]) -> Self {
+        self.layout = self.layout.trying(auxiliary);
+        let tried = self.layout.tried();
+        self.sensitivity = (tried > 0).then(|| Sensitivity::new(tried, self.x.len()));
+        self
     }
 
     /// A stretch begins: navigation errors and the table's position start anew, `anew` tells whether the
@@ -95,6 +107,9 @@ impl Filter {
     /// Forgets a state: its error is drawn anew, independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
+        if let Some(sensitivity) = &mut self.sensitivity {
+            sensitivity.redraw(state);
+        }
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
         self.p[(state, state)] = sigma.powi(2);
@@ -173,6 +188,17 @@ impl Filter {
                 self.p[(at_row, at_column)] = sum + noise[(of_row, of_column)];
             }
         }
+        if let Some(sensitivity) = &mut self.sensitivity {
+            let on = self.layout.terms().count();
+            let tried = self.layout.tried_terms().zip(&block.terms[on..]);
+            let tried = tried.map(|((k, _), term)| {
+                (
+                    k,
+                    std::array::from_fn(|moving| term.column[place(moving).1]),
+                )
+            });
+            sensitivity.propagate(&phi, |moving| place(moving).0, tried);
+        }
     }
 
     /// The rows of Φ of the states that move, column by column: navigation errors, the states that drive
@@ -188,7 +214,9 @@ impl Filter {
             let (sensor, parameter) = sensor_and_parameter(index);
             of_triad(sensor, parameter)
         });
-        let terms = block.terms.iter().map(|term| term.column.column(0));
+        let on = self.layout.terms().count();
+        let terms = block.terms.iter().take(on);
+        let terms = terms.map(|term| term.column.column(0));
         // Stated gravity that is too small pulls the computed velocity down too little.
         let t = block.duration;
         let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
@@ -220,6 +248,9 @@ impl Filter {
         for &(state, sigma, correlation_time) in &self.varying {
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
+            if let Some(sensitivity) = &mut self.sensitivity {
+                sensitivity.scale(state, keep);
+            }
             self.p.row_mut(state).scale_mut(keep);
             self.p.column_mut(state).scale_mut(keep);
             self.p[(state, state)] += sigma.powi(2) * (1.0 - keep * keep);
@@ -273,6 +304,10 @@ impl Filter {
             for ((x, gain), ph) in self.x.iter_mut().zip(&mut gain).zip(&ph) {
                 *gain = ph * scale;
                 *x += *gain * innovation;
+            }
+            if let Some(sensitivity) = &mut self.sensitivity {
+                let rows = (row.as_slice(), measurement.tried[axis].as_slice());
+                sensitivity.update(rows, &gain, innovation, variance);
             }
             // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
             let columns = self.p.as_mut_slice().chunks_exact_mut(n);
@@ -337,6 +372,12 @@ impl Filter {
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;
+            if let Some(sensitivity) = &mut self.sensitivity {
+                for row in 0..3 {
+                    let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
+                    sensitivity.add(first + row, turned);
+                }
+            }
             let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
             let mut of_error = self.p.fixed_rows_mut::<3>(first);
             of_error += rows;

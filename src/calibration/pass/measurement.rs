@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::attitude::log;
 use crate::calibration::layout::{ATTITUDE, Layout, POSITION, VELOCITY};
 use crate::navigation::State;
-use crate::turntable::Tilts;
+use crate::turntable::AxisResponse;
 
 /// A residual with its measurement model.
 #[derive(Debug, Clone)]
@@ -14,6 +14,8 @@ pub(in crate::calibration) struct Measurement {
     pub residual: Vector3<f64>,
     /// H, row by row: state and coefficient of what is not zero.
     pub rows: [Vec<(usize, f64)>; 3],
+    /// The same for the auxiliary parameters that are tried, by their number.
+    pub tried: [Vec<(usize, f64)>; 3],
     /// R, per axis.
     pub variance: f64,
 }
@@ -40,13 +42,13 @@ impl Measurement {
         Some(Self::of(layout.turn_at_rest()?, residual, variance))
     }
 
-    /// The table's reading: `z = φ − τ − ε − Σ t_k α_k`, with the tilts α of its axes and the directions
+    /// The table's reading: `z = φ − τ − ε − Σ t_k α_k`, with the errors α of its axes and the direction
     /// t in which each turns the table.
     pub fn table(
         layout: &Layout,
         computed: &State,
         reading: &Matrix3<f64>,
-        tilts: Option<&Tilts>,
+        axes: Option<&AxisResponse>,
         variance: f64,
     ) -> Self {
         let residual = -log(&(computed.attitude * reading.transpose()));
@@ -57,9 +59,20 @@ impl Measurement {
                 .into_iter()
                 .chain(layout.table_base());
             row.extend(errors.map(|first| (first + axis, -1.0)));
-            if let Some(tilts) = tilts {
-                let of_tilts = layout.table_tilts();
-                row.extend(of_tilts.map(|(state, k)| (state, -tilts[(axis, k)])));
+            if let Some(response) = axes {
+                let of_axes = layout.table_axes();
+                row.extend(of_axes.map(|(state, k)| (state, -response[(axis, k)])));
+            }
+        }
+        for (number, index) in layout.tried_of_table() {
+            for (axis, row) in measurement.tried.iter_mut().enumerate() {
+                let turn = match index.checked_sub(3) {
+                    None => f64::from(index == axis),
+                    Some(k) => axes.map_or(0.0, |response| response[(axis, k)]),
+                };
+                if turn != 0.0 {
+                    row.push((number, -turn));
+                }
             }
         }
         measurement
@@ -69,6 +82,7 @@ impl Measurement {
         Self {
             residual,
             rows: [0, 1, 2].map(|axis| vec![(first + axis, 1.0)]),
+            tried: Default::default(),
             variance,
         }
     }

@@ -5,6 +5,7 @@ mod initial_attitude;
 mod measurement;
 mod mode;
 mod result;
+mod sensitivity;
 mod stretch;
 
 use super::auxiliary::auxiliary_vector;
@@ -19,8 +20,8 @@ use initial_attitude::InitialAttitude;
 pub(super) use measurement::Measurement;
 pub(super) use mode::{Gate, Mode};
 pub use result::Epoch;
-pub(super) use result::PassResult;
 use result::Sums;
+pub(super) use result::{PassResult, Tried};
 use stretch::OneStretch;
 pub(super) use stretch::navigator;
 
@@ -31,6 +32,17 @@ pub(super) fn pass(
     at: &Linearisation,
     mode: Mode,
 ) -> Result<PassResult, CalibrationError> {
+    pass_trying(problem, priors, at, mode, &[])
+}
+
+/// The same, and what auxiliary parameters that are no states would do to it.
+pub(super) fn pass_trying(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    at: &Linearisation,
+    mode: Mode,
+    tried: &[usize],
+) -> Result<PassResult, CalibrationError> {
     let model = &problem.model;
     // The prior keeps its own mean, wherever the pass linearises; a pass with feedback begins at the
     // point it is given and finds its way from there.
@@ -40,7 +52,7 @@ pub(super) fn pass(
     };
     let mut sums = Sums {
         at: at.clone(),
-        filter: Filter::new(model, &parameters, &terms),
+        filter: Filter::new(model, &parameters, &terms).trying(tried),
         innovations: Vec::new(),
         history: Vec::new(),
         posteriors: Vec::new(),

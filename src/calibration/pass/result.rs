@@ -1,6 +1,6 @@
 //! What a pass gives.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::filter::Filter;
 use super::initial_attitude::InitialAttitude;
@@ -11,7 +11,9 @@ use crate::calibration::innovation::Innovation;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::observability::AttitudeCovariance;
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector, from_vector, to_vector};
+use crate::calibration::parameters::{
+    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
+};
 use crate::imu::TermVector;
 use crate::turntable::TABLE_GEOMETRY;
 
@@ -52,6 +54,19 @@ pub(in crate::calibration) struct PassResult {
     pub history: Vec<Epoch>,
     /// What is known of the constants before the first dwell and after each.
     pub posteriors: Vec<Posterior>,
+    /// What auxiliary parameters that were tried would do to it.
+    pub tried: Option<Tried>,
+}
+
+/// What auxiliary parameters that are no states of a pass would do to it.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct Tried {
+    /// Their information from the data alone.
+    pub information: DMatrix<f64>,
+    /// Gradient of ln of the likelihood where they are zero.
+    pub score: DVector<f64>,
+    /// Derivative of the estimated parameters of both triads: [`PARAMETERS`] rows.
+    pub of_parameters: DMatrix<f64>,
 }
 
 /// What a pass has come to so far.
@@ -75,7 +90,25 @@ impl Sums {
         }
     }
 
-    pub fn result(self, prior_sigma: AuxiliaryVector, earlier: &[InitialAttitude]) -> PassResult {
+    pub fn result(
+        mut self,
+        prior_sigma: AuxiliaryVector,
+        earlier: &[InitialAttitude],
+    ) -> PassResult {
+        let tried = self.filter.sensitivity.take().map(|sensitivity| {
+            let states = self.filter.layout.parameters();
+            let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();
+            let (information, score, of_states) = sensitivity.normal_equations(states.into_iter());
+            let mut of_parameters = DMatrix::zeros(PARAMETERS, score.len());
+            for (row, index) in of_states.row_iter().zip(indices) {
+                of_parameters.set_row(index, &row);
+            }
+            Tried {
+                information,
+                score,
+                of_parameters,
+            }
+        });
         let filter = &self.filter;
         let form = self.at.triads.gyro.form;
         let errors = earlier.iter().map(|attitude| attitude.smoothed(filter));
@@ -110,6 +143,7 @@ impl Sums {
             history: self.history,
             posteriors: self.posteriors,
             at: self.at,
+            tried,
         }
     }
 }
@@ -173,8 +207,8 @@ fn auxiliary(filter: &Filter, at: &TermVector, prior_sigma: AuxiliaryVector) -> 
 fn auxiliary_states(layout: &Layout) -> Vec<(usize, usize)> {
     let base = layout.table_base().into_iter();
     let base = base.flat_map(|first| (0..3).map(move |axis| (first + axis, axis)));
-    let tilts = layout.table_tilts().map(|(state, k)| (state, 3 + k));
+    let axes = layout.table_axes().map(|(state, k)| (state, 3 + k));
     let terms = layout.terms();
     let terms = terms.map(|(state, k)| (state, TABLE_GEOMETRY + k));
-    base.chain(tilts).chain(terms).collect()
+    base.chain(axes).chain(terms).collect()
 }

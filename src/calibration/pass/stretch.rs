@@ -63,7 +63,8 @@ pub(in crate::calibration) fn navigator<'a>(
     layout: &Layout,
 ) -> Result<Navigator<'a>, CalibrationError> {
     let run = stretch.run;
-    let on = layout.terms().map(|(_, index)| index);
+    let tried = layout.tried_terms();
+    let on = layout.terms().chain(tried).map(|(_, index)| index);
     let terms = TermValues {
         on: on.collect(),
         values: at.terms,
@@ -228,8 +229,8 @@ impl<'a> OneStretch<'a> {
         if let Some((reading, count)) = &at_rest.reading {
             let white = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
             let layout = &self.sums.filter.layout;
-            let tilts = at_rest.tilts.as_ref();
-            let attitude = Measurement::table(layout, &state, reading, tilts, white);
+            let axes = at_rest.axes.as_ref();
+            let attitude = Measurement::table(layout, &state, reading, axes, white);
             self.observe(time, Observation::Table, &attitude)?;
         }
         let variance = self.stretch.attitude_variance(model);

@@ -133,6 +133,16 @@ impl<'a> Source<'a> {
                 Term::SizeEffect => "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
                 Term::TimeOffset => "-q w x f to f, accelerometers sampled later",
                 Term::GSensitivity => "Q f to w, this the row and column of Q",
+                Term::GyroAsymmetry => "q |w| along its axis to w",
+                Term::GyroSecondOrder => "q w^2 / r along its axis to w, r = 100 deg/s",
+                Term::GyroNonlinearity => {
+                    "q |w| w / r (odd quadratic), q w^3 / r^2 (third order) along its axis to w, r = 100 \
+                     deg/s"
+                }
+                Term::AccelThirdOrder => "q f^3 along its axis to f",
+                Term::AccelCrossCoupling => {
+                    "q times the product of these two of f along its axis to f"
+                }
             };
             Some(format!("{name} = {value:e} {}, adds {adds}", si_unit(term)))
         };
@@ -172,6 +182,9 @@ pub(super) fn si_unit(term: Term) -> &'static str {
         Term::SizeEffect => "m",
         Term::TimeOffset => "s",
         Term::GSensitivity => "(rad/s)/(m/s^2)",
+        Term::GyroAsymmetry | Term::GyroSecondOrder | Term::GyroNonlinearity => "1",
+        Term::AccelThirdOrder => "s^4/m^2",
+        Term::AccelCrossCoupling => "s^2/m",
     }
 }
 

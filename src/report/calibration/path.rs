@@ -110,7 +110,7 @@ mod tests {
         TableLog {
             time: (0..attitude.len()).map(|k| k as f64).collect(),
             attitude,
-            tilts: Vec::new(),
+            axes: Vec::new(),
         }
     }
 

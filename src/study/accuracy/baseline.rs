@@ -43,6 +43,8 @@ impl Baseline {
         let mut square = scenario.clone();
         square.table.errors.nonorthogonality = 0.0;
         square.table.errors.wobble = 0.0;
+        square.table.errors.wobble_harmonics = 0.0;
+        square.table.errors.encoder_harmonics = 0.0;
         let scenario = match square.clone().with_path(PATH) {
             Ok(on_its_table) => on_its_table,
             Err(_) => on_three_axes(&square)?,

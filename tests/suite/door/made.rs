@@ -25,7 +25,7 @@ pub fn made_run(name: &str) -> Run {
             attitude: (0..20)
                 .map(|k| attitude::exp(Vector3::new(0.1, -0.2, 0.3) * f64::from(k)))
                 .collect(),
-            tilts: Vec::new(),
+            axes: Vec::new(),
         }),
         segments: vec![Segment {
             start: 3.5,

@@ -93,6 +93,7 @@ fn measurement(first: usize, minus: Option<usize>, z: Vector3<f64>, variance: f6
     Measurement {
         residual: z,
         rows: [0, 1, 2].map(row),
+        tried: Default::default(),
         variance,
     }
 }
