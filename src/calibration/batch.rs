@@ -27,7 +27,7 @@ use super::parameters::{
 };
 use super::problem::{Problem, Stretch};
 use super::schedule::AtRest;
-use crate::attitude::{from_tilt_and_heading, log, skew, to_tilt_and_heading};
+use crate::attitude::{log, skew, to_tilt_and_heading};
 use crate::imu::{PerSensor, Triad};
 use crate::navigation::{Block, BlockMatrix, Navigator, ProcessNoise, State};
 use crate::run::Aiding;
@@ -329,15 +329,13 @@ impl Information {
         }
     }
 
-    /// Refers the navigation errors to another computed state of the same moment. Attitudes add up
-    /// to more than the sum of their rotation vectors, so the sum is taken at the estimate so far.
+    /// Refers the navigation errors to another computed state of the same moment, see
+    /// [`super::pass::Filter::refer`].
     fn refer(&mut self, from: &State, to: &State) {
-        let estimate = self.solution();
-        let error = Vector3::from_fn(|axis, _| estimate[(self.dwell + ATTITUDE + axis, 0)]);
-        let turned = from_tilt_and_heading(&error) * from.attitude * to.attitude.transpose();
+        let turned = to_tilt_and_heading(&(from.attitude * to.attitude.transpose()));
         let mut shift = Mat::zeros(NAVIGATION, 1);
         for (first, by) in [
-            (ATTITUDE, to_tilt_and_heading(&turned) - error),
+            (ATTITUDE, turned),
             (VELOCITY, to.velocity - from.velocity),
             (POSITION, to.position - from.position),
         ] {

@@ -289,8 +289,6 @@ mod tests {
         let run = scenario.simulate(23, 0).unwrap().run;
         let problem = Problem::new(&run, &Options::default());
         let outcome = estimate(&problem, &|_| {}).unwrap();
-        let joint = Joint::new(&problem, &outcome).unwrap();
-        let without = Fit::of(&joint.own);
         for term in [
             ErrorTerm::Instrument(Term::SizeEffect),
             ErrorTerm::Instrument(Term::GyroNonlinearity),
@@ -299,13 +297,17 @@ mod tests {
         ] {
             let mut model = problem.model.clone();
             model.switch_on(term);
+            // Behind priors a million times as wide as what the data leave the filter itself is not exact.
+            model.term_sigma /= 100.0;
+            let joint = Joint::beside(&problem, &outcome, &model).unwrap();
+            let without = Fit::of(&joint.own);
             let with = Fit::of(&once_more(&problem.with_model(model), &outcome, &[]).unwrap());
             let tried = joint.with(&[term]).unwrap();
             let gain = without.cost - with.cost;
             println!("{term:?}: {gain} {}", without.cost - tried.cost);
-            assert_relative_eq!(without.cost - tried.cost, gain, epsilon = 0.01);
+            assert_relative_eq!(without.cost - tried.cost, gain, epsilon = 1e-3);
             for p in 0..PARAMETERS {
-                assert_relative_eq!(tried.variance[p], with.variance[p], max_relative = 1e-3);
+                assert_relative_eq!(tried.variance[p], with.variance[p], max_relative = 1e-4);
             }
         }
     }

@@ -230,7 +230,7 @@ mod tests {
         for (given, off) in [
             (0.01, None),
             (0.010_001, Some(-1e-4)),
-            (0.0099, Some(0.0101)),
+            (0.0099, Some(0.01 / 0.0099 - 1.0)),
         ] {
             let clock = Uniform::new(Path::new("imu.csv"), &stamps, Some(given)).unwrap();
             assert_eq!(clock.numbers, (0..20_000).collect::<Vec<_>>());

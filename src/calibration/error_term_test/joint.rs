@@ -51,11 +51,20 @@ pub(super) fn once_more(
 
 impl Joint {
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
-        let model = &problem.model;
-        let mut everything = model.clone();
+        let mut everything = problem.model.clone();
         ErrorTerm::constant().for_each(|term| everything.switch_on(term));
+        Self::beside(problem, outcome, &everything)
+    }
+
+    /// With what a model has on more than the problem's.
+    pub fn beside(
+        problem: &Problem,
+        outcome: &Outcome,
+        everything: &Model,
+    ) -> Result<Self, CalibrationError> {
+        let model = &problem.model;
         let sigma = |model: &Model| auxiliary_vector(&model.geometry.vector(), &model.term_sigma);
-        let (own, all) = (sigma(model), sigma(&everything));
+        let (own, all) = (sigma(model), sigma(everything));
         let indices: Vec<usize> = (0..AUXILIARY)
             .filter(|&k| own[k] == 0.0 && all[k] > 0.0)
             .collect();

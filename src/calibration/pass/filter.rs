@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::measurement::Measurement;
 use super::sensitivity::Sensitivity;
-use crate::attitude::{from_tilt_and_heading, skew, to_tilt_and_heading};
+use crate::attitude::{skew, to_tilt_and_heading};
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
@@ -387,21 +387,22 @@ impl Filter {
         }
     }
 
-    /// Refers the navigation errors to another computed state of the same moment. What is estimated
-    /// of the truth stays as it is, and so does the covariance.
+    /// Refers the navigation errors to another computed state of the same moment, to first order as all of
+    /// a pass: the filter stays linear, and what it finds does not depend on the order of what it is told.
     pub fn refer(&mut self, from: &State, to: &State) {
-        let error = self.at(ATTITUDE);
-        let estimated = from_tilt_and_heading(&error) * from.attitude;
-        let referred = to_tilt_and_heading(&(estimated * to.attitude.transpose()));
-        self.x.fixed_rows_mut::<3>(ATTITUDE).copy_from(&referred);
-        if let Some(turn) = self.layout.turn_at_rest() {
-            let mut turn = self.x.fixed_rows_mut::<3>(turn);
-            turn += referred - error;
+        let turned = to_tilt_and_heading(&(from.attitude * to.attitude.transpose()));
+        let turn = self.layout.turn_at_rest();
+        for (first, by) in [
+            (ATTITUDE, turned),
+            (VELOCITY, to.velocity - from.velocity),
+            (POSITION, to.position - from.position),
+        ]
+        .into_iter()
+        .chain(turn.map(|turn| (turn, turned)))
+        {
+            let mut error = self.x.fixed_rows_mut::<3>(first);
+            error += by;
         }
-        let mut velocity = self.x.fixed_rows_mut::<3>(VELOCITY);
-        velocity += to.velocity - from.velocity;
-        let mut position = self.x.fixed_rows_mut::<3>(POSITION);
-        position += to.position - from.position;
     }
 
     /// Estimated errors that a pass with feedback takes out of the mean.

@@ -3,7 +3,7 @@
 use super::{ExperimentError, HOUR_PATH, POSITIONS};
 use crate::calibration::to_vector;
 use crate::calibration::{Estimate, estimate, in_general_form, six_position};
-use crate::calibration::{Options, Problem};
+use crate::calibration::{NoisePolicy, Options, Problem};
 use crate::calibration::{ParameterMatrix, ParameterVector};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
@@ -128,7 +128,9 @@ fn calibrated(
             rejects_form,
         }
     };
-    let problem = Problem::new(run, &Options::default().installation(form));
+    // What a scenario states of noise is right.
+    let options = Options::default().noise(NoisePolicy::Stated);
+    let problem = Problem::new(run, &options.installation(form));
     match estimator {
         Estimator::ClosedForm => {
             let closed_form = six_position(&problem).map_err(|error| error.to_string())?;
