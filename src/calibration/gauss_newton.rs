@@ -48,6 +48,9 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         feedback,
         iterated,
     } = others.fold(of_start, better)?;
+    let form_test = form_test(problem, &priors, &iterated.held)?;
+    // Noise that makes up for angles that are missing is no noise.
+    let rejected = form_test.as_ref().is_some_and(FormTest::rejects);
     let Learnt {
         model,
         iterated: Iterated {
@@ -55,9 +58,11 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             converged,
         },
         report,
-    } = learn(problem, &priors, iterated, &mut passes, progress)?;
+    } = match rejected {
+        true => Learnt::stated(problem, iterated),
+        false => learn(problem, &priors, iterated, &mut passes, progress)?,
+    };
     let problem = &problem.with_model(model);
-    let form_test = form_test(problem, &priors, &held)?;
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
     let widened = scores.as_ref().and_then(DwellScores::widened);

@@ -344,11 +344,11 @@ fn a_term_that_is_not_known_is_not_passed_over() {
         value: 1.0,
         sigma: None,
     };
-    record.terms.insert("accel.third_order.x".to_owned(), term);
+    record.terms.insert("accel.fourth_order.x".to_owned(), term);
     let error = Correction::of_record(&record).unwrap_err();
     assert_eq!(
         error,
-        CorrectionError::UnknownTerm("accel.third_order.x".to_owned())
+        CorrectionError::UnknownTerm("accel.fourth_order.x".to_owned())
     );
     record.terms.clear();
     record.accel.installation[1] = record.accel.installation[0];

@@ -2,11 +2,18 @@
 
 use nalgebra::Vector3;
 use turncal::attitude::exp;
-use turncal::calibration::{Options, Outcome, PARAMETERS, Problem, batch_estimate, estimate};
+use turncal::calibration::{
+    NoisePolicy, Options, Outcome, PARAMETERS, Problem, batch_estimate, estimate,
+};
 use turncal::imu::InstallationForm;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::units::ARCSEC;
+
+/// With the noise that the run states, which is that of its data.
+fn stated() -> Options {
+    Options::default().noise(NoisePolicy::Stated)
+}
 
 /// Largest difference of estimate and of covariance, in σ and its products.
 fn difference(problem: &Problem, outcome: &Outcome) -> (f64, f64) {
@@ -29,7 +36,7 @@ fn difference(problem: &Problem, outcome: &Outcome) -> (f64, f64) {
 #[test]
 fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
     let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
-    let problem = Problem::new(&simulated.run, &Options::default());
+    let problem = Problem::new(&simulated.run, &stated());
     let outcome = estimate(&problem, &|_| {}).unwrap();
     assert!(outcome.converged);
     let (estimate, covariance) = difference(&problem, &outcome);
@@ -57,10 +64,7 @@ fn it_agrees_on_what_the_gate_leaves_out() {
         let outlier = exp(Vector3::new(0.0, 30.0 * ARCSEC, 0.0));
         table.attitude[300] = outlier * table.attitude[300];
     }
-    let problem = Problem::new(
-        &run,
-        &Options::default().installation(InstallationForm::SixAngle),
-    );
+    let problem = Problem::new(&run, &stated().installation(InstallationForm::SixAngle));
     let outcome = estimate(&problem, &|_| {}).unwrap();
     assert!(outcome.innovations.iter().any(|i| !i.accepted));
     let (estimate, covariance) = difference(&problem, &outcome);
@@ -74,7 +78,7 @@ fn it_agrees_where_gyros_or_table_have_no_error_and_the_problem_fewer_unknowns()
     let mut exact = short();
     exact.table.position_sigma = 0.0;
     for run in [quiet, exact] {
-        let problem = Problem::new(&run, &Options::default());
+        let problem = Problem::new(&run, &stated());
         let outcome = estimate(&problem, &|_| {}).unwrap();
         let (estimate, covariance) = difference(&problem, &outcome);
         assert!(estimate < 1e-6 && covariance < 1e-6);

@@ -2,12 +2,17 @@
 
 use rayon::prelude::*;
 use turncal::calibration::{
-    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Method, Options, Outcome, Problem, Role,
-    batch_estimate, estimate, test_error_terms,
+    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Method, NoisePolicy, Options, Outcome,
+    Problem, Role, batch_estimate, estimate, test_error_terms,
 };
 use turncal::imu::Term;
 use turncal::simulation::Scenario;
 use turncal::turntable::AxisError;
+
+/// With the noise that the run states, which is that of its data.
+fn stated() -> Options {
+    Options::default().noise(NoisePolicy::Stated)
+}
 
 /// Fixed before the first run was made.
 const SEED: u64 = 23;
@@ -53,7 +58,7 @@ fn most_significant_is(all: Vec<Option<ErrorTerm>>) {
             }
         }
         let run = scenario.simulate(SEED, 0).unwrap().run;
-        let mut problem = Problem::new(&run, &Options::default());
+        let mut problem = Problem::new(&run, &stated());
         for term in ErrorTerm::ALL {
             problem.model.switch_off(term);
         }
@@ -84,7 +89,7 @@ fn a_calibration_warns_of_the_error_term_that_is_not_estimated() {
     let scenario = Scenario::load("demo").unwrap().with_error_term(ORDER);
     let mut run = scenario.simulate(SEED, 0).unwrap().run;
     run.instrument.term_sigma.fill(0.0);
-    let problem = Problem::new(&run, &Options::default());
+    let problem = Problem::new(&run, &stated());
     let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
     let assessment = solution.assess(&problem).unwrap();
     let record = solution.calibration(&problem, &assessment);
@@ -107,7 +112,7 @@ fn a_calibration_warns_of_the_error_term_that_is_not_estimated() {
 fn a_batch_refuses_a_problem_with_states_that_it_does_not_have() {
     let scenario = Scenario::load("demo").unwrap();
     let run = scenario.simulate(SEED, 0).unwrap().run;
-    let mut problem = Problem::new(&run, &Options::default());
+    let mut problem = Problem::new(&run, &stated());
     let (outcome, _) = calibrated(&problem);
     assert!(batch_estimate(&problem, &outcome).is_ok());
     problem.model.switch_on(ORDER);
@@ -123,7 +128,7 @@ fn sound_runs_raise_no_alarm() {
     let scenario = Scenario::load("demo").unwrap();
     let kinds = (0..RUNS).into_par_iter().flat_map_iter(|stream| {
         let run = scenario.simulate(SEED, stream).unwrap().run;
-        let problem = Problem::new(&run, &Options::default());
+        let problem = Problem::new(&run, &stated());
         let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
         let assessment = solution.assess(&problem).unwrap();
         let findings = solution.findings(&assessment);

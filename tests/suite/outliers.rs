@@ -7,10 +7,16 @@ use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::attitude::exp;
 use turncal::calibration::{
-    Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem, estimate, to_vector,
+    NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem, estimate,
+    to_vector,
 };
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
+
+/// With the noise that the run states, which is that of its data.
+fn stated() -> Options {
+    Options::default().noise(NoisePolicy::Stated)
+}
 
 /// Fixed before the first run was made.
 const SEED: u64 = 1616;
@@ -41,7 +47,7 @@ fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
-    let outcome = estimate(&Problem::new(&simulated.run, &Options::default()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&simulated.run, &stated()), &|_| {}).unwrap();
     assert!(outcome.converged);
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);
     let normalised = error.component_div(&outcome.estimate.sigma());

@@ -1,18 +1,25 @@
 //! Records that other programs made, with known truth.
 
 use turncal::calibration::result::Calibration;
-use turncal::calibration::{Options, Outcome, PARAMETERS, Problem, estimate, to_vector, triads_of};
+use turncal::calibration::{
+    NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate, to_vector, triads_of,
+};
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 use crate::shared::{read, shared};
+
+/// With the noise that the run states, which is that of its data.
+fn stated() -> Options {
+    Options::default().noise(NoisePolicy::Stated)
+}
 
 /// Largest errors: K in ppm, E in ″, D in °/h or µg, gyro before accelerometer.
 fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
     let truth = Calibration::read(&directory.join("truth.json")).unwrap();
-    let outcome = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &stated()), &|_| {}).unwrap();
     let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);
     let mut largest = [0f64; 6];

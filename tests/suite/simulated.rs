@@ -3,12 +3,18 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use turncal::calibration::{
-    Finding, Options, Outcome, ParameterVector, Problem, estimate, mean_square_interval, to_vector,
+    Finding, NoisePolicy, Options, Outcome, ParameterVector, Problem, estimate,
+    mean_square_interval, to_vector,
 };
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::models::{InstallationModel, Place};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::units::ARCSEC;
+
+/// With the noise that the run states, which is that of its data.
+fn stated() -> Options {
+    Options::default().noise(NoisePolicy::Stated)
+}
 
 /// Fixed before the first run was made.
 const SEED: u64 = 2016;
@@ -23,8 +29,7 @@ pub struct Trial {
 
 impl Trial {
     pub fn new(simulated: &Simulated) -> Self {
-        let outcome =
-            estimate(&Problem::new(&simulated.run, &Options::default()), &|_| {}).unwrap();
+        let outcome = estimate(&Problem::new(&simulated.run, &stated()), &|_| {}).unwrap();
         let error = outcome.estimate.vector() - to_vector(&simulated.truth);
         let sigma = outcome.estimate.sigma();
         let estimated: Vec<usize> = outcome.estimate.estimated().collect();
@@ -97,7 +102,7 @@ fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
     // Not modelled, the same errors are several σ.
     let mut run = scenario.simulate(SEED, 0).unwrap();
     run.run.table.geometry = Default::default();
-    let outcome = estimate(&Problem::new(&run.run, &Options::default()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run.run, &stated()), &|_| {}).unwrap();
     let error = outcome.estimate.vector() - to_vector(&run.truth);
     let worst = error.component_div(&outcome.estimate.sigma()).amax();
     println!(
@@ -198,7 +203,7 @@ fn the_filter_knows_the_form_of_an_instrument_that_has_it() {
         scenario.installation = InstallationModel::load(model, &Place::CommandLine).unwrap();
         let simulated = scenario.simulate(SEED, 0).unwrap();
         let outcome = estimate(
-            &Problem::new(&simulated.run, &Options::default().installation(form)),
+            &Problem::new(&simulated.run, &stated().installation(form)),
             &|_| {},
         )
         .unwrap();
@@ -218,7 +223,7 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations_not_g
     let outcome = estimate(
         &Problem::new(
             &simulated.run,
-            &Options::default().installation(InstallationForm::ThreeAngle),
+            &stated().installation(InstallationForm::ThreeAngle),
         ),
         &|_| {},
     )

@@ -8,7 +8,7 @@ use super::super::coarse::{Equations, gauss_newton};
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
 use super::super::linearisation::singular;
-use super::super::parameters::{ParameterMatrix, from_vector, parameter};
+use super::super::parameters::{OBSERVED_BELOW, ParameterMatrix, from_vector, parameter};
 use super::super::problem::Problem;
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
@@ -45,8 +45,8 @@ pub(super) fn both_triads(
     for sensor in Sensor::ALL {
         let positions = positions.get(sensor);
         let (triad, of_triad) = match six_position_triad(positions, form) {
-            Some(determined) => determined,
-            None => with_prior(problem, sensor, positions)?,
+            Some(determined) if knows_more(problem, sensor, &determined.1) => determined,
+            _ => with_prior(problem, sensor, positions)?,
         };
         *triads.get_mut(sensor) = triad;
         let first = parameter(sensor, 0);
@@ -55,6 +55,18 @@ pub(super) fn both_triads(
             .copy_from(&of_triad);
     }
     Ok(Estimate { triads, covariance })
+}
+
+/// Whether positions alone know every parameter better than the prior does.
+fn knows_more(
+    problem: &Problem,
+    sensor: Sensor,
+    covariance: &SMatrix<f64, PER_TRIAD, PER_TRIAD>,
+) -> bool {
+    (0..PER_TRIAD).all(|k| {
+        let prior = problem.model.prior_sigma[parameter(sensor, k)];
+        prior == 0.0 || covariance[(k, k)].sqrt() < OBSERVED_BELOW * prior
+    })
 }
 
 /// One triad from positions and its prior, with the covariance of its parameters.

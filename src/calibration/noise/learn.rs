@@ -44,6 +44,17 @@ pub(in crate::calibration) struct Learnt {
     pub report: NoiseReport,
 }
 
+impl Learnt {
+    /// The noise as stated, not tested.
+    pub fn stated(problem: &Problem, iterated: Iterated) -> Self {
+        Self {
+            model: problem.model.clone(),
+            iterated,
+            report: NoiseReport::stated(problem.options.noise, None),
+        }
+    }
+}
+
 /// Keeps stated noise or learns it, as the problem's options say, from what converged with it.
 pub(in crate::calibration) fn learn(
     problem: &Problem,
@@ -59,7 +70,7 @@ pub(in crate::calibration) fn learn(
         report: NoiseReport::stated(policy, test),
     };
     if policy == NoisePolicy::Stated {
-        return Ok(keep(stated, None));
+        return Ok(Learnt::stated(problem, stated));
     }
     let at = stated.held.estimate.clone();
     let mut accepted: Vec<bool> = let_in(&stated.held.innovations);
@@ -227,7 +238,13 @@ impl Likelihood<'_> {
             return Ok((test, None));
         }
         let deviance = slope.here.deviance();
-        for i in suspects {
+        let all = self.fit(&stated, &sources)?;
+        let ratio = deviance - all.deviance;
+        test.ratio = Some(ratio);
+        test.rejected = ratio > test.ratio_limit;
+        // One factor alone may be beyond its limit where all together are not.
+        let suspects = suspects.into_iter().filter(|_| !test.rejected);
+        for i in suspects.collect::<Vec<_>>() {
             let one = self.fit(&stated, &sources[i..=i])?;
             let ratio = (deviance - one.deviance) / of_one(i, 0.5 * FALSE_ALARM);
             if test.ratio_of_one.is_none_or(|largest| ratio > largest) {
@@ -235,11 +252,7 @@ impl Likelihood<'_> {
                 test.of = Some(Source::ALL[sources[i]]);
             }
         }
-        let all = self.fit(&stated, &sources)?;
-        let ratio = deviance - all.deviance;
-        test.ratio = Some(ratio);
-        test.rejected =
-            ratio > test.ratio_limit || test.ratio_of_one.is_some_and(|ratio| ratio > 1.0);
+        test.rejected |= test.ratio_of_one.is_some_and(|ratio| ratio > 1.0);
         Ok((test, Some(all)))
     }
 

@@ -38,7 +38,8 @@ pub struct NoiseTest {
     pub ratio: Option<f64>,
     /// … and what it stays below if what is stated is right.
     pub ratio_limit: f64,
-    /// The largest against one factor over what it stays below; one or less if what is stated is right …
+    /// Where that is within its limit, the largest against one factor over what it stays below; one or
+    /// less if what is stated is right …
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ratio_of_one: Option<f64>,
     /// … and its source.
