@@ -66,17 +66,16 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
     let widened = scores.as_ref().and_then(DwellScores::widened);
-    let mut widest = None;
-    if let Some(widened) = &widened {
-        let before = held.covariance;
-        held.widen(&Layout::new(&problem.model), widened);
-        widest = Some(largest_growth(&before, &held.covariance));
-    }
     let triads = held.estimate.triads;
+    let covariance_by_noise = held.covariance + curvature(&triads, &held.covariance);
+    if let Some(widened) = &widened {
+        held.widen(&Layout::new(&problem.model), widened);
+    }
     let estimate = Estimate {
         covariance: held.covariance + curvature(&triads, &held.covariance),
         triads,
     };
+    let growth = widened.map(|_| largest_growth(&covariance_by_noise, &estimate.covariance));
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
@@ -87,6 +86,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         dwell_scatter: scores.map(|scores| scores.scatter),
         observability: Observability::new(&estimate, &model.prior_sigma, &held.attitude_covariance),
         estimate,
+        covariance_by_noise,
         prior_sigma: model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: priors,
@@ -111,7 +111,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         findings: Vec::new(),
     };
     outcome.findings = findings(problem, &outcome);
-    if let Some((scatter, growth)) = outcome.dwell_scatter.zip(widest) {
+    if let Some((scatter, growth)) = outcome.dwell_scatter.zip(growth) {
         outcome.findings.push(Finding::DwellsScatter {
             mean: scatter.mean,
             limit: scatter.limit,

@@ -12,7 +12,7 @@ use super::linearisation::{AttitudePrior, Linearisation};
 use super::model::Model;
 use super::noise::NoiseReport;
 use super::observability::Observability;
-use super::parameters::{OBSERVED_BELOW, ParameterVector};
+use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::pass::Epoch;
 use super::problem::Problem;
 use crate::run::Aiding;
@@ -25,6 +25,9 @@ const HEADING_SEEN: f64 = 6.0;
 pub struct Outcome {
     /// The estimate after the last pass.
     pub estimate: Estimate,
+    /// Covariance of the parameters by noise and prior alone; that of the estimate is larger where dwells
+    /// scatter more.
+    pub covariance_by_noise: ParameterMatrix,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.

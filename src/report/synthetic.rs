@@ -157,6 +157,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
     let outcome = Outcome {
         form_test: None,
         dwell_scatter: None,
+        covariance_by_noise: ParameterMatrix::zeros(),
         model: Model::new(&run, &Options::default().installation(form)),
         noise: NoiseReport {
             policy: Default::default(),

@@ -25,7 +25,7 @@ fn difference(problem: &Problem, outcome: &Outcome) -> (f64, f64) {
     for i in (0..PARAMETERS).filter(|&i| sigma[i] > 0.0) {
         estimate = estimate.max((apart[i] / sigma[i]).abs());
         for j in (0..PARAMETERS).filter(|&j| sigma[j] > 0.0) {
-            let apart = filter.covariance[(i, j)] - batch.covariance[(i, j)];
+            let apart = outcome.covariance_by_noise[(i, j)] - batch.covariance[(i, j)];
             covariance = covariance.max((apart / (sigma[i] * sigma[j])).abs());
         }
     }

@@ -189,12 +189,22 @@ fn a_calibration_without_convergence_is_written_whole_and_fails() {
         .arg(&run)
         .assert()
         .success();
-    // Gravity is wrong by one part in a hundred, and so is the form.
+    // Gravity is wrong by one part in a hundred, so is the form, and noise is next to nothing.
     let run = run.join("run.toml");
     let text = fs::read_to_string(&run).unwrap();
-    let (before, after) = text.split_once("gravity_m_s2 = ").unwrap();
-    let (_, after) = after.split_once('\n').unwrap();
-    fs::write(&run, format!("{before}gravity_m_s2 = 9.7\n{after}")).unwrap();
+    let stated = |line: &str| {
+        let wrong = [
+            ("gravity_m_s2", "9.7"),
+            ("angle_random_walk_deg_per_sqrt_h", "1e-6"),
+            ("velocity_random_walk_ug_per_sqrt_hz", "1e-2"),
+            ("position_sigma_arcsec", "1e-2"),
+            ("reading_sigma_arcsec", "1e-2"),
+        ];
+        let wrong = wrong.into_iter().find(|(name, _)| line.starts_with(name));
+        wrong.map_or(line.to_owned(), |(name, value)| format!("{name} = {value}"))
+    };
+    let lines: Vec<String> = text.lines().map(stated).collect();
+    fs::write(&run, lines.join("\n")).unwrap();
     let failed = turncal()
         .arg("calibrate")
         .arg(&run)

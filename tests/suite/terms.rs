@@ -144,7 +144,8 @@ fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     run.instrument.term_sigma = TermVector::zeros();
     let outcome = estimate(&Problem::new(&run, &stated()), &|_| {}).unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
-    let normalised = error.component_div(&outcome.estimate.sigma());
+    let sigma = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
+    let normalised = error.component_div(&sigma);
     (outcome, normalised)
 }
 

@@ -8,7 +8,7 @@ use super::super::coarse::{Equations, gauss_newton};
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
 use super::super::linearisation::singular;
-use super::super::parameters::{OBSERVED_BELOW, ParameterMatrix, from_vector, parameter};
+use super::super::parameters::{ParameterMatrix, from_vector, parameter};
 use super::super::problem::Problem;
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
@@ -65,7 +65,7 @@ fn knows_more(
 ) -> bool {
     (0..PER_TRIAD).all(|k| {
         let prior = problem.model.prior_sigma[parameter(sensor, k)];
-        prior == 0.0 || covariance[(k, k)].sqrt() < OBSERVED_BELOW * prior
+        prior == 0.0 || covariance[(k, k)].sqrt() < prior
     })
 }
 
