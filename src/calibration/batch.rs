@@ -51,6 +51,10 @@ pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, 
     if let Some(term) = on {
         return Err(CalibrationError::NotInBatch { term: term.name() });
     }
+    if model.turning_at_rest > 0.0 {
+        let term = "turning at standstill";
+        return Err(CalibrationError::NotInBatch { term });
+    }
     let [stretch] = problem.stretches() else {
         let term = "a second stretch";
         return Err(CalibrationError::NotInBatch { term });

@@ -97,23 +97,10 @@ pub enum Look {
     AfterMoves,
     /// Sums over each dwell, each over its σ: they carry what lasts.
     OverDwells,
-    /// East.
-    East,
-    /// North.
-    North,
-    /// Up.
-    Up,
 }
 
 impl Look {
-    const ALL: [Self; 6] = [
-        Self::All,
-        Self::AfterMoves,
-        Self::OverDwells,
-        Self::East,
-        Self::North,
-        Self::Up,
-    ];
+    const ALL: [Self; 3] = [Self::All, Self::AfterMoves, Self::OverDwells];
 
     /// In words, after what was observed.
     pub fn words(self) -> &'static str {
@@ -121,16 +108,12 @@ impl Look {
             Self::All => "",
             Self::AfterMoves => " first after each move",
             Self::OverDwells => " summed over each dwell",
-            Self::East => " along East",
-            Self::North => " along North",
-            Self::Up => " along Up",
         }
     }
 
     /// Squares of independent numbers of σ 1.
     fn squares(self, of_kind: &[&Innovation]) -> Vec<f64> {
         let accepted = || of_kind.iter().filter(|i| i.accepted);
-        let along = |axis: usize| accepted().map(|i| i.whitened[axis].powi(2)).collect();
         let dwells = || of_kind.chunk_by(|a, b| a.dwell == b.dwell);
         match self {
             Self::All => accepted().flat_map(|i| i.whitened.map(|w| w * w)).collect(),
@@ -142,9 +125,6 @@ impl Look {
                     .collect()
             }
             Self::OverDwells => dwells().flat_map(summed).collect(),
-            Self::East => along(0),
-            Self::North => along(1),
-            Self::Up => along(2),
         }
     }
 }

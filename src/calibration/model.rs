@@ -44,6 +44,9 @@ pub struct Model {
     /// White 1σ at standstill of what each triad's output adds up to, attitude in rad and velocity in m/s;
     /// none: in each stretch what its run states or shows.
     pub stillness: PerSensor<Option<f64>>,
+    /// How the body turns where it should not, in dwells without a table: 1σ density of a random walk,
+    /// rad/√s. Gyros sense it, so it is none of their noise.
+    pub turning_at_rest: f64,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
@@ -82,6 +85,7 @@ impl Model {
             noise: run.instrument.noise,
             motion_noise: PerSensor::default(),
             stillness: PerSensor::default(),
+            turning_at_rest: 0.0,
             term_sigma: run.instrument.term_sigma,
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
@@ -123,6 +127,7 @@ impl Model {
             noise: other.noise,
             motion_noise: other.motion_noise,
             stillness: other.stillness,
+            turning_at_rest: other.turning_at_rest,
             position_sigma: other.position_sigma,
             reading_sigma: other.reading_sigma,
             ..self.clone()

@@ -61,8 +61,9 @@ impl Scale {
                 _ if source.stated(problem) => sigma.powi(2),
                 Source::Velocity => walk(Sensor::Accel) * step,
                 // Beside a table's readings it says nothing.
-                Source::Attitude if problem.model.aiding == Aiding::Table => 0.0,
+                Source::Attitude | Source::Turning if problem.model.aiding == Aiding::Table => 0.0,
                 Source::Attitude => walk(Sensor::Gyro) * step,
+                Source::Turning => walk(Sensor::Gyro),
                 Source::GyroGaussMarkov => over_step(walk(Sensor::Gyro)),
                 Source::AccelGaussMarkov => over_step(walk(Sensor::Accel)),
                 _ => 0.0,

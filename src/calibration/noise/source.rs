@@ -27,6 +27,8 @@ pub enum Source {
     Velocity,
     /// White attitude at standstill, without a table.
     Attitude,
+    /// Turning where the body should stand still, without a table.
+    Turning,
     /// Position error of the table.
     TablePosition,
     /// Reading of the table.
@@ -39,7 +41,7 @@ pub enum Source {
 
 impl Source {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::AngleRandomWalk,
         Self::VelocityRandomWalk,
         Self::GyroMotion,
@@ -48,6 +50,7 @@ impl Source {
         Self::AccelMoving,
         Self::Velocity,
         Self::Attitude,
+        Self::Turning,
         Self::TablePosition,
         Self::TableReading,
         Self::GyroGaussMarkov,
@@ -65,6 +68,7 @@ impl Source {
             Self::AccelMoving => "velocity noise of moves by time",
             Self::Velocity => "velocity at standstill",
             Self::Attitude => "attitude at standstill",
+            Self::Turning => "turning at standstill",
             Self::TablePosition => "table position",
             Self::TableReading => "table reading",
             Self::GyroGaussMarkov => "Gauss-Markov bias of the gyros",
@@ -79,7 +83,7 @@ impl Source {
             Self::VelocityRandomWalk => ("ug/sqrt(Hz)", MICRO_G_PER_SQRT_HZ),
             // Over the root of ∫|ω|² dt in rad²/s or ∫|a|² dt in m²/s³.
             Self::GyroMotion | Self::AccelMotion => ("sqrt(s)", 1.0),
-            Self::GyroMoving => ("deg/sqrt(s)", DEGREE),
+            Self::GyroMoving | Self::Turning => ("deg/sqrt(s)", DEGREE),
             Self::AccelMoving => ("mm/s/sqrt(s)", 1e-3),
             Self::Velocity => ("mm/s", 1e-3),
             Self::Attitude | Self::TablePosition | Self::TableReading => ("arcsec", ARCSEC),
@@ -124,6 +128,7 @@ impl Source {
             Self::AccelMoving => model.motion_noise.accel.by_duration,
             Self::Velocity => problem.unrest(Sensor::Accel).sqrt(),
             Self::Attitude => problem.unrest(Sensor::Gyro).sqrt(),
+            Self::Turning => model.turning_at_rest,
             Self::TablePosition => model.position_sigma,
             Self::TableReading => model.reading_sigma,
             Self::GyroGaussMarkov => gauss_markov(Sensor::Gyro),
@@ -142,6 +147,7 @@ impl Source {
             Self::AccelMoving => model.motion_noise.accel.by_duration = sigma,
             Self::Velocity => model.set_unrest(Sensor::Accel, sigma.powi(2)),
             Self::Attitude => model.set_unrest(Sensor::Gyro, sigma.powi(2)),
+            Self::Turning => model.turning_at_rest = sigma,
             Self::TablePosition => model.position_sigma = sigma,
             Self::TableReading => model.reading_sigma = sigma,
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {

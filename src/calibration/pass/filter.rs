@@ -20,6 +20,8 @@ pub(in crate::calibration) struct Filter {
     x: DVector<f64>,
     p: DMatrix<f64>,
     noise: PerSensor<ProcessNoise>,
+    /// Of the turn at rest alone, rad/√s.
+    turning: f64,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
     /// What auxiliary parameters that are tried would do.
@@ -57,6 +59,7 @@ impl Filter {
             layout,
             x,
             p,
+            turning: model.turning_at_rest,
             noise: model.process_noise(),
             varying,
             sensitivity: None,
@@ -186,6 +189,9 @@ impl Filter {
             for (row, sum) in sum.iter().enumerate() {
                 let (at_row, of_row) = place(row);
                 self.p[(at_row, at_column)] = sum + noise[(of_row, of_column)];
+            }
+            if at_column >= NAVIGATION {
+                self.p[(at_column, at_column)] += self.turning.powi(2) * block.duration;
             }
         }
         if let Some(sensitivity) = &mut self.sensitivity {
