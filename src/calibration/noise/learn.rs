@@ -27,11 +27,11 @@ const ROUNDS: usize = 6;
 /// A change of −2 ln of the likelihood from one point of linearisation to the next that is nothing: a
 /// third of a σ of one factor.
 const SETTLED: f64 = 0.1;
-/// Observations of three components that noise is learnt from: 3,000 numbers, half of which tell σ of a
-/// white noise to 2 %.
+/// Observations of three components that noise is first learnt from: 3,000 numbers, half of which tell σ of
+/// a white noise to 2 %.
 const ENOUGH: usize = 1000;
-/// Steps of a dwell between observations at most: longer ones would not tell white noise of velocity and
-/// attitude from random walk.
+/// Steps of a dwell between these observations at most: longer ones would not tell white noise of velocity
+/// and attitude from random walk at all.
 const LONGEST: usize = 10;
 /// Half of a 95 % interval in σ, and what 95 % stay below.
 const INTERVAL: f64 = 1.96;
@@ -74,7 +74,7 @@ pub(in crate::calibration) fn learn(
     }
     let at = stated.held.estimate.clone();
     let mut accepted: Vec<bool> = let_in(&stated.held.innovations);
-    let thinned = Thinned::new(problem, accepted.len());
+    let thinned = Thinned::new(problem, (accepted.len() / ENOUGH).clamp(1, LONGEST));
     let script = Script::new(&thinned.problem, priors, &at)?;
     let scale = Scale::new(problem, &script.moves());
     let (test, fitted) = thinned
@@ -90,6 +90,8 @@ pub(in crate::calibration) fn learn(
     let mut iterated = stated;
     // Stated noise may have thrown the gate open; the learnt one decides once.
     let mut open = accepted.iter().all(|&accepted| accepted);
+    // Near the end all observations count: few cannot tell white noise from random walk.
+    let whole = Thinned::new(problem, 1);
     let mut before = None;
     let mut at = at;
     let mut round = 0;
@@ -116,8 +118,8 @@ pub(in crate::calibration) fn learn(
         let gate = Gate::As(&as_decided);
         iterated = iterate(&with_noise, priors, from, gate, passes, progress)?;
         at = iterated.held.estimate.clone();
-        let script = Script::new(&thinned.problem, priors, &at)?;
-        let likelihood = thinned.likelihood(&script, &scale, &accepted);
+        let script = Script::new(&whole.problem, priors, &at)?;
+        let likelihood = whole.likelihood(&script, &scale, &accepted);
         let now = likelihood.replay(&fit.factors)?.deviance();
         let moved = before.is_none_or(|before: f64| (now - before).abs() > SETTLED);
         if (!changed && !moved) || round == ROUNDS {
@@ -142,9 +144,8 @@ struct Thinned<'a> {
 }
 
 impl<'a> Thinned<'a> {
-    fn new(problem: &Problem<'a>, observations: usize) -> Self {
-        let longer = (observations / ENOUGH).clamp(1, LONGEST);
-        let thinned = problem.observed_every(longer);
+    fn new(problem: &Problem<'a>, steps_of_dwell: usize) -> Self {
+        let thinned = problem.observed_every(steps_of_dwell);
         let mut groups = Vec::new();
         let mut next = 0;
         for (all, few) in problem.stretches().iter().zip(thinned.stretches()) {
