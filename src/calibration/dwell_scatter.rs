@@ -144,3 +144,58 @@ fn halves((information, score): &(DMatrix<f64>, DVector<f64>)) -> (f64, usize) {
     });
     squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::{Finding, NoisePolicy, Options, Outcome, Problem, estimate};
+    use crate::run::Run;
+    use crate::simulation::Scenario;
+
+    /// Fixed before the first run was made.
+    const SEED: u64 = 13;
+    const RUNS: u64 = 4;
+
+    fn run(number: u64) -> Run {
+        Scenario::load("demo")
+            .unwrap()
+            .simulate(SEED, number)
+            .unwrap()
+            .run
+    }
+
+    fn estimated(run: &Run) -> Outcome {
+        let options = Options::default().noise(NoisePolicy::Stated);
+        estimate(&Problem::new(run, &options), &|_| {}).unwrap()
+    }
+
+    #[test]
+    fn scores_of_a_right_model_are_as_large_as_their_variance() {
+        let all: Vec<DwellScatter> = (0..RUNS)
+            .map(|number| estimated(&run(number)).dwell_scatter.unwrap())
+            .collect();
+        let count: usize = all.iter().map(|scatter| scatter.count).sum();
+        let sum: f64 = all.iter().map(|s| s.mean * s.count as f64).sum();
+        let (low, high) = mean_square_interval(count, 1e-3);
+        let mean = sum / count as f64;
+        println!("{mean:.3} of {count}");
+        assert!((low..high).contains(&mean), "{mean} {low} {high}");
+    }
+
+    #[test]
+    fn positions_worse_than_stated_are_seen_and_sigma_grow_to_them() {
+        let mut run = run(0);
+        let truth = estimated(&run);
+        run.table.position_sigma /= 3.0;
+        let outcome = estimated(&run);
+        let said = |finding: &Finding| matches!(finding, Finding::DwellsScatter { .. });
+        assert!(outcome.findings.iter().any(said));
+        // What positions tell most is again known as well as with the figure that is right.
+        let sigma = |outcome: &Outcome| outcome.estimate.sigma().rows(3, 6).norm();
+        let ratio = sigma(&outcome) / sigma(&truth);
+        let by_noise = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
+        let without = by_noise.rows(3, 6).norm() / sigma(&truth);
+        println!("σ of gyro E over those with the right figure: {ratio:.2}, by noise {without:.2}");
+        assert!(without < 0.5 && ratio > 0.7, "{without} {ratio}");
+    }
+}

@@ -107,6 +107,37 @@ fn part(run: &Run, samples: Range<usize>) -> Run {
 }
 
 #[test]
+fn one_dwell_shows_the_bias_of_the_gyro_about_the_vertical_and_no_scale() {
+    let Simulated { run, truth, .. } = Scenario::load("demo").unwrap().simulate(SEED, 0).unwrap();
+    // z up.
+    let first = run.dwells(run.aiding())[0].samples.clone();
+    let duration = first.len() as f64 * run.recording.imu.period;
+    let mut dwell = part(&run, first);
+    dwell.recording.table = None;
+    let problem = Problem::new(&dwell, &Options::default().aiding(Aiding::Velocity));
+    let outcome = solved(&problem);
+    let (sigma, prior) = (outcome.estimate.sigma(), outcome.prior_sigma);
+    let error = outcome.estimate.vector() - to_vector(&truth);
+    // gyro.scale.z, gyro.installation.zx, gyro.bias.z
+    let [scale, angle, bias] = [2, 7, 11];
+    // Random walk over the dwell, and Earth rate by a scale and an angle that are not known.
+    let walk = run.instrument.noise.gyro.random_walk / duration.sqrt();
+    let earth_rate = run.site.earth_rate_n();
+    let along = prior[scale] * earth_rate.z;
+    let expected = walk.hypot(along).hypot(prior[angle] * earth_rate.y);
+    println!("σ {:.2e} rad/s, expected {expected:.2e}", sigma[bias]);
+    assert!(
+        (sigma[bias] / expected - 1.0).abs() < 0.2,
+        "{}",
+        sigma[bias]
+    );
+    assert!(error[bias].abs() < 4.0 * sigma[bias]);
+    for hidden in [0, 1, 2, 12, 13] {
+        assert!(sigma[hidden] > 0.5 * prior[hidden], "{hidden}");
+    }
+}
+
+#[test]
 fn a_break_of_ten_seconds_in_a_move_costs_no_more_than_what_is_lost() {
     let Simulated {
         run, truth, terms, ..
