@@ -40,6 +40,7 @@ fn demo(output: &Path, threads: &str) {
 }
 
 #[test]
+#[ignore = "slow: two demonstrations"]
 fn the_demo_gives_the_same_bytes_on_one_thread_and_on_two() {
     let directory = tempfile::tempdir().unwrap();
     let (one, two) = (directory.path().join("one"), directory.path().join("two"));

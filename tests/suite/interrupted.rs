@@ -96,6 +96,7 @@ fn a_signal_ends_a_command_by_that_signal_and_leaves_nothing() {
 
 #[test]
 #[cfg(target_os = "linux")]
+#[ignore = "slow: a whole demonstration"]
 fn a_command_under_nohup_goes_on_without_its_terminal() {
     let directory = tempfile::tempdir().unwrap();
     let mut child = begun(&["nohup"], directory.path(), "out");
@@ -105,6 +106,7 @@ fn a_command_under_nohup_goes_on_without_its_terminal() {
 }
 
 #[test]
+#[ignore = "slow: a whole demonstration"]
 fn what_a_killed_command_left_goes_with_the_next_and_what_another_is_writing_stays() {
     let directory = tempfile::tempdir().unwrap();
     let mut killed = begun(&[], directory.path(), "killed");
