@@ -39,7 +39,9 @@ fn the_most_significant_error_term_is_the_one_that_is_there_and_none_where_none_
 #[test]
 #[ignore = "statistical: 15 runs"]
 fn each_error_term_that_is_there_is_the_most_significant_one() {
-    let all = ErrorTerm::ALL.into_iter().map(Some);
+    // Positions at right angles do not tell errors of encoders from those of positions.
+    let shown = |term: &ErrorTerm| *term != ErrorTerm::TableAxes(AxisError::Encoder);
+    let all = ErrorTerm::ALL.into_iter().filter(shown).map(Some);
     most_significant_is(all.collect());
 }
 
