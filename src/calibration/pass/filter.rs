@@ -312,8 +312,8 @@ impl Filter {
                 *x += *gain * innovation;
             }
             if let Some(sensitivity) = &mut self.sensitivity {
-                let rows = (row.as_slice(), measurement.tried[axis].as_slice());
-                sensitivity.update(rows, &gain, innovation, variance);
+                let rows = [row.as_slice(), measurement.tried[axis].as_slice()];
+                sensitivity.update(rows, &gain, scalars[axis]);
             }
             // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
             let columns = self.p.as_mut_slice().chunks_exact_mut(n);

@@ -8,6 +8,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::filter::ScalarInnovation;
+
 /// Rows of the normal equations that are summed at once.
 const ROWS: usize = 96;
 
@@ -77,10 +79,12 @@ impl Sensitivity {
     /// variance.
     pub fn update(
         &mut self,
-        (states, parameters): (&[(usize, f64)], &[(usize, f64)]),
+        [states, parameters]: [&[(usize, f64)]; 2],
         gain: &[f64],
-        innovation: f64,
-        variance: f64,
+        ScalarInnovation {
+            innovation,
+            variance,
+        }: ScalarInnovation,
     ) {
         let mut sensed = DVector::zeros(self.of_states.nrows());
         for &(state, weight) in states {

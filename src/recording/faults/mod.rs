@@ -154,8 +154,8 @@ fn find(
         };
         let spikes = spikes.iter().map(|&row| row..row + 1);
         let spikes = spikes.filter(free).map(|rows| (FaultKind::Spike, rows));
-        let stuck = stuck.iter().cloned().filter(free);
-        let stuck = stuck.map(|rows| (FaultKind::Stuck, rows));
+        let stuck = stuck.iter().filter(|&rows| free(rows));
+        let stuck = stuck.map(|rows| (FaultKind::Stuck, rows.clone()));
         let kinds: Vec<_> = spikes.chain(stuck).collect();
         let saturated = saturated
             .into_iter()
