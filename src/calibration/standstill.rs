@@ -43,8 +43,11 @@ fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
         }
         let mean = sums.iter().sum::<Vector3<f64>>() / sums.len() as f64;
         for pair in sums.windows(2) {
-            covariance += (pair[0] - mean).dot(&(pair[1] - mean));
-            variance += (pair[0] - mean).norm_squared();
+            let square = (pair[0] - mean).norm_squared();
+            // A mean of the very sums takes that much off each product.
+            let by_mean = square / sums.len() as f64;
+            covariance += (pair[0] - mean).dot(&(pair[1] - mean)) + by_mean;
+            variance += square;
             pairs += 3;
         }
     }
@@ -75,6 +78,20 @@ mod tests {
             scenario.output = output;
             let run = scenario.simulate(1, 0).unwrap().run;
             assert_eq!(stillness(&run, &run.dwells(run.aiding())), FLOOR);
+        }
+    }
+
+    #[test]
+    fn many_short_dwells_are_as_still_as_few_long_ones() {
+        let mut scenario = Scenario::load("demo").unwrap();
+        scenario.output = Output::Increment;
+        for number in 0..8 {
+            let run = scenario.simulate(1, number).unwrap().run;
+            let mut dwells = run.dwells(run.aiding());
+            for dwell in &mut dwells {
+                dwell.samples.end = dwell.samples.start + 100;
+            }
+            assert_eq!(stillness(&run, &dwells), FLOOR, "{number}");
         }
     }
 
