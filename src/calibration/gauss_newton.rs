@@ -60,7 +60,17 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         report,
     } = match rejected {
         true => Learnt::stated(problem, iterated),
-        false => learn(problem, &priors, iterated, &mut passes, progress)?,
+        false => {
+            let (stated, number) = (iterated.clone(), passes.len());
+            match learn(problem, &priors, iterated, &mut passes, progress) {
+                Ok(learnt) if learnt.iterated.converged || !stated.converged => learnt,
+                // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
+                _ => {
+                    passes.truncate(number);
+                    Learnt::stated(problem, stated)
+                }
+            }
+        }
     };
     let problem = &problem.with_model(model);
     let scores = held.posteriors.split_first();

@@ -19,6 +19,7 @@ const DECIDED_AFTER: usize = 4;
 const MOST_OUTLIERS: f64 = 0.05;
 
 /// The last pass, and whether it moved nothing.
+#[derive(Clone)]
 pub(super) struct Iterated {
     pub held: PassResult,
     pub converged: bool,

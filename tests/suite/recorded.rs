@@ -45,6 +45,16 @@ fn assert_within(largest: [f64; 6], limits: [f64; 6]) {
 }
 
 #[test]
+fn a_record_without_noise_is_calibrated_whatever_is_learnt_of_its_noise() {
+    let Some(directory) = shared("nineteen-position-clean") else {
+        return;
+    };
+    let run = read(&directory);
+    let outcome = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
+    assert!(outcome.converged);
+}
+
+#[test]
 fn a_three_axis_run_in_counts_is_calibrated_within_four_passes() {
     let Some((outcome, largest, sigmas)) = calibrated("three-axis-counts") else {
         return;
