@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::measurement::Measurement;
+use super::measurement::{Measurement, ScalarInnovation};
 use super::sensitivity::Sensitivity;
 use crate::attitude::{skew, to_tilt_and_heading};
 use crate::calibration::dwell_scatter::Posterior;
@@ -510,14 +510,6 @@ impl Filter {
     pub fn initial_attitude(&self) -> Vector3<f64> {
         self.at(self.layout.initial_attitude())
     }
-}
-
-/// One component of a measurement less what the filter expected of it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(in crate::calibration) struct ScalarInnovation {
-    pub innovation: f64,
-    /// As the filter expects it.
-    pub variance: f64,
 }
 
 /// What a pass with feedback takes out of the mean.

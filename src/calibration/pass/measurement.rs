@@ -20,6 +20,14 @@ pub(in crate::calibration) struct Measurement {
     pub variance: f64,
 }
 
+/// One component of a measurement less what the filter expected of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(in crate::calibration) struct ScalarInnovation {
+    pub innovation: f64,
+    /// As the filter expects it.
+    pub variance: f64,
+}
+
 impl Measurement {
     /// Zero velocity: `z = δV`.
     pub fn velocity(computed: &State, variance: f64) -> Self {

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::ScalarInnovation;
+use super::measurement::ScalarInnovation;
 
 /// Rows of the normal equations that are summed at once.
 const ROWS: usize = 96;
