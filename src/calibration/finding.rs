@@ -198,7 +198,7 @@ impl fmt::Display for Finding {
                     "Innovations are not as large as their σ says. NIS, with what it stays within in 999 \
                      runs of 1000 if noise figures and model are right: {}. After moves it is what grows \
                      with a move (table position, scale, timing), over dwells what lasts (bias), \
-                     everywhere the white noise. --noise auto finds the noise that the record shows.",
+                     everywhere the white noise.",
                     looks.join("; ")
                 )
             }

@@ -33,6 +33,16 @@ pub(super) struct Rest {
     pub known: Option<PerSensor<Vector3<f64>>>,
 }
 
+impl Rest {
+    /// What a triad senses, and the variance of each component.
+    pub fn sensed(&self, sensor: Sensor) -> (&Vector3<f64>, f64) {
+        match sensor {
+            Sensor::Gyro => (&self.rate, self.rate_variance),
+            Sensor::Accel => (&self.force, self.force_variance),
+        }
+    }
+}
+
 /// A move from one dwell to the next, or a part of it.
 #[derive(Debug, Clone)]
 pub(super) struct Move {

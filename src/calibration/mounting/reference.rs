@@ -42,51 +42,26 @@ pub(super) fn by_table(
     position_sigma: f64,
     orders: &[AxisOrder],
 ) -> PerSensor<Likelihoods> {
-    let accel = orders.iter().map(|order| {
-        let mut equations = Equations::new(prior_sigma);
-        for rest in &motion.rests {
-            if let Some(known) = &rest.known {
-                let variance = rest.force_variance + position_sigma.powi(2);
-                let sensor = Sensor::Accel;
-                add_direct(
-                    &mut equations,
-                    sensor,
-                    &rest.force,
-                    order,
-                    &known.accel,
-                    variance,
-                );
+    PerSensor::from_fn(|sensor| {
+        Likelihoods::new(orders.iter().map(|order| {
+            let mut equations = Equations::new(prior_sigma);
+            let moves = motion.moves.iter().filter(|_| sensor == Sensor::Gyro);
+            for of in moves {
+                if let Some(known) = &of.known {
+                    add_turn(&mut equations, of, order, known);
+                }
             }
-        }
-        equations
-    });
-    let gyro = orders.iter().map(|order| {
-        let mut equations = Equations::new(prior_sigma);
-        for of in &motion.moves {
-            if let Some(known) = &of.known {
-                add_turn(&mut equations, of, order, known);
+            for rest in &motion.rests {
+                if let Some(known) = &rest.known {
+                    let (found, variance) = rest.sensed(sensor);
+                    let variance = variance + position_sigma.powi(2);
+                    let known = known.get(sensor);
+                    add_direct(&mut equations, sensor, found, order, known, variance);
+                }
             }
-        }
-        for rest in &motion.rests {
-            if let Some(known) = &rest.known {
-                let variance = rest.rate_variance + position_sigma.powi(2);
-                let sensor = Sensor::Gyro;
-                add_direct(
-                    &mut equations,
-                    sensor,
-                    &rest.rate,
-                    order,
-                    &known.gyro,
-                    variance,
-                );
-            }
-        }
-        equations
-    });
-    PerSensor {
-        gyro: Likelihoods::new(gyro),
-        accel: Likelihoods::new(accel),
-    }
+            equations
+        }))
+    })
 }
 
 /// Labels say which axis is up and about which it turns: each triad by itself against them.

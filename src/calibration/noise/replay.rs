@@ -187,19 +187,9 @@ impl Pass<'_> {
             filter.redraw_table(model.position_sigma);
             filter.update(&Measurement::position(state, variance.position));
         }
-        let velocity = Measurement::velocity(state, stretch.velocity_variance(model));
-        self.observe(rest.time, &velocity)?;
-        if let Some((reading, count)) = &rest.at_rest.reading {
-            let white = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
-            let axes = rest.at_rest.axes.as_ref();
-            let layout = &self.filter.layout;
-            let attitude = Measurement::table(layout, state, reading, axes, white);
-            self.observe(rest.time, &attitude)?;
-        }
-        let variance = stretch.attitude_variance(model);
-        let layout = &self.filter.layout;
-        if let Some(turn) = Measurement::turn_at_rest(layout, state, &rest.held, variance) {
-            self.observe(rest.time, &turn)?;
+        let of_stretch = (stretch, model, &self.filter.layout);
+        for (_, measurement) in Measurement::of_rest(of_stretch, rest.at_rest, state, &rest.held) {
+            self.observe(rest.time, &measurement)?;
         }
         Ok(())
     }

@@ -3,7 +3,11 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::log;
+use crate::calibration::innovation::Observation;
 use crate::calibration::layout::{ATTITUDE, Layout, POSITION, VELOCITY};
+use crate::calibration::model::Model;
+use crate::calibration::problem::Stretch;
+use crate::calibration::schedule::AtRest;
 use crate::navigation::State;
 use crate::turntable::AxisResponse;
 
@@ -29,8 +33,32 @@ pub(in crate::calibration) struct ScalarInnovation {
 }
 
 impl Measurement {
+    /// What is observed at the end of a step of a dwell, in order; `held` is the attitude that was computed
+    /// when the body came to rest.
+    pub fn of_rest(
+        (stretch, model, layout): (&Stretch, &Model, &Layout),
+        at_rest: &AtRest,
+        computed: &State,
+        held: &Matrix3<f64>,
+    ) -> impl Iterator<Item = (Observation, Self)> + use<> {
+        let velocity = Self::velocity(computed, stretch.velocity_variance(model));
+        let table = at_rest.reading.as_ref().map(|(reading, count)| {
+            let white = model.reading_sigma.powi(2) / *count as f64 + stretch.variance.attitude;
+            Self::table(layout, computed, reading, at_rest.axes.as_ref(), white)
+        });
+        let variance = stretch.attitude_variance(model);
+        let turn = Self::turn_at_rest(layout, computed, held, variance);
+        [
+            (Observation::Velocity, Some(velocity)),
+            (Observation::Table, table),
+            (Observation::Attitude, turn),
+        ]
+        .into_iter()
+        .filter_map(|(kind, measurement)| Some((kind, measurement?)))
+    }
+
     /// Zero velocity: `z = δV`.
-    pub fn velocity(computed: &State, variance: f64) -> Self {
+    fn velocity(computed: &State, variance: f64) -> Self {
         Self::of(VELOCITY, computed.velocity, variance)
     }
 
@@ -40,7 +68,7 @@ impl Measurement {
     }
 
     /// The attitude when the body came to rest: `z = φ − φ₀`, the turn at rest. None with a table.
-    pub fn turn_at_rest(
+    fn turn_at_rest(
         layout: &Layout,
         computed: &State,
         held: &Matrix3<f64>,
@@ -52,7 +80,7 @@ impl Measurement {
 
     /// The table's reading: `z = φ − τ − ε − Σ t_k α_k`, with the errors α of its axes and the direction
     /// t in which each turns the table.
-    pub fn table(
+    fn table(
         layout: &Layout,
         computed: &State,
         reading: &Matrix3<f64>,

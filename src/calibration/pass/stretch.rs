@@ -224,19 +224,10 @@ impl<'a> OneStretch<'a> {
             // not at all: one observation a dwell, however long it is.
             filter.update(&Measurement::position(&state, variance.position));
         }
-        let velocity = Measurement::velocity(&state, self.stretch.velocity_variance(model));
-        self.observe(time, Observation::Velocity, &velocity)?;
-        if let Some((reading, count)) = &at_rest.reading {
-            let white = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
-            let layout = &self.sums.filter.layout;
-            let axes = at_rest.axes.as_ref();
-            let attitude = Measurement::table(layout, &state, reading, axes, white);
-            self.observe(time, Observation::Table, &attitude)?;
-        }
-        let variance = self.stretch.attitude_variance(model);
-        let layout = &self.sums.filter.layout;
-        if let Some(turn) = Measurement::turn_at_rest(layout, &state, &self.held, variance) {
-            self.observe(time, Observation::Attitude, &turn)?;
+        let of_stretch = (self.stretch, model, &self.sums.filter.layout);
+        let measurements = Measurement::of_rest(of_stretch, at_rest, &state, &self.held);
+        for (observation, measurement) in measurements {
+            self.observe(time, observation, &measurement)?;
         }
         match self.mode {
             Mode::Feedback => self.feed_back(),
