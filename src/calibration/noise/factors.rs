@@ -94,6 +94,15 @@ impl Scale {
         (0..SOURCES).filter(|&k| self.reference[k] > 0.0).collect()
     }
 
+    /// What a source has that the data do not call for: what is stated, else nothing.
+    pub fn needless(&self, source: usize) -> f64 {
+        if self.stated[source] {
+            self.initial.0[source]
+        } else {
+            0.0
+        }
+    }
+
     /// Whether a figure of it is stated that is not zero.
     pub fn is_stated(&self, source: usize) -> bool {
         self.stated[source]

@@ -15,6 +15,7 @@ use super::likelihood_ratio::limit;
 use super::policy::NoisePolicy;
 use super::replay::Script;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
+use super::selection::Selection;
 use super::source::Source;
 
 /// Chance that stated figures which are right are given up; each of the two tests has half of it.
@@ -77,15 +78,18 @@ pub(in crate::calibration) fn learn(
     let thinned = Thinned::new(problem, (accepted.len() / ENOUGH).clamp(1, LONGEST));
     let script = Script::new(&thinned.problem, priors, &at)?;
     let scale = Scale::new(problem, &script.moves());
-    let (test, fitted) = thinned
-        .likelihood(&script, &scale, &accepted)
-        .test(policy)?;
-    let Some(mut fit) = fitted else {
+    let likelihood = thinned.likelihood(&script, &scale, &accepted);
+    let (test, fitted) = likelihood.test(policy)?;
+    let Some(fitted) = fitted else {
         return Ok(keep(stated, Some(test)));
     };
     if policy == NoisePolicy::Auto && !test.rejected && stated.converged {
         return Ok(keep(stated, Some(test)));
     }
+    let Selection {
+        mut fit,
+        mut sources,
+    } = likelihood.select(&fitted.factors, scale.present())?;
 
     let mut iterated = stated;
     // Stated noise may have thrown the gate open; the learnt one decides once.
@@ -131,7 +135,7 @@ pub(in crate::calibration) fn learn(
             });
         }
         before = Some(now);
-        fit = likelihood.fit(&fit.factors, &scale.present())?;
+        Selection { fit, sources } = likelihood.select(&fit.factors, sources)?;
     }
 }
 
@@ -210,7 +214,7 @@ fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) -> bo
 }
 
 impl Likelihood<'_> {
-    /// The test of what is stated, and the fit of all factors where one was made.
+    /// The test of what is stated, and what the data call for where that was worked out.
     fn test(&self, policy: NoisePolicy) -> Result<(NoiseTest, Option<Fit>), CalibrationError> {
         let sources = self.scale.present();
         let stated = self.scale.initial();

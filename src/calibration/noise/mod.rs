@@ -13,6 +13,7 @@ mod policy;
 mod replay;
 mod report;
 mod run_toml;
+mod selection;
 mod source;
 
 pub(super) use learn::{Learnt, learn};
