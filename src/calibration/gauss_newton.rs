@@ -18,7 +18,7 @@ use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
 use super::parameters::{ParameterMatrix, parameter_name};
 use super::pass::{Gate, Mode, PassResult, pass};
-use super::prior_distance::far_from_prior;
+use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use crate::imu::Sensor;
 use crate::run::Aiding;
@@ -46,8 +46,16 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         priors,
         mut passes,
         feedback,
-        iterated,
+        mut iterated,
     } = others.fold(of_start, better)?;
+    let stated = problem;
+    let widened = widened(&problem.model, &estimated(&iterated.held));
+    let with_wide_prior = widened.map(|model| problem.with_model(model));
+    let problem = with_wide_prior.as_ref().unwrap_or(problem);
+    if with_wide_prior.is_some() {
+        let (from, gate) = (iterated.held.estimate, Gate::Innovations);
+        iterated = iterate(problem, &priors, from, gate, &mut passes, progress)?;
+    }
     let form_test = form_test(problem, &priors, &iterated.held)?;
     // Noise that makes up for angles that are missing is no noise.
     let rejected = form_test.as_ref().is_some_and(FormTest::rejects);
@@ -75,17 +83,13 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let problem = &problem.with_model(model);
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
-    let widened = scores.as_ref().and_then(DwellScores::widened);
-    let triads = held.estimate.triads;
-    let covariance_by_noise = held.covariance + curvature(&triads, &held.covariance);
-    if let Some(widened) = &widened {
+    let by_scatter = scores.as_ref().and_then(DwellScores::widened);
+    let covariance_by_noise = estimated(&held).covariance;
+    if let Some(widened) = &by_scatter {
         held.widen(&Layout::new(&problem.model), widened);
     }
-    let estimate = Estimate {
-        covariance: held.covariance + curvature(&triads, &held.covariance),
-        triads,
-    };
-    let growth = widened.map(|_| largest_growth(&covariance_by_noise, &estimate.covariance));
+    let estimate = estimated(&held);
+    let growth = by_scatter.map(|_| largest_growth(&covariance_by_noise, &estimate.covariance));
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
@@ -94,10 +98,14 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let mut outcome = Outcome {
         form_test,
         dwell_scatter: scores.map(|scores| scores.scatter),
-        observability: Observability::new(&estimate, &model.prior_sigma, &held.attitude_covariance),
+        observability: Observability::new(
+            &estimate,
+            &stated.model.prior_sigma,
+            &held.attitude_covariance,
+        ),
         estimate,
         covariance_by_noise,
-        prior_sigma: model.prior_sigma,
+        prior_sigma: stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: priors,
         attitude_sigma: held.attitude_sigma,
@@ -120,7 +128,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         passes,
         findings: Vec::new(),
     };
-    outcome.findings = findings(problem, &outcome);
+    outcome.findings = findings(stated, &outcome);
     if let Some((scatter, growth)) = outcome.dwell_scatter.zip(growth) {
         outcome.findings.push(Finding::DwellsScatter {
             mean: scatter.mean,
@@ -129,6 +137,15 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         });
     }
     Ok(outcome)
+}
+
+/// What a pass makes of both triads.
+fn estimated(held: &PassResult) -> Estimate {
+    let triads = held.estimate.triads;
+    Estimate {
+        covariance: held.covariance + curvature(&triads, &held.covariance),
+        triads,
+    }
 }
 
 /// The largest σ over what it was.
@@ -205,7 +222,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             sources: noise.sources.clone(),
         });
     }
-    findings.extend(far_from_prior(&outcome.model, &outcome.estimate));
+    findings.extend(far_from_prior(&problem.model, &outcome.estimate));
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();
     let by = "this path";

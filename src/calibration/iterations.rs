@@ -35,10 +35,7 @@ pub(super) fn iterate(
     passes: &mut Vec<Pass>,
     progress: &dyn Fn(&Pass),
 ) -> Result<Iterated, CalibrationError> {
-    let most = match gate {
-        Gate::Innovations => problem.options.passes,
-        Gate::Open | Gate::As(_) => passes.len() + problem.options.passes,
-    };
+    let most = passes.len() + problem.options.passes;
     let given = matches!(gate, Gate::As(_));
     let mut decision: Option<Vec<Innovation>> = None;
     let first = passes.len();

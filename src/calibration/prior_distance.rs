@@ -1,6 +1,7 @@
 //! Parameters that the prior does not allow, and what most likely made them so.
 
 use nalgebra::Vector3;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::estimate::Estimate;
 use super::finding::Finding;
@@ -12,22 +13,15 @@ use crate::units::{DEGREE, PPM};
 
 /// Parameters further from their prior than this many of its σ contradict it.
 const CONTRADICTS: f64 = 5.0;
+/// Chance that a prior which is right is widened.
+const FALSE_ALARM: f64 = 1e-3;
 /// Parts that differ by less than this much of what they have in common are alike.
 const ALIKE: f64 = 0.5;
 
 /// Parameters of an estimate that are too far from their prior, as a finding, if there are any.
-///
-/// Their own σ counts with the prior's, for an estimate may be made without it.
 pub(super) fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
-    let sigma = estimate.sigma();
+    let far = far(model, estimate);
     let off = estimate.vector() - model.prior_mean;
-    let far: Vec<usize> = estimate
-        .estimated()
-        .filter(|&i| {
-            let prior = model.prior_sigma[i];
-            prior > 0.0 && off[i].abs() > CONTRADICTS * prior.hypot(sigma[i])
-        })
-        .collect();
     let names = far
         .iter()
         .filter_map(|&i| parameter_name(estimate.form(), i));
@@ -37,6 +31,38 @@ pub(super) fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Findi
         distances: far.iter().map(|&i| off[i] / model.prior_sigma[i]).collect(),
         causes: causes(&far, &estimate.triads),
     })
+}
+
+/// The model with a prior that its estimate does not contradict: where it does, σ of each parameter is at
+/// least its distance. None where the prior holds. A wrong prior would make sound observations outliers,
+/// and noise of what is none.
+pub(super) fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
+    let off = estimate.vector() - model.prior_mean;
+    let known: Vec<usize> = estimate
+        .estimated()
+        .filter(|&i| model.prior_sigma[i] > 0.0)
+        .collect();
+    let distance = |&i: &usize| (off[i] / model.prior_sigma[i]).powi(2);
+    let squared: f64 = known.iter().map(distance).sum();
+    let chi2 = ChiSquared::new(known.len() as f64).ok()?;
+    let contradicted = chi2.sf(squared) < FALSE_ALARM || !far(model, estimate).is_empty();
+    let mut widened = model.clone();
+    for &i in &known {
+        widened.prior_sigma[i] = widened.prior_sigma[i].max(off[i].abs());
+    }
+    contradicted.then_some(widened)
+}
+
+/// The parameters that contradict their prior. Their own σ counts with the prior's, for an estimate may
+/// be made without it.
+fn far(model: &Model, estimate: &Estimate) -> Vec<usize> {
+    let sigma = estimate.sigma();
+    let off = estimate.vector() - model.prior_mean;
+    let far = |&i: &usize| {
+        let prior = model.prior_sigma[i];
+        prior > 0.0 && off[i].abs() > CONTRADICTS * prior.hypot(sigma[i])
+    };
+    estimate.estimated().filter(far).collect()
 }
 
 fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<PriorCause> {

@@ -7,9 +7,10 @@ use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::attitude::exp;
 use turncal::calibration::{
-    NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem, estimate,
-    to_vector,
+    Finding, NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem,
+    estimate, to_vector,
 };
+use turncal::imu::Sensor;
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
 
@@ -160,4 +161,22 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
     // The readings are partly taken for the end of the turn; the velocities only the gate can find.
     assert_eq!(velocity, dwells.len() - 1);
     assert!(table < dwells.len());
+}
+
+#[test]
+fn a_prior_that_is_wrong_makes_no_outliers_and_is_named_itself() {
+    let mut simulated = Scenario::load("demo").unwrap().simulate(SEED, 0).unwrap();
+    let (right, clean) = error(&simulated);
+    let truth = simulated.truth;
+    for sensor in Sensor::ALL {
+        // Nominal scales are one.
+        let off = truth.get(sensor).scale.add_scalar(-1.0).abs();
+        simulated.run.instrument.prior.get_mut(sensor).scale_sigma = off / 20.0;
+    }
+    let (wrong, spoilt) = error(&simulated);
+    let rejected = |outcome: &Outcome| outcome.innovations.iter().filter(|i| !i.accepted).count();
+    assert_eq!(rejected(&wrong), rejected(&right));
+    assert!((spoilt - clean).amax() < 0.1);
+    let named = |finding: &Finding| matches!(finding, Finding::FarFromPrior { .. });
+    assert!(wrong.findings.iter().any(named));
 }
