@@ -8,8 +8,8 @@ use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
 use crate::units::DEGREE;
 
-/// Nothing is known of an axis over a longer time, s.
-const LONGEST: f64 = 2.0;
+/// A whole move, from rest to rest, may hide in a longer hole, and nothing at its edges would tell of it, s.
+const LONGEST: f64 = 0.5;
 /// A hole is short against one that is this many times as long.
 const SHORT: usize = 8;
 /// An attitude that may be wrong by more is beyond a linear filter, rad.

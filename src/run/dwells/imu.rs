@@ -30,12 +30,17 @@ const BIAS_SIGMAS: f64 = 6.0;
 
 /// Mean output of a triad over each window.
 struct Windows {
+    /// Not a number where samples are missing, so that nothing is at rest or steady there.
     means: Vec<Vector3<f64>>,
     /// 1σ per axis of their noise.
     sigma: f64,
 }
 
 impl Windows {
+    fn missing(&self, window: usize) -> bool {
+        self.means[window].x.is_nan()
+    }
+
     /// The part of a standstill at whose ends the output is what it is beside them.
     fn settled(&self, standstill: Range<usize>) -> Range<usize> {
         let Range { mut start, mut end } = standstill;
@@ -81,10 +86,13 @@ impl Run {
         let force = STILL_SIGMAS * std::f64::consts::SQRT_2 * accel.sigma + STILL_FORCE;
         let steady = |k: usize| (accel.means[k + 1] - accel.means[k]).norm() < force;
         let count = gyro.means.len();
+        // The record, or what is known of it, begins or ends here.
+        let begins = |k: usize| k == 0 || accel.missing(k - 1);
+        let ends = |k: usize| k == count || accel.missing(k);
         let is_still = |k: usize| {
             (gyro.means[k] - rest).norm() < rate
-                && (k == 0 || steady(k - 1))
-                && (k + 1 == count || steady(k))
+                && (begins(k) || steady(k - 1))
+                && (ends(k + 1) || steady(k))
         };
         let mut dwells = Vec::new();
         let mut first = 0;
@@ -94,16 +102,8 @@ impl Run {
             }
             // A move begins and ends too gently for the windows at its ends to show it.
             let settled = gyro.settled(first..k);
-            let begin = if settled.start == 0 {
-                0
-            } else {
-                settled.start + 1
-            };
-            let end = if settled.end == count {
-                count
-            } else {
-                settled.end.saturating_sub(1)
-            };
+            let begin = settled.start + usize::from(!begins(settled.start));
+            let end = settled.end.saturating_sub(usize::from(!ends(settled.end)));
             if end >= begin + FEWEST {
                 let end = if end == count {
                     self.recording.imu.len()
@@ -124,12 +124,21 @@ impl Run {
         let samples = self.recording.imu.of(sensor);
         let duration = length as f64 * self.recording.imu.period;
         let mean = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>() / duration;
-        let means: Vec<_> = samples.chunks_exact(length).map(mean).collect();
+        let mut means: Vec<_> = samples.chunks_exact(length).map(mean).collect();
+        let faults = self.recording.imu.faults.iter();
+        for missing in faults
+            .filter(|fault| !fault.bridged)
+            .map(|fault| &fault.samples)
+        {
+            let windows = missing.start / length..missing.end.div_ceil(length).min(means.len());
+            means[windows].fill(Vector3::repeat(f64::NAN));
+        }
         // Most windows are at rest or turn evenly, so the median sees noise alone; noise figures may
         // know nothing of a laboratory's shaking.
         let mut changes: Vec<f64> = means
             .windows(2)
             .flat_map(|pair| <[f64; 3]>::from((pair[1] - pair[0]).abs()))
+            .filter(|change| !change.is_nan())
             .collect();
         let found = median(&mut changes).unwrap_or(0.0);
         let stated = self.instrument.noise.get(sensor).random_walk / duration.sqrt();
