@@ -180,6 +180,12 @@ impl ImuSamples {
         self.continuous && self.stretches.iter().any(of_one)
     }
 
+    /// The samples between stretches, of which nothing is known.
+    pub fn missing(&self) -> impl Iterator<Item = Range<usize>> {
+        let pairs = self.stretches.windows(2);
+        pairs.map(|pair| pair[0].samples.end..pair[1].samples.start)
+    }
+
     /// Time that the samples last, s.
     pub fn duration(&self) -> f64 {
         self.len() as f64 * self.period

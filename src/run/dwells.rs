@@ -69,15 +69,9 @@ impl Run {
                 _ => dwells.push(dwell),
             }
         }
-        let unbridged = || {
-            self.recording
-                .imu
-                .faults
-                .iter()
-                .filter(|fault| !fault.bridged)
-        };
         dwells.retain_mut(|dwell| {
-            unbridged().for_each(|fault| dwell.leave_out(&fault.samples));
+            let missing = self.recording.imu.missing();
+            missing.for_each(|missing| dwell.leave_out(&missing));
             dwell.samples.len() as f64 * self.recording.imu.period >= SHORTEST
         });
         dwells
@@ -211,7 +205,7 @@ impl Position {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::TableLog;
+    use crate::recording::{Stretch, TableLog};
     use crate::simulation::Scenario;
 
     fn reading(dwell: &Dwell) -> Range<usize> {
@@ -295,6 +289,33 @@ mod tests {
                 assert_eq!(all.iter().filter(within).count(), 1, "{found:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_hole_in_a_dwell_makes_two_of_it_and_neither_is_lost() {
+        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        run.recording.table = None;
+        let whole = run.dwells(Aiding::Velocity);
+        let longest = whole
+            .iter()
+            .max_by_key(|dwell| dwell.samples.len())
+            .unwrap();
+        let imu = &mut run.recording.imu;
+        let third = longest.samples.len() / 3;
+        let lost = longest.samples.start + third..longest.samples.end - third;
+        let after = Stretch {
+            samples: lost.end..imu.len(),
+            start: imu.time(lost.end),
+        };
+        imu.stretches[0].samples.end = lost.start;
+        imu.stretches.push(after);
+        let parted = run.dwells(Aiding::Velocity);
+        assert_eq!(parted.len(), whole.len() + 1);
+        let within = |dwell: &Dwell| {
+            let Range { start, end } = dwell.samples;
+            end <= lost.start || lost.end <= start
+        };
+        assert!(parted.iter().all(within));
     }
 
     #[test]

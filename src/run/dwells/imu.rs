@@ -125,11 +125,7 @@ impl Run {
         let duration = length as f64 * self.recording.imu.period;
         let mean = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>() / duration;
         let mut means: Vec<_> = samples.chunks_exact(length).map(mean).collect();
-        let faults = self.recording.imu.faults.iter();
-        for missing in faults
-            .filter(|fault| !fault.bridged)
-            .map(|fault| &fault.samples)
-        {
+        for missing in self.recording.imu.missing() {
             let windows = missing.start / length..missing.end.div_ceil(length).min(means.len());
             means[windows].fill(Vector3::repeat(f64::NAN));
         }
