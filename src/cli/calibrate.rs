@@ -265,7 +265,7 @@ impl Calibrate {
         }
         if let Some(target) = target.filter(|_| !self.json) {
             let page = target.join("report").join("index.html");
-            eprintln!("\nreport: {}", page.display());
+            eprintln!("\nreport: {}", printable(&page.display().to_string()));
         }
         if !solution.converged() {
             bail!(

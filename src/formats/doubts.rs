@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::earth::normal_gravity;
-use crate::imu::Sensor;
+use crate::imu::{AxisOrder, Sensor};
 use crate::recording::{TableLog, nanoseconds};
 use crate::run::{Aiding, Run};
 use crate::units::{DEGREE, MILLIGAL};
@@ -13,6 +13,9 @@ use crate::units::{DEGREE, MILLIGAL};
 const ANOMALY: f64 = 500.0 * MILLIGAL;
 /// Part of sound records for which another order of quaternions is named.
 const FALSE_ALARMS: f64 = 1e-6;
+
+/// The attitude that a reading means, from the one that it was taken for.
+type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
 
 /// A sentence for each.
 pub(super) fn of(run: &Run) -> Vec<String> {
@@ -69,7 +72,9 @@ fn coverage(run: &Run, table: &TableLog) -> Option<String> {
 /// if they take East-North-Up to the body.
 ///
 /// Specific force at rest is up along body axes, but for errors that prior σ tell. The likelihoods of two
-/// orders differ by the sum of squares that each leaves, its variance being taken from them.
+/// hypotheses differ by the sum of squares that each leaves, its variance being taken from them. The order as
+/// it is stated has the accelerometers' axes swapped and reversed in any way on its side, for these are
+/// stated, too, and are looked into elsewhere.
 fn order(run: &Run, table: &TableLog) -> Option<String> {
     if !table.axes.is_empty() {
         return None;
@@ -87,31 +92,34 @@ fn order(run: &Run, table: &TableLog) -> Option<String> {
             Some((force.normalize(), dwell.position.as_ref()?.attitude))
         })
         .collect();
-    let count = 3.0 * ups.len() as f64;
-    let left = |reordered: &dyn Fn(&Matrix3<f64>) -> Matrix3<f64>| {
+    let left = |axes: &AxisOrder, reordered: Reading| {
         let squares = ups.iter().map(|(force, attitude)| {
-            (force - reordered(attitude).tr_mul(&Vector3::z())).norm_squared()
+            let up = reordered(attitude).tr_mul(&Vector3::z());
+            (axes.apply(force) - up).norm_squared()
         });
         squares.sum::<f64>() + expected * ups.len() as f64
     };
-    let as_stated = left(&|attitude| *attitude);
-    let others: [(&str, &dyn Fn(&Matrix3<f64>) -> Matrix3<f64>); 2] = [
+    let as_stated = AxisOrder::all().map(|axes| left(&axes, |attitude| *attitude));
+    let as_stated = as_stated.fold(f64::INFINITY, f64::min);
+    let others: [(&str, Reading); 2] = [
         (
             "are in the order x, y, z, w: in [turntable] name the last of the four columns first",
-            &w_last,
+            w_last,
         ),
         (
             "take East-North-Up to the body, not the body to East-North-Up: turn the signs of x, y and z",
-            &|attitude| attitude.transpose(),
+            |attitude| attitude.transpose(),
         ),
     ];
-    let log_ratios =
-        others.map(|(words, order)| (0.5 * count * (as_stated / left(order)).ln(), words));
+    let log_ratios = others.map(|(words, order)| {
+        let ratio = as_stated / left(&AxisOrder::IDENTITY, order);
+        (1.5 * ups.len() as f64 * ratio.ln(), words)
+    });
     let (log_ratio, words) = log_ratios.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     (log_ratio > -FALSE_ALARMS.ln()).then(|| {
         format!(
-            "The accelerometers observe gravity in {} dwells as if the table's quaternions {words} (10^{:.0} times \
-             as likely).",
+            "The accelerometers observe gravity in {} dwells as if the table's quaternions {words} (10^{:.0} \
+             times as likely as the stated order).",
             ups.len(),
             log_ratio / std::f64::consts::LN_10
         )

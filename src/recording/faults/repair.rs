@@ -155,14 +155,13 @@ impl Rows<'_> {
             ColumnFacts::of(name, &columns[k], *unit)
         });
         let mut found = find(&columns, &facts, &self.full_scale, self.pulses);
-        for column in 0..6 {
-            let mut marked = vec![false; columns[column].len()];
+        for (column, values) in columns.iter().enumerate() {
+            let mut marked = vec![false; values.len()];
             for rows in impossible.of_column(column) {
                 marked[rows.clone()].fill(true);
             }
-            found.retain(|other| {
-                other.column != column || !marked[other.rows.clone()].contains(&true)
-            });
+            let is_marked = |rows: &Range<usize>| marked[rows.clone()].contains(&true);
+            found.retain(|other| other.column != column || !is_marked(&other.rows));
             let beyond = impossible.beyond[column].iter().cloned();
             found.extend(beyond.map(|rows| Found {
                 kind: FaultKind::Beyond,

@@ -205,6 +205,15 @@ fn quaternions_in_another_order_are_told_by_gravity() {
     assert!(said.contains(words), "{said}");
     let said = turncal(&["calibrate", "run/run.toml"]);
     assert!(said.contains(words), "{said}");
+    // Axes that are swapped are another cause.
+    let swapped = text.replace(r#"["ax", "ay", "az"]"#, r#"["az", "-ay", "ax"]"#);
+    assert_ne!(text, swapped);
+    fs::write(&file, swapped).unwrap();
+    let said = turncal(&["check", "run/run.toml"]);
+    assert!(
+        said.contains("Check of run") && !said.contains("as if the table's quaternions"),
+        "{said}"
+    );
     // The inverse of a rotation has the signs of three turned.
     fs::write(&file, text).unwrap();
     let inverse = |rows: Vec<String>| {
