@@ -18,9 +18,9 @@ use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 /// What the names of such files end in, each also with `.gz` behind it.
 const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
 
-/// Bytes that a value takes until a record is calibrated (75 as measured): it is held as it stands, repaired
-/// and in SI, with marks of what is wrong, and summed up.
-const BYTES_A_VALUE: usize = 80;
+/// Bytes that a value takes while a record is read: it is held as it stands, repaired and in SI. To ask for
+/// what a calibration takes would refuse what may find room.
+const BYTES_A_VALUE: usize = 32;
 /// The same where no column is taken, for all are only looked at.
 const BYTES_LOOKED_AT: usize = 16;
 /// So many rows always find room.
