@@ -65,6 +65,7 @@ pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod run;
+pub(crate) mod shown;
 pub mod simulation;
 pub(crate) mod statistics;
 pub mod study;

@@ -5,6 +5,7 @@ mod cli;
 use std::process::ExitCode;
 
 use clap::Parser;
+use turncal::report::terminal::printable;
 
 fn main() -> ExitCode {
     let cli = cli::Cli::parse();
@@ -13,7 +14,7 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("turncal: {error:#}");
+            eprintln!("turncal: {}", printable(&format!("{error:#}")));
             ExitCode::FAILURE
         }
     }

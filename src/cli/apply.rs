@@ -8,6 +8,7 @@ use turncal::calibration::Correction;
 use turncal::calibration::result::Calibration;
 use turncal::formats::export::{sample_rows, write_samples};
 use turncal::imu::{Sensor, Term};
+use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::units::PPM;
 
@@ -79,7 +80,7 @@ impl Apply {
             record.body_frame.words()
         );
         for note in notes(&record, &correction, &run) {
-            eprintln!("note: {note}");
+            eprintln!("note: {}", printable(&note));
         }
         Ok(())
     }

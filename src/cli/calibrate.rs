@@ -16,6 +16,7 @@ use turncal::calibration::{
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
 use turncal::report::calibration::{self as of_calibration, Navigated, Report};
+use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
 
@@ -213,7 +214,9 @@ impl Calibrate {
             })
             .transpose()?;
 
-        let solution = solve(&problem, self.method.into(), &activity)?;
+        // What was found in the files may be why.
+        let solution = solve(&problem, self.method.into(), &activity)
+            .inspect_err(|_| say(&run.recording.notes))?;
         let method = match self.method {
             Method::Ekf => "EKF",
             Method::SixPosition => "closed form",
@@ -262,7 +265,7 @@ impl Calibrate {
         }
         if let Some(target) = target.filter(|_| !self.json) {
             let page = target.join("report").join("index.html");
-            eprintln!("\nreport: {}", page.display());
+            eprintln!("\nreport: {}", printable(&page.display().to_string()));
         }
         if !solution.converged() {
             bail!(
@@ -271,6 +274,12 @@ impl Calibrate {
             );
         }
         Ok(())
+    }
+}
+
+fn say(notes: &[String]) {
+    for note in notes {
+        eprintln!("note: {}", printable(note));
     }
 }
 

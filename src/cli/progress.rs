@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use turncal::calibration::Pass;
+use turncal::report::terminal::printable;
 
 /// What is being done, with the time it has taken.
 pub struct Activity {
@@ -17,7 +18,7 @@ pub struct Activity {
 impl Activity {
     /// Begins to show an activity.
     pub fn new(message: impl Into<String>) -> Self {
-        let bar = ProgressBar::new_spinner().with_message(message.into());
+        let bar = ProgressBar::new_spinner().with_message(printable(&message.into()));
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed:>4}") {
             bar.set_style(style);
         }
@@ -27,7 +28,7 @@ impl Activity {
 
     /// Says what comes next.
     pub fn next(&self, message: impl Into<String>) {
-        self.bar.set_message(message.into());
+        self.bar.set_message(printable(&message.into()));
     }
 
     /// Tells of a pass of the filter.

@@ -4,14 +4,16 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::error::{FileError, Place, suggestion};
+use super::small_file;
 use super::whole::write_whole;
 use crate::calibration::result::{Calibration, FORMAT, TriadRecord};
 use crate::imu::{PARAMETERS, Sensor, Triad};
+use crate::shown::excerpt;
 
 impl Calibration {
     /// Reads and checks a record.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = small_file::bytes(path).map_err(|error| {
             FileError::io(
                 path,
                 "read the calibration",
@@ -25,7 +27,7 @@ impl Calibration {
                 column: error.column() as u64,
             };
             let at = format!(" at line {} column {}", error.line(), error.column());
-            let what = error.to_string().replace(&at, "");
+            let what = excerpt(&error.to_string().replace(&at, ""));
             FileError {
                 file: path.to_owned(),
                 place,
@@ -36,6 +38,8 @@ impl Calibration {
             }
         })?;
         record.check(path)?;
+        record.check_sizes(path)?;
+        record.check_correlations(path)?;
         Ok(record)
     }
 
@@ -89,13 +93,10 @@ impl Calibration {
         }
         if let Some(sigma) = &self.sigma {
             for sensor in Sensor::ALL {
-                if !sigma
-                    .get(sensor)
-                    .values()
-                    .all(|s| s.is_finite() && s >= 0.0)
-                {
+                let cannot_be = |s: &f64| !(s.is_finite() && *s >= 0.0);
+                if let Some(wrong) = sigma.get(sensor).values().find(cannot_be) {
                     return error(
-                        format!("sigma.{} with a value below zero", sensor.name()),
+                        format!("{wrong} in sigma.{}", sensor.name()),
                         "finite numbers that are zero or above",
                         "Correct the file.",
                     );

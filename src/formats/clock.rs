@@ -61,6 +61,7 @@ impl<'a> Clock<'a> {
             period: self.period.unwrap_or(1.0),
             number: None,
             unwrapped: 0.0,
+            wraps_at: None,
             of_rows: Vec::new(),
         })
     }
@@ -83,6 +84,8 @@ pub(super) struct Stamps {
     number: Option<f64>,
     /// What wraps of a counter add up to.
     unwrapped: f64,
+    /// The size of a counter that wrapped.
+    wraps_at: Option<f64>,
     /// Time in s and line of each row taken.
     pub of_rows: Vec<(f64, u64)>,
 }
@@ -121,10 +124,19 @@ impl Stamps {
                         of(number)
                     ),
                     "times that increase",
-                    "Put the rows in order, or split the file where the clock was set.",
+                    match self::wrap(step) {
+                        Some(size) => format!(
+                            "A counter of {size} that wraps? Add that to what follows, or say time_unit = \
+                             \"count\" if it counts samples. Else put the rows in order, or split the file \
+                             where the clock was set."
+                        ),
+                        None => "Put the rows in order, or split the file where the clock was set."
+                            .to_owned(),
+                    },
                 ));
             };
             self.unwrapped += wrap;
+            self.wraps_at = Some(wrap);
         }
         self.number = Some(number);
         let time = match self.unit {
@@ -133,6 +145,17 @@ impl Stamps {
         };
         self.of_rows.push((time, csv.line()));
         Ok(Stamp::Later)
+    }
+
+    /// What a counter that wraps leaves open where so many samples lack their rows, in a sentence.
+    pub fn lost_count(&self, missing: usize) -> Option<String> {
+        let size = self.wraps_at.filter(|_| missing > 0)?;
+        Some(format!(
+            "Rows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing at \
+             each place, or several times as many, and all after it be as much too early. Give a time that does \
+             not wrap, or split the record there.",
+            nanoseconds(size * self.period)
+        ))
     }
 
     /// The error of a row that has the stamp of the row before, but other values.

@@ -1,21 +1,30 @@
 //! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
 
 mod lines;
+mod row;
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use csv::{ByteRecord, ErrorKind, Reader, ReaderBuilder};
 use flate2::read::MultiGzDecoder;
 
 use super::error::{FileError, Place, list, nearest};
-use lines::Lines;
-
 use crate::recording::FileColumn;
+use crate::shown::excerpt;
+use lines::{LONGEST, Lines, Stop};
+use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 
 /// What the names of such files end in, each also with `.gz` behind it.
 const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
+
+/// Bytes that a value takes while a record is read: it is held as it stands, repaired and in SI. To ask for
+/// what a calibration takes would refuse what may find room.
+const BYTES_A_VALUE: usize = 32;
+/// The same where no column is taken, for all are only looked at.
+const BYTES_LOOKED_AT: usize = 16;
+/// So many rows always find room.
+const FEW_ROWS: usize = 1 << 12;
 
 /// A file of rows at one of them.
 ///
@@ -24,13 +33,24 @@ const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
 /// names is passed over. Numbers may have a decimal comma where commas do not part them.
 pub(super) struct CsvFile {
     file: PathBuf,
-    reader: Reader<Lines>,
+    lines: Lines,
     header: Vec<String>,
     units: Option<Vec<String>>,
     decimal_comma: bool,
     taken: Vec<usize>,
-    row: ByteRecord,
+    row: Row,
+    rows: usize,
     line: u64,
+    cut: Option<Cut>,
+}
+
+/// What the end of a file without a line end leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cut {
+    /// Its last row lacks fields.
+    Row,
+    /// The last number of its last row may lack digits.
+    Number,
 }
 
 impl CsvFile {
@@ -53,21 +73,36 @@ impl CsvFile {
                 "Rename or convert the file.",
             ));
         }
-        let file = File::open(path).map_err(|error| {
+        let refused = |error| {
             FileError::io(
                 path,
                 "open the file",
                 &error,
                 "Names in run.toml are relative to run.toml; correct the name or add the file.",
             )
-        })?;
+        };
+        // To open a pipe would wait for whoever writes into it.
+        let kind = fs::metadata(path).map_err(refused)?;
+        if !kind.is_file() {
+            return Err(FileError::new(
+                path,
+                Place::File,
+                match kind.is_dir() {
+                    true => "a directory",
+                    false => "a device or pipe",
+                },
+                "a regular file, for a log may be read more than once",
+                "Copy what it gives into a file and name that.",
+            ));
+        }
+        let file = File::open(path).map_err(refused)?;
         let file = BufReader::with_capacity(1 << 16, file);
         let source: Box<dyn BufRead> = if plain.is_some() {
             Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file)))
         } else {
             Box::new(file)
         };
-        let (lines, heading) = Lines::open(source).map_err(|error| damaged(path, &error))?;
+        let (lines, heading) = Lines::open(source).map_err(|stop| stopped(path, &stop))?;
         let heading = heading.ok_or_else(|| {
             FileError::new(
                 path,
@@ -79,18 +114,15 @@ impl CsvFile {
         })?;
         Ok(Self {
             file: path.to_owned(),
-            reader: ReaderBuilder::new()
-                .buffer_capacity(1 << 16)
-                .has_headers(false)
-                .flexible(true)
-                .delimiter(heading.delimiter.byte())
-                .from_reader(lines),
+            lines,
+            row: Row::new(heading.delimiter.byte()),
             decimal_comma: heading.delimiter.leaves_commas(),
             header: heading.names,
             units: heading.units,
             taken: Vec::new(),
-            row: ByteRecord::new(),
+            rows: 0,
             line: heading.line,
+            cut: None,
         })
     }
 
@@ -125,7 +157,7 @@ impl CsvFile {
             )),
             (None, _) => Err(self.error_here(
                 format_args!("the columns {}", list(header())),
-                format_args!("a column named `{name}`"),
+                format_args!("a column named `{}`", excerpt(name)),
                 match nearest(name, header()) {
                     Some(like) => format!(
                         "Did you mean `{like}`? Correct `columns` in run.toml or this header."
@@ -148,17 +180,24 @@ impl CsvFile {
         Ok((self.column(&column.name)?, column))
     }
 
-    /// Goes to the next row; false at the end of the file.
+    /// Goes to the next row; false at the end of the file, and at a last row that the end of the file cuts
+    /// off.
     pub fn advance(&mut self) -> Result<bool, FileError> {
-        let more = self.reader.read_byte_record(&mut self.row);
-        let more = more.map_err(|error| self.unreadable(&error))?;
-        if !more {
+        let more = self.lines.advance();
+        if !more.map_err(|stop| stopped(&self.file, &stop))? {
             return Ok(false);
         }
-        // The reader has taken the end of the row's line, too.
-        let given = self.reader.position().line() - 1;
-        self.line = self.reader.get_ref().number(given);
+        self.line = self.lines.number();
+        self.rows += 1;
+        self.reserve()?;
+        let split = self.row.split(self.lines.line());
         let (found, expected) = (self.row.len(), self.header.len());
+        let is_cut = split == Err(Malformed::Quote) || found < expected;
+        if is_cut && !self.lines.is_ended() {
+            self.cut = Some(Cut::Row);
+            return Ok(false);
+        }
+        split.map_err(|what| malformed(&self.file, self.line, what))?;
         let ends_in_delimiter = found == expected + 1 && self.bytes(expected).is_empty();
         if found != expected && !ends_in_delimiter {
             return Err(self.error_here(
@@ -167,7 +206,51 @@ impl CsvFile {
                 "Complete or remove the row.",
             ));
         }
+        let last_is_used = self.taken.contains(&(expected - 1));
+        if !self.lines.is_ended() && last_is_used && !ends_in_delimiter {
+            self.cut = Some(Cut::Number);
+        }
         Ok(true)
+    }
+
+    /// Whether the row is the last and no line end shows that its last number is whole.
+    pub fn may_be_cut(&self) -> bool {
+        self.cut == Some(Cut::Number)
+    }
+
+    /// What the end of the file leaves open, in a sentence, with what was done about its last row.
+    pub fn cut_off(&self, done: &str) -> Option<String> {
+        let (file, line) = (self.file.display(), self.line);
+        let what = match self.cut? {
+            Cut::Row => "is cut off: fields are missing. It is left out",
+            Cut::Number => &format!("has no line end, so its last number may lack digits. {done}"),
+        };
+        Some(format!(
+            "The last row of {file}, line {line}, {what}; look whether the file is whole."
+        ))
+    }
+
+    /// Makes sure, as rows become more, that there is room for what is made of them.
+    fn reserve(&self) -> Result<(), FileError> {
+        if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
+            return Ok(());
+        }
+        let a_row = match self.taken.len() {
+            0 => self.header.len() * BYTES_LOOKED_AT,
+            taken => taken * BYTES_A_VALUE,
+        };
+        let bytes = (2 * self.rows).saturating_mul(a_row);
+        let mut room: Vec<u8> = Vec::new();
+        let there_is = room.try_reserve_exact(bytes);
+        // What is never used need never be asked for.
+        std::hint::black_box(room);
+        there_is.map_err(|_| {
+            self.error_here(
+                format_args!("row {}, and no memory for as many more", self.rows),
+                "a record that fits into memory",
+                "Give it more memory, or split the record.",
+            )
+        })
     }
 
     /// Line of the row.
@@ -239,26 +322,46 @@ impl CsvFile {
     ) -> FileError {
         FileError::new(&self.file, Place::Line(self.line), found, expected, advice)
     }
+}
 
-    fn unreadable(&self, error: &csv::Error) -> FileError {
-        match error.kind() {
-            ErrorKind::Io(error) => damaged(&self.file, error),
-            _ => FileError {
-                file: self.file.clone(),
-                place: Place::Line(self.line),
-                message: format!("cannot read on: {error}. Correct this row."),
-            },
-        }
+fn stopped(file: &Path, stop: &Stop) -> FileError {
+    match stop {
+        Stop::System(error) => FileError::io(
+            file,
+            "read on",
+            error,
+            "The file is damaged or cut off; copy or compress it again.",
+        ),
+        Stop::Endless { line } => FileError::new(
+            file,
+            Place::Line(*line),
+            format_args!("more than {} KiB without a row that ends", LONGEST / 1024),
+            "rows of numbers, a line each",
+            "Is this the right file? Record or export it again.",
+        ),
+        Stop::Malformed { line, what } => malformed(file, *line, *what),
     }
 }
 
-fn damaged(file: &Path, error: &std::io::Error) -> FileError {
-    FileError::io(
-        file,
-        "read on",
-        error,
-        "The file is damaged or cut off; copy or compress it again.",
-    )
+fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
+    let (found, expected, advice) = match what {
+        Malformed::Quote => (
+            "a quote that is not closed".to_owned(),
+            "a row in each line, and fields in quotes closed in it".to_owned(),
+            "Remove the quote or close it.",
+        ),
+        Malformed::Columns => (
+            "more columns than any log has".to_owned(),
+            format!("at most {MOST_COLUMNS}"),
+            "Is this the right file? Export the columns that are needed.",
+        ),
+        Malformed::Field => (
+            format!("a field of more than {} KiB", LONGEST_FIELD / 1024),
+            "numbers and names".to_owned(),
+            "Is this the right file? Record or export it again.",
+        ),
+    };
+    FileError::new(file, Place::Line(line), found, expected, advice)
 }
 
 #[cfg(test)]

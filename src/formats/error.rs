@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::shown::{LONGEST, excerpt};
+
 /// Why a file could not be read or written, in one sentence or a few.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}{place}: {message}", file.display())]
@@ -44,13 +46,15 @@ impl fmt::Display for Place {
             Self::File => Ok(()),
             Self::Line(line) => write!(f, ", line {line}"),
             Self::Character { line, column } => write!(f, ", line {line}, column {column}"),
-            Self::Column { line, column } => write!(f, ", line {line}, column `{column}`"),
+            Self::Column { line, column } => {
+                write!(f, ", line {line}, column `{}`", excerpt(column))
+            }
         }
     }
 }
 
 impl FileError {
-    /// An error at a place: `found …, expected …. What to do.`
+    /// An error at a place: `found …, expected …. What to do.` What was found is cut where it is long.
     pub(super) fn new(
         file: &Path,
         place: Place,
@@ -61,7 +65,10 @@ impl FileError {
         Self {
             file: file.to_owned(),
             place,
-            message: format!("found {found}, expected {expected}. {advice}"),
+            message: format!(
+                "found {}, expected {expected}. {advice}",
+                excerpt(&found.to_string())
+            ),
         }
     }
 
@@ -81,8 +88,11 @@ pub(super) fn nearest<'a>(
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
     let name = name.to_lowercase();
+    // Likeness takes the product of both lengths, and half of it at most twice the length.
+    let likely = |candidate: &&str| name.len() <= LONGEST && candidate.len() <= 4 * name.len();
     candidates
         .into_iter()
+        .filter(likely)
         .map(|candidate| {
             let lower = candidate.to_lowercase();
             (

@@ -227,9 +227,15 @@ impl<'a> Field<'a> {
                 .map(|whole| whole as f64),
             _ => None,
         };
-        number
+        let number = number
             .filter(|number: &f64| number.is_finite())
-            .ok_or_else(|| self.wrong_kind("a finite number"))
+            .ok_or_else(|| self.wrong_kind("a finite number"))?;
+        // Squares and quotients of such numbers are still numbers.
+        let has_size = number == 0.0 || (1e-30..=1e30).contains(&number.abs());
+        match has_size {
+            true => Ok(number),
+            false => Err(self.wrong_kind("a number whose magnitude is from 1e-30 to 1e30")),
+        }
     }
 
     /// A number above zero.
@@ -239,6 +245,16 @@ impl<'a> Field<'a> {
             Ok(number)
         } else {
             Err(self.wrong_kind("a number above zero"))
+        }
+    }
+
+    /// A number above zero that no larger one can be.
+    pub fn positive_to(&self, most: f64) -> Result<f64, FileError> {
+        let number = self.positive()?;
+        if number <= most {
+            Ok(number)
+        } else {
+            Err(self.wrong_kind(&format!("a number above zero, at most {most}")))
         }
     }
 
@@ -277,13 +293,15 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Three numbers above zero, or one.
-    pub fn positive_triple(&self) -> Result<Vector3<f64>, FileError> {
+    /// Three numbers above zero that no larger ones can be, or one.
+    pub fn positive_triple_to(&self, most: f64) -> Result<Vector3<f64>, FileError> {
         let triple = self.triple()?;
-        if triple.iter().all(|&number| number > 0.0) {
-            Ok(triple)
-        } else {
+        if triple.iter().any(|&number| number <= 0.0) {
             Err(self.wrong_kind("numbers above zero"))
+        } else if triple.iter().any(|&number| number > most) {
+            Err(self.wrong_kind(&format!("numbers above zero, at most {most}")))
+        } else {
+            Ok(triple)
         }
     }
 

@@ -61,7 +61,7 @@ pub(super) struct ImuLog<'a> {
 
 /// What the file holds.
 struct Content {
-    stamps: Vec<(f64, u64)>,
+    stamps: Stamps,
     triads: PerSensor<[FileColumn; 3]>,
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
     columns: [Vec<f64>; 6],
@@ -71,16 +71,20 @@ struct Content {
 }
 
 impl ImuLog<'_> {
-    /// Reads the samples, finds what is wrong with them, and bridges it.
-    pub fn read(&self) -> Result<ImuSamples, FileError> {
+    /// Reads the samples, finds what is wrong with them, and bridges it; what the file leaves open goes to
+    /// `notes`.
+    pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let Content {
             stamps,
             triads,
             columns,
             duplicates,
             temperature,
-        } = self.content()?;
-        let clock = Uniform::new(&self.file, &stamps, self.clock.period)?;
+        } = self.content(notes)?;
+        let clock = Uniform::new(&self.file, &stamps.of_rows, self.clock.period)?;
+        let samples = clock.numbers.last().map_or(0, |last| last + 1);
+        notes.extend(stamps.lost_count(samples - clock.numbers.len()));
+        let stamps = stamps.of_rows;
         let period = clock.period;
         let seconds = match self.output {
             Output::Pulse | Output::Increment => 1.0,
@@ -164,7 +168,7 @@ impl ImuLog<'_> {
         })
     }
 
-    fn content(&self) -> Result<Content, FileError> {
+    fn content(&self, notes: &mut Vec<String>) -> Result<Content, FileError> {
         let mut csv = CsvFile::open(&self.file)?;
         let mut stamps = self.clock.start(&mut csv)?;
         let mut triad = |[x, y, z]: [&str; 3]| -> Result<_, FileError> {
@@ -185,7 +189,7 @@ impl ImuLog<'_> {
         let mut duplicates = Vec::new();
         let mut temperatures = Vec::new();
         let mut before = [f64::NAN; 6];
-        while csv.advance()? {
+        while csv.advance()? && !csv.may_be_cut() {
             let mut row = [0.0; 6];
             for (value, &place) in row.iter_mut().zip(&places) {
                 *value = self.value(&csv, place)?;
@@ -205,10 +209,10 @@ impl ImuLog<'_> {
                 temperatures.push(csv.number(place)?);
             }
         }
-        let stamps = stamps.of_rows;
-        if stamps.len() < FEWEST_SAMPLES {
+        notes.extend(csv.cut_off("It is left out"));
+        if stamps.of_rows.len() < FEWEST_SAMPLES {
             return Err(csv.error(
-                format_args!("{} samples", stamps.len()),
+                format_args!("{} samples", stamps.of_rows.len()),
                 format_args!("at least {FEWEST_SAMPLES}"),
                 "Record a run with dwells and turns.",
             ));

@@ -16,6 +16,13 @@ use crate::imu::{
 };
 use crate::units::{ARCSEC, PPM};
 
+/// 1σ of a scale factor of which nothing is known, of the scale factor.
+const WIDEST_SCALE: f64 = 10.0;
+/// 1σ of a bias beyond the range of any instrument, rad/s or m/s².
+const WIDEST_BIAS: f64 = 1e6;
+/// Beyond any error of an angle, ″.
+pub(super) const HALF_TURN: f64 = 648_000.0;
+
 /// What `[imu]` and the tables below it say.
 pub(super) struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
@@ -149,9 +156,11 @@ fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
     for term in Term::ALL {
         let meaning = "1σ of each of its parameters";
         if let Some(fields) = terms.table(term.name(), &["sigma"])? {
-            let given = fields.need("sigma", meaning)?.positive()?;
+            let unit = term.unit().1;
+            let most = (term.largest() / unit).round();
+            let given = fields.need("sigma", meaning)?.positive_to(most)?;
             for parameter in term.parameters() {
-                sigma[parameter] = given * term.unit().1;
+                sigma[parameter] = given * unit;
             }
         }
     }
@@ -242,9 +251,9 @@ fn triad(
             ));
         }
     };
-    let sigma = |name| -> Result<Vector3<f64>, FileError> {
+    let sigma = |name, most: f64| -> Result<Vector3<f64>, FileError> {
         let field = fields.need(name, "the 1σ before calibration; none is invented")?;
-        field.positive_triple()
+        field.positive_triple_to(most)
     };
     let bias = match fields.get("bias") {
         Some(field) => field.triple()?,
@@ -254,10 +263,12 @@ fn triad(
         unit: unit.text()?.to_owned(),
         nominal: Nominal(axes.each(nominal)),
         prior: Prior {
-            scale_sigma: axes.each(sigma("scale_sigma_ppm")?) * PPM,
-            installation_sigma: axes.each(sigma("installation_sigma_arcsec")?) * ARCSEC,
+            scale_sigma: axes.each(sigma("scale_sigma_ppm", WIDEST_SCALE / PPM)?) * PPM,
+            installation_sigma: axes.each(sigma("installation_sigma_arcsec", HALF_TURN)?) * ARCSEC,
             bias: axes.vector(bias.component_div(&nominal)),
-            bias_sigma: axes.each(sigma("bias_sigma")?.component_div(&nominal.abs())),
+            bias_sigma: axes.each(
+                sigma("bias_sigma", WIDEST_BIAS * nominal.amax())?.component_div(&nominal.abs()),
+            ),
         },
     })
 }

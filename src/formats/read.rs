@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::doubts;
 use super::error::FileError;
 use super::fields::{Document, Fields};
 use super::instrument::InstrumentFields;
 use super::segments;
+use super::small_file;
 use super::table_log::TableLogFile;
 use crate::earth::Site;
 use crate::imu::{Output, Sensor};
@@ -36,7 +38,7 @@ impl Run {
     /// the files overlap. Samples, nominal scales and priors come back along right-front-up
     /// whatever `body_axes` says. A bias without a prior mean has the mean zero; no σ has a default.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
+        let text = small_file::text(path).map_err(|error| {
             FileError::io(path, "read the run", &error, "Give the path of a run.toml.")
         })?;
         let document = Document {
@@ -73,19 +75,21 @@ impl Run {
         let mut files = vec![path.to_owned(), instrument.log.file.clone()];
         files.extend(table_log.as_ref().map(|log| log.file.clone()));
         files.extend(segments_file.clone());
-        let imu = instrument.log.read()?;
+        let imu = instrument.log.read(&mut notes)?;
         notes.extend(faults::notes(&imu));
         notes.extend(clock_note(&imu, &instrument));
         let accuracy = table_log.as_ref().map(|log| log.accuracy);
-        let table = table_log.map(|log| log.read(&imu)).transpose()?;
+        let table = table_log
+            .map(|log| log.read(&imu, &mut notes))
+            .transpose()?;
         let segments = match segments_file {
             Some(file) => {
                 let log = &instrument.log;
-                segments::read(&file, &imu, log.stamp.lag(), log.axes)?
+                segments::read(&file, &imu, log.stamp.lag(), log.axes, &mut notes)?
             }
             None => Vec::new(),
         };
-        Ok(Self {
+        let run = Self {
             recording: Recording {
                 name: name(path),
                 meta,
@@ -100,7 +104,14 @@ impl Run {
             table: accuracy.unwrap_or_default(),
             standstill,
             segment_sigma: segment_sigma.unwrap_or(SET_BY_HAND),
-        })
+        };
+        let doubts = doubts::of(&run);
+        Ok(run.with_notes(doubts))
+    }
+
+    fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.recording.notes.extend(notes);
+        self
     }
 }
 
@@ -176,7 +187,7 @@ fn site(top: &Fields) -> Result<Site, FileError> {
         site = site.with_gravity(field.within(9.7, 9.9)?, 0.0);
     }
     if let Some(field) = fields.get("gravity_sigma_mgal") {
-        site.gravity_sigma = field.not_negative()? * MILLIGAL;
+        site.gravity_sigma = field.within(0.0, 1e5)? * MILLIGAL;
     }
     Ok(site)
 }

@@ -10,12 +10,14 @@ use super::error::FileError;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
-/// Reads the sections of a run with these samples, which are stamped so many samples after they begin.
+/// Reads the sections of a run with these samples, which are stamped so many samples after they begin; what
+/// the file leaves open goes to `notes`.
 pub(super) fn read(
     file: &Path,
     imu: &ImuSamples,
     lag: f64,
     axes: BodyAxes,
+    notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
     let mut csv = CsvFile::open(file)?;
     let start_column = csv.column("start")?;
@@ -66,6 +68,11 @@ pub(super) fn read(
             label,
         });
     }
+    // A label that lacks letters is none, which is said elsewhere.
+    notes.extend(
+        csv.cut_off("It is used")
+            .filter(|_| label_column + 1 != csv.header().len()),
+    );
     Ok(segments)
 }
 

@@ -8,6 +8,7 @@ use super::clock::{Clock, Stamp, Stamps};
 use super::csv_file::CsvFile;
 use super::error::FileError;
 use super::fields::Fields;
+use super::instrument::HALF_TURN;
 use crate::attitude;
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
@@ -15,6 +16,9 @@ use crate::units::{ARCSEC, DEGREE};
 
 /// Four components printed to four decimals meet it. What is off by more is no quaternion.
 const NORM_TOLERANCE: f64 = 1e-4;
+
+/// No clocks of one run are further apart, ms.
+const MINUTE_MS: f64 = 60_000.0;
 
 /// Keys of the 1σ of errors of the axes, in the order of [`AxisError::ALL`].
 const AXIS_KEYS: [&str; AxisError::ALL.len()] = [
@@ -187,11 +191,14 @@ impl<'a> TableLogFile<'a> {
         let clock = Clock::of_fields(&fields, &columns)?;
         let attitude = AttitudeColumns::of_fields(&fields, &columns)?;
         if let Some(field) = fields.get("time_sigma_ms") {
-            field.positive()?;
+            field.positive_to(MINUTE_MS)?;
             notes.push("turntable.time_sigma_ms is read but has no effect yet.".to_owned());
         }
         let optional = |name| -> Result<f64, FileError> {
-            let field = fields.get(name).map(|field| field.positive()).transpose()?;
+            let field = fields.get(name);
+            let field = field
+                .map(|field| field.positive_to(HALF_TURN))
+                .transpose()?;
             Ok(field.unwrap_or(0.0) * ARCSEC)
         };
         let mut axes = TableGeometry::default().axes;
@@ -215,7 +222,8 @@ impl<'a> TableLogFile<'a> {
             axes,
         };
         let sigma = |name| -> Result<f64, FileError> {
-            Ok(fields.need(name, "a 1σ in seconds of arc")?.positive()? * ARCSEC)
+            let field = fields.need(name, "a 1σ in seconds of arc")?;
+            Ok(field.positive_to(HALF_TURN)? * ARCSEC)
         };
         Ok(Some(Self {
             file: directory.join(fields.need("file", "a file name")?.text()?),
@@ -229,15 +237,15 @@ impl<'a> TableLogFile<'a> {
         }))
     }
 
-    /// Reads the log of a run with these samples.
-    pub fn read(&self, imu: &ImuSamples) -> Result<TableLog, FileError> {
+    /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.
+    pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = CsvFile::open(&self.file)?;
         let mut stamps = self.clock.start(&mut csv)?;
         let columns = self.attitude.find(&mut csv)?;
 
         let mut attitude: Vec<Matrix3<f64>> = Vec::new();
         let mut axes = Vec::new();
-        while csv.advance()? {
+        while csv.advance()? && !csv.may_be_cut() {
             let reading = columns.reading(&csv)?;
             match stamps.look(&csv)? {
                 // A row twice says nothing new.
@@ -247,6 +255,7 @@ impl<'a> TableLogFile<'a> {
             }
             axes.extend(columns.axes(&csv)?);
         }
+        notes.extend(csv.cut_off("It is left out"));
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();
         let (first, last) = match time.as_slice() {
             [first, .., last] => (*first, *last),

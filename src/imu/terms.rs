@@ -140,6 +140,22 @@ impl Term {
         in_unit * self.unit().1
     }
 
+    /// A parameter beyond this makes of gravity, or of a turn at [`REFERENCE_RATE`], as much again, as no
+    /// instrument does, in SI.
+    pub fn largest(self) -> f64 {
+        match self {
+            Self::AccelSecondOrder | Self::AccelCrossCoupling => STANDARD_GRAVITY.recip(),
+            Self::AccelThirdOrder => STANDARD_GRAVITY.powi(-2),
+            Self::AccelAsymmetry
+            | Self::GyroAsymmetry
+            | Self::GyroSecondOrder
+            | Self::GyroNonlinearity => 1.0,
+            Self::SizeEffect => STANDARD_GRAVITY / REFERENCE_RATE.powi(2),
+            Self::TimeOffset => REFERENCE_RATE.recip(),
+            Self::GSensitivity => REFERENCE_RATE / STANDARD_GRAVITY,
+        }
+    }
+
     /// Indices of its parameters.
     pub const fn parameters(self) -> std::ops::Range<usize> {
         let first = FIRST[self as usize];

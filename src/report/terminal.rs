@@ -4,6 +4,7 @@ use comfy_table::{CellAlignment, ContentArrangement, presets};
 use textwrap::Options;
 
 use super::document::{Block, Document, Facts, List, Medium, Table};
+pub use crate::shown::printable;
 
 /// A heading of a column is broken into lines of at least so many letters.
 const HEADING: usize = 9;
@@ -42,7 +43,7 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
     let parts: Vec<String> = parts.map(|part| part.join("\n")).collect();
     let text = parts.join("\n\n");
     let lines = text.lines().map(|line| line.trim_end().to_owned() + "\n");
-    lines.collect()
+    printable(&lines.collect::<String>())
 }
 
 /// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.

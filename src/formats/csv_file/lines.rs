@@ -1,7 +1,12 @@
-//! Lines of a text of rows as programs write them, made alike for the CSV reader: without comments, rows
-//! without content and runs of blanks, but each in its place, so that lines are counted as in the file.
+//! Rows of a text as programs write them: a line each, without comments, lines without content and runs of
+//! blanks. What a file may make its reader hold is limited here, for all callers alike.
 
 use std::io::{self, BufRead, Read};
+
+use super::row::{Malformed, Row};
+
+/// Within so many bytes a row ends, comments and empty lines before it counted; what does not is no log.
+pub(super) const LONGEST: u64 = 1 << 20;
 
 /// What parts a row's fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +20,7 @@ pub(super) enum Delimiter {
 impl Delimiter {
     /// The one in a first row.
     fn of_row(row: &str) -> Self {
-        let blanks = Self::Blanks.fields(row);
+        let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
             return match row.contains('\t') && !row.contains(' ') {
                 true => Self::Byte(b'\t'),
@@ -23,15 +28,18 @@ impl Delimiter {
             };
         }
         // A comma with a tab behind it is a comma.
-        let parts = |byte: &u8| {
-            let fields = Self::Byte(*byte).fields(row);
-            fields.len() > 1 && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
+        let parts = |byte: &u8| match Self::Byte(*byte).fields(row) {
+            Ok(fields) => {
+                fields.len() > 1 && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
+            }
+            // Whoever reads the row by it says what is wrong.
+            Err(_) => row.as_bytes().contains(byte),
         };
         let byte = [b';', b'\t', b','].into_iter().find(parts);
         // A single column has no delimiter.
         byte.map_or(
             match blanks.len() {
-                1 => Self::Byte(b','),
+                0 | 1 => Self::Byte(b','),
                 _ => Self::Blanks,
             },
             Self::Byte,
@@ -53,27 +61,22 @@ impl Delimiter {
 
     /// The fields of one row, without quotes and blanks around them; an empty one behind a last delimiter
     /// is none.
-    fn fields(self, row: &str) -> Vec<String> {
-        let mut text = row.as_bytes().to_vec();
+    fn fields(self, line: &str) -> Result<Vec<String>, Malformed> {
+        let mut text = line.as_bytes().to_vec();
         if self == Self::Blanks {
             collapse_blanks(&mut text);
         }
-        let mut csv = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .delimiter(self.byte())
-            .from_reader(text.as_slice());
-        let mut record = csv::ByteRecord::new();
-        // Bytes in memory are always read.
-        let _ = csv.read_byte_record(&mut record);
+        let mut row = Row::new(self.byte());
+        row.split(&text)?;
         let name = |field: &[u8]| {
             let text = String::from_utf8_lossy(field);
             text.trim().trim_matches('"').trim().to_owned()
         };
-        let mut fields: Vec<String> = record.iter().map(name).collect();
+        let mut fields: Vec<String> = row.fields().map(name).collect();
         if fields.len() > 1 && fields.last().is_some_and(String::is_empty) {
             fields.pop();
         }
-        fields
+        Ok(fields)
     }
 }
 
@@ -116,66 +119,104 @@ pub(super) struct Heading {
     pub units: Option<Vec<String>>,
 }
 
-/// The lines of a file behind its heading.
+/// Why lines cannot be read on.
+#[derive(Debug)]
+pub(super) enum Stop {
+    /// The system or the decompression says so.
+    System(io::Error),
+    /// From this line on no row ends within [`LONGEST`].
+    Endless { line: u64 },
+    /// This line has no fields.
+    Malformed { line: u64, what: Malformed },
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
+/// The rows of a file behind its heading, a line each.
 pub(super) struct Lines {
     source: Box<dyn BufRead>,
     delimiter: Delimiter,
-    /// What is left of the line being given out.
+    /// The row, without what ends it.
     line: Vec<u8>,
-    given: usize,
-    /// Number in the file of the last line taken from it.
+    /// Its number in the file.
     number: u64,
-    /// Number of the line given out first.
-    first: u64,
+    /// Whether the file goes on behind it.
+    ended: bool,
+    /// Whether it is still to be given out.
+    pending: bool,
+    /// The last comment before it.
+    remark: Option<String>,
 }
 
 impl Lines {
     /// Reads the heading; none of an empty file.
-    pub fn open(source: Box<dyn BufRead>) -> io::Result<(Self, Option<Heading>)> {
+    pub fn open(source: Box<dyn BufRead>) -> Result<(Self, Option<Heading>), Stop> {
         let mut lines = Self {
             source,
             delimiter: Delimiter::Byte(b','),
             line: Vec::new(),
-            given: 0,
             number: 0,
-            first: 1,
+            ended: false,
+            pending: false,
+            remark: None,
         };
         let heading = lines.heading()?;
         if let Some(heading) = &heading {
             lines.delimiter = heading.delimiter;
         }
-        lines.first = lines.number;
         lines.tidy();
         Ok((lines, heading))
     }
 
-    /// Number in the file of the n-th line given out.
-    pub fn number(&self, given: u64) -> u64 {
-        self.first + given - 1
+    /// Goes to the next row; false at the end of the file.
+    pub fn advance(&mut self) -> Result<bool, Stop> {
+        if std::mem::take(&mut self.pending) {
+            return Ok(true);
+        }
+        let more = self.take()?;
+        self.tidy();
+        Ok(more)
     }
 
-    /// Leaves the first line that is not part of it as the current one.
-    fn heading(&mut self) -> io::Result<Option<Heading>> {
-        let mut remark = String::new();
-        while self.take()? && !self.has_content() {
-            if let Some(text) = self.comment() {
-                remark = String::from_utf8_lossy(text).into_owned();
-            }
-        }
-        if self.line.is_empty() {
+    /// The row.
+    pub fn line(&self) -> &[u8] {
+        &self.line
+    }
+
+    /// Number of its line in the file.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Whether something ends its line, so that it is all there.
+    pub fn is_ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Leaves the first row that is not part of it as the current one.
+    fn heading(&mut self) -> Result<Option<Heading>, Stop> {
+        if !self.take()? {
             return Ok(None);
         }
         let line = self.number;
+        let malformed = |what| Stop::Malformed { line, what };
         let row = String::from_utf8_lossy(&self.line).into_owned();
         let delimiter = Delimiter::of_row(&row);
-        let mut names = delimiter.fields(&row);
+        let mut names = delimiter.fields(&row).map_err(malformed)?;
         if names.iter().all(|name| is_number(name)) {
             // Some programs write the names as a comment.
+            let remark = self.remark.take().unwrap_or_default();
             let remarked = Delimiter::of_row(&remark).fields(&remark);
+            let remarked = remarked.unwrap_or_default();
             names = match remarked.len() == names.len() && remarked.len() > 1 {
                 true => remarked,
                 false => (1..=names.len()).map(|n| n.to_string()).collect(),
             };
+            self.pending = true;
             return Ok(Some(Heading {
                 delimiter,
                 names,
@@ -183,11 +224,13 @@ impl Lines {
                 units: None,
             }));
         }
-        while self.take()? && !self.has_content() {}
+        self.pending = self.take()?;
         let below = delimiter.fields(&String::from_utf8_lossy(&self.line));
+        // What is wrong with it is said where it is read.
+        let below = below.unwrap_or_default();
         let is_units = below.len() > 1 && !below.iter().any(|field| is_number(field));
         if is_units {
-            self.take()?;
+            self.pending = self.take()?;
         }
         Ok(Some(Heading {
             delimiter,
@@ -197,21 +240,37 @@ impl Lines {
         }))
     }
 
-    /// Takes the next line, without what ends it; false at the end of the file.
-    fn take(&mut self) -> io::Result<bool> {
-        self.line.clear();
-        self.given = 0;
-        if self.source.read_until(b'\n', &mut self.line)? == 0 {
-            return Ok(false);
+    /// Takes the next row; false at the end of the file.
+    fn take(&mut self) -> Result<bool, Stop> {
+        let first = self.number + 1;
+        let mut left = LONGEST;
+        loop {
+            self.line.clear();
+            let mut source = self.source.by_ref().take(left + 1);
+            let length = source.read_until(b'\n', &mut self.line)? as u64;
+            if length == 0 {
+                return Ok(false);
+            }
+            if length > left {
+                return Err(Stop::Endless { line: first });
+            }
+            left -= length;
+            self.number += 1;
+            self.ended = self.line.last() == Some(&b'\n');
+            while matches!(self.line.last(), Some(b'\n' | b'\r')) {
+                self.line.pop();
+            }
+            if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
+                self.line.drain(..3);
+            }
+            // Most rows begin with a digit, and need no look.
+            if self.line.first().is_some_and(u8::is_ascii_digit) || self.has_content() {
+                return Ok(true);
+            }
+            if let Some(text) = self.comment() {
+                self.remark = Some(String::from_utf8_lossy(text).into_owned());
+            }
         }
-        self.number += 1;
-        while matches!(self.line.last(), Some(b'\n' | b'\r')) {
-            self.line.pop();
-        }
-        if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
-            self.line.drain(..3);
-        }
-        Ok(true)
     }
 
     /// The text of the line if it is a comment.
@@ -227,35 +286,10 @@ impl Lines {
         self.comment().is_none() && !self.line.iter().all(empty)
     }
 
-    /// Makes the line ready to be given out.
+    /// Leaves one delimiter between two fields.
     fn tidy(&mut self) {
-        // Most lines begin with a digit, and need no look.
-        if !self.line.first().is_some_and(u8::is_ascii_digit) && !self.has_content() {
-            self.line.clear();
-        }
         if self.delimiter == Delimiter::Blanks {
             collapse_blanks(&mut self.line);
         }
-        self.line.push(b'\n');
-    }
-}
-
-impl Read for Lines {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut filled = 0;
-        while filled < buffer.len() {
-            if self.given == self.line.len() {
-                if !self.take()? {
-                    break;
-                }
-                self.tidy();
-            }
-            let left = &self.line[self.given..];
-            let length = left.len().min(buffer.len() - filled);
-            buffer[filled..filled + length].copy_from_slice(&left[..length]);
-            self.given += length;
-            filled += length;
-        }
-        Ok(filled)
     }
 }

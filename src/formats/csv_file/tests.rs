@@ -104,3 +104,49 @@ fn files_without_a_row_are_empty_or_have_none() {
     assert!(rows("a.csv", b"t,gx,ax\n").unwrap().is_empty());
     assert!(rows("a.csv", b"t,gx,ax\ns,deg,m\n").unwrap().is_empty());
 }
+
+#[test]
+fn a_quote_that_is_not_closed_is_named_where_it_is() {
+    let good = "0,\"1\",2\n".repeat(500);
+    let names = "\"t\", \"gx\", ax\n";
+    let all = rows("a.csv", format!("{names}{good}").as_bytes()).unwrap();
+    assert!(all.len() == 500 && all[499].1 == [0.0, 1.0, 2.0]);
+    for stray in ["0,\"1,2\n", "0,1,\"2\n", "\"0,1,2\n"] {
+        let text = format!("{names}{good}{stray}{good}");
+        let error = rows("a.csv", text.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("line 502: found a quote"), "{error}");
+    }
+    let error = rows("a.csv", b"t,\"gx,ax\n0,1,2\n").unwrap_err();
+    assert!(
+        error.to_string().contains("line 1: found a quote"),
+        "{error}"
+    );
+    // A quote within a field is a letter of it: an inch.
+    let inch = rows("a.csv", b"t,gx,ax,long 5\"\n0,1,2,3\"\n").unwrap();
+    assert_eq!(inch, [(2, vec![0.0, 1.0, 2.0])]);
+}
+
+#[test]
+fn a_file_that_ends_within_a_row_is_told_from_one_that_is_whole() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.csv");
+    for (content, rows, doubtful, note) in [
+        ("t,gx\n0,10\n1,20\n", 2, false, None),
+        ("t,gx\n0,10,\n1,20,", 2, false, None),
+        ("t,gx\n0,10\n1,2", 2, true, Some("may lack digits")),
+        ("t,gx\n0,10\n1", 1, false, Some("fields are missing")),
+        ("t,gx\n0,10\n1,\"2", 1, false, Some("fields are missing")),
+    ] {
+        fs::write(&path, content).unwrap();
+        let mut csv = CsvFile::open(&path).unwrap();
+        csv.column("gx").unwrap();
+        let mut found = 0;
+        while csv.advance().unwrap() {
+            found += 1;
+        }
+        assert_eq!((found, csv.may_be_cut()), (rows, doubtful), "{content}");
+        let said = csv.cut_off("");
+        let fits = |note: &str| said.as_ref().is_some_and(|said| said.contains(note));
+        assert!(note.map_or(said.is_none(), fits), "{content}: {said:?}");
+    }
+}

@@ -1,6 +1,7 @@
 //! What is wrong with a log's rows, and what was done about it.
 
 mod chance;
+mod impossible;
 mod interpolation;
 mod notes;
 mod repair;
@@ -46,16 +47,22 @@ pub enum FaultKind {
     Stuck,
     /// A single sample to which neither what is before nor what is after leads.
     Spike,
+    /// All values of the row are zero, though gravity is not.
+    Zero,
+    /// Beyond what any instrument measures.
+    Beyond,
 }
 
 impl FaultKind {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Missing,
         Self::Duplicate,
         Self::Saturated,
         Self::Stuck,
         Self::Spike,
+        Self::Zero,
+        Self::Beyond,
     ];
 
     /// In a word.
@@ -66,6 +73,8 @@ impl FaultKind {
             Self::Saturated => "saturated",
             Self::Stuck => "stuck",
             Self::Spike => "spike",
+            Self::Zero => "zero",
+            Self::Beyond => "beyond any instrument",
         }
     }
 }

@@ -63,6 +63,8 @@ impl ImuSamples {
             FaultKind::Duplicate => "there twice",
             FaultKind::Spike if count == 1 => "a spike",
             FaultKind::Spike => "spikes",
+            FaultKind::Zero => "zero in all columns, as no accelerometers are under gravity",
+            FaultKind::Beyond => "beyond what any instrument measures, by the nominal scale",
             FaultKind::Missing | FaultKind::Saturated | FaultKind::Stuck => kind.name(),
         };
         let mut columns: Vec<&str> = Vec::new();

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::impossible::Impossible;
 use super::interpolation::fill;
 use super::{Bridge, Fault, FaultKind, Found, find};
 use crate::imu::Sensor;
@@ -53,8 +54,16 @@ fn sensor(column: usize) -> Sensor {
 impl Rows<'_> {
     /// Looks for faults and bridges them.
     pub fn repair(self) -> Repaired {
-        let found = find(&self.columns, self.facts, &self.full_scale, self.pulses);
+        let impossible = Impossible::find(&self);
+        let found = self.find_beside(&impossible);
         let mut faults = self.missing();
+        faults.extend(impossible.zero.iter().map(|rows| Fault {
+            kind: FaultKind::Zero,
+            axis: None,
+            samples: self.samples(rows),
+            line: self.lines[rows.start],
+            bridged: true,
+        }));
         faults.extend(self.duplicates.iter().map(|&(row, line)| Fault {
             kind: FaultKind::Duplicate,
             axis: None,
@@ -133,6 +142,34 @@ impl Rows<'_> {
             faults,
             bridges,
         }
+    }
+
+    /// The faults of columns: what is impossible, and what the other values show.
+    fn find_beside(&self, impossible: &Impossible) -> Vec<Found> {
+        if impossible.is_empty() {
+            return find(&self.columns, self.facts, &self.full_scale, self.pulses);
+        }
+        let columns = impossible.without(&self.columns);
+        let facts = std::array::from_fn(|k| {
+            let ColumnFacts { name, unit, .. } = &self.facts[k];
+            ColumnFacts::of(name, &columns[k], *unit)
+        });
+        let mut found = find(&columns, &facts, &self.full_scale, self.pulses);
+        for (column, values) in columns.iter().enumerate() {
+            let mut marked = vec![false; values.len()];
+            for rows in impossible.of_column(column) {
+                marked[rows.clone()].fill(true);
+            }
+            let is_marked = |rows: &Range<usize>| marked[rows.clone()].contains(&true);
+            found.retain(|other| other.column != column || !is_marked(&other.rows));
+            let beyond = impossible.beyond[column].iter().cloned();
+            found.extend(beyond.map(|rows| Found {
+                kind: FaultKind::Beyond,
+                column,
+                rows,
+            }));
+        }
+        found
     }
 
     /// The samples of rows that follow one another.

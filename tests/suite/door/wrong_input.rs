@@ -10,7 +10,7 @@ const RUN: &str = r#"format = "turncal-run/1"
 [site]
 latitude_deg = 34.0
 height_m = 10.0
-gravity_m_s2 = 9.79
+gravity_m_s2 = 9.797
 [meta]
 serial = "7"
 [imu]
@@ -133,6 +133,26 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "turncal-run/1",
             "turncal-run/2",
             "line 1 & turncal-run/2 & turncal-run/1",
+        ),
+        (
+            "position_sigma_arcsec = 1.0",
+            "position_sigma_arcsec = 1e300",
+            "1e300 & from 1e-30 to 1e30",
+        ),
+        (
+            "reading_sigma_arcsec = 0.5",
+            "reading_sigma_arcsec = 7e5",
+            "turntable.reading_sigma_arcsec = 7e5 & at most 648000",
+        ),
+        (
+            "[imu.noise]",
+            "[imu.terms]\ntime-offset = { sigma = 1e12 }\n[imu.noise]",
+            "imu.terms.time-offset.sigma = 1e12 & at most 573",
+        ),
+        (
+            "gravity_m_s2 = 9.797",
+            "gravity_m_s2 = 9.797\ngravity_sigma_mgal = 1e6",
+            "site.gravity_sigma_mgal = 1e6 & from 0 to 100000",
         ),
         (
             "height_m",
@@ -479,12 +499,107 @@ fn each_wrong_calibration_has_its_message() {
         ),
         ("gyro.scale.x", "accel.bias.z", "`accel.bias.z` twice"),
         ("\"any\"}", "\"any\"", "line 2"),
+        (
+            "[[1,0],[0,2]]",
+            "[[1,0.1],[0.2,2]]",
+            "gyro.scale.x & accel.bias.z & 1e-1 & 2e-1 & symmetric",
+        ),
+        (
+            "[[1,0],[0,2]]",
+            "[[1,14],[14,2]]",
+            "gyro.scale.x & accel.bias.z & 1.4e1 & from −1 to 1",
+        ),
+        ("[[1,0],[0,2]]", "[[0,1],[1,2]]", "from −1 to 1"),
+        (
+            "\"covariance\":[[1,0],[0,2]]",
+            "\"sigma\":{\"gyro\":TRIAD,\"accel\":TRIAD},\"covariance\":[[1,0],[0,2]]",
+            "-1 in sigma.gyro & zero or above",
+        ),
+        (
+            "\"gyro\":{\"scale\":[1,1,1]",
+            "\"gyro\":{\"scale\":[1,1,1e300]",
+            "gyro.scale.z = 1e300 & 1e15",
+        ),
+        (
+            "[[1,0,0],[0,1,0],[0,0,1]],\"bias\":[0,0,0]",
+            "[[1,0,0],[0,1,1e300],[0,0,1]],\"bias\":[0,0,0]",
+            "gyro.installation.yz = 1e300 & at most 1e2",
+        ),
+        (
+            "\"bias\":[0,0,0]",
+            "\"bias\":[0,1e300,0]",
+            "gyro.bias.y = 1e300 & 1e6",
+        ),
+        (
+            "\"source\"",
+            "\"terms\":{\"accel.time_offset\":{\"value\":1e9}},\"source\"",
+            "terms.accel.time_offset.value = 1e9 & 0.573",
+        ),
+        (
+            "\"source\"",
+            "\"terms\":{\"accel.second_order.x\":{\"value\":1e300}},\"source\"",
+            "terms.accel.second_order.x.value = 1e300 & 0.102",
+        ),
+        (
+            "\"source\"",
+            "\"terms\":{\"gyro.asymmetry.x\":{\"value\":0,\"sigma\":-1}},\"source\"",
+            "terms.gyro.asymmetry.x.sigma = -1e0 & 0 to 1.000",
+        ),
+        (
+            "\"source\"",
+            "\"gravity\":{\"m_s2\":98.0,\"sigma_m_s2\":0},\"source\"",
+            "gravity.m_s2 = 98 & 9.7 to 9.9",
+        ),
     ] {
-        let spoilt = good.replacen(from, to, 1);
+        let to = to.replace("TRIAD", &triad.replace("[1,1,1]", "[1,-1,1]"));
+        let spoilt = good.replacen(from, &to, 1);
         assert_ne!(spoilt, good, "{from}");
         fs::write(&path, spoilt).unwrap();
         let error = Calibration::read(&path).expect_err(words);
         assert_says(&error.to_string(), "calibration.json", words);
+    }
+}
+
+/// Three correlations of −0.9 are each possible, and not together.
+#[test]
+fn a_covariance_that_gives_a_combination_a_negative_variance_is_refused_by_every_command() {
+    let triad = r#"{"scale":[1,1,1],"installation":[[1,0,0],[0,1,0],[0,0,1]],"bias":[0,0,0]}"#;
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("calibration.json");
+    let file = |r: f64| {
+        let text = format!(
+            r#"{{"format":"turncal-calibration/1","gyro":{triad},"accel":{triad},
+"parameters":["gyro.scale.x","gyro.scale.y","gyro.scale.z"],"covariance":[[4,{0},{0}],[{0},4,{0}],[{0},{0},4]]}}"#,
+            4.0 * r
+        );
+        fs::write(&path, text).unwrap();
+        Calibration::read(&path)
+    };
+    assert!(file(-0.499).is_ok() && file(0.999).is_ok() && file(1.0).is_ok());
+    let error = file(-0.9).unwrap_err().to_string();
+    assert_says(
+        &error,
+        "calibration.json",
+        "smallest eigenvalue & -0.800 & semidefinite",
+    );
+    good_run(directory.path());
+    for arguments in [
+        "apply calibration.json run.toml",
+        "export calibration.json --format kalibr",
+        "compare calibration.json calibration.json",
+        "navigate calibration.json --truth calibration.json --latitude-deg 30",
+        "calibrate run.toml --json --truth calibration.json",
+    ] {
+        assert_cmd::Command::new(env!("CARGO_BIN_EXE_turncal"))
+            .current_dir(directory.path())
+            .args(arguments.split(' '))
+            .assert()
+            .code(1)
+            .stdout("")
+            .stderr(format!(
+                "turncal: {}\n",
+                error.replace(&path.display().to_string(), "calibration.json")
+            ));
     }
 }
 

@@ -1,0 +1,99 @@
+//! One line as fields.
+
+use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
+
+/// As many columns as a spreadsheet has.
+pub(super) const MOST_COLUMNS: usize = 16_384;
+/// No number and no name is longer, bytes.
+pub(super) const LONGEST_FIELD: usize = 1 << 16;
+
+/// Why a line is no row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Malformed {
+    /// A field begins with a quote that nothing in its line closes.
+    Quote,
+    /// More columns than [`MOST_COLUMNS`].
+    Columns,
+    /// A field longer than [`LONGEST_FIELD`].
+    Field,
+}
+
+/// The fields of a line, which may stand in quotes; no field goes beyond its line.
+pub(super) struct Row {
+    parser: Reader,
+    text: Vec<u8>,
+    /// End of each field in the text, and room for more.
+    ends: Vec<usize>,
+    count: usize,
+}
+
+impl Row {
+    /// No fields yet, to be parted by this byte.
+    pub fn new(delimiter: u8) -> Self {
+        Self {
+            parser: ReaderBuilder::new()
+                .delimiter(delimiter)
+                .terminator(Terminator::Any(b'\n'))
+                .build(),
+            text: Vec::new(),
+            ends: vec![0; 64],
+            count: 0,
+        }
+    }
+
+    /// Takes the fields of a line, which comes without its end.
+    pub fn split(&mut self, line: &[u8]) -> Result<(), Malformed> {
+        self.parser.reset();
+        self.count = 0;
+        // Fields together are never longer than their line.
+        self.text.resize(line.len() + 1, 0);
+        let (mut length, mut rest, mut ended) = (0, line, false);
+        loop {
+            let (result, read, written, ends) = self.parser.read_record(
+                rest,
+                &mut self.text[length..],
+                &mut self.ends[self.count..],
+            );
+            rest = &rest[read..];
+            length += written;
+            self.count += ends;
+            match result {
+                ReadRecordResult::Record | ReadRecordResult::End => break,
+                ReadRecordResult::InputEmpty if ended => return Err(Malformed::Quote),
+                ReadRecordResult::InputEmpty => (rest, ended) = (b"\n", true),
+                ReadRecordResult::OutputFull => self.text.push(0),
+                ReadRecordResult::OutputEndsFull if self.count > MOST_COLUMNS => {
+                    return Err(Malformed::Columns);
+                }
+                ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len(), 0),
+            }
+        }
+        if self.count > MOST_COLUMNS {
+            return Err(Malformed::Columns);
+        }
+        match self.fields().any(|field| field.len() > LONGEST_FIELD) {
+            true => Err(Malformed::Field),
+            false => Ok(()),
+        }
+    }
+
+    /// How many fields there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// A field, without its quotes.
+    pub fn get(&self, index: usize) -> Option<&[u8]> {
+        let end = *self.ends[..self.count].get(index)?;
+        let start = match index.checked_sub(1) {
+            Some(before) => self.ends[before],
+            None => 0,
+        };
+        self.text.get(start..end)
+    }
+
+    /// All fields in order.
+    pub fn fields(&self) -> impl Iterator<Item = &[u8]> {
+        (0..self.count).filter_map(|index| self.get(index))
+    }
+}
