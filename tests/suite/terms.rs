@@ -61,11 +61,7 @@ fn nees(term: Term, stream: u64) -> (f64, usize) {
 }
 
 fn recovered_as_well_as_sigma_says(runs: u64) {
-    // Moves at one rate do not show nonlinearity.
-    let shown = Term::ALL
-        .into_iter()
-        .filter(|&term| term != Term::GyroNonlinearity);
-    for term in shown {
+    for term in Term::ALL {
         let all: Vec<(f64, usize)> = (0..runs)
             .into_par_iter()
             .map(|stream| nees(term, stream))
