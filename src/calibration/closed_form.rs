@@ -5,6 +5,7 @@
 mod gravity;
 mod labels;
 mod least_squares;
+mod observed;
 mod result;
 mod table;
 
@@ -15,7 +16,10 @@ use super::problem::Problem;
 use crate::earth::Site;
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
-pub use least_squares::{Position, six_position_triad};
+pub use least_squares::six_position_triad;
+#[cfg(test)]
+pub(super) use least_squares::{by_position, linear_design};
+pub use observed::Position;
 pub use result::{ClosedForm, Reference};
 pub use table::six_position_of;
 

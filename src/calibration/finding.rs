@@ -120,10 +120,23 @@ pub enum Finding {
         /// Their labels.
         labels: Vec<String>,
     },
-    /// Residuals of the closed form that are larger than noise.
+    /// Residuals of the closed form that are larger than chance makes them; its σ were widened.
     ResidualsLarge {
-        /// RMS of residuals, each over its σ.
-        ratio: f64,
+        /// `gyro`, `accel` or `both triads`.
+        of: &'static str,
+        /// Sum of their squares, each over its variance …
+        chi_square: f64,
+        /// … with so many degrees of freedom …
+        degrees: usize,
+        /// … and what it stays below in 999 runs of 1000, for both triads at once, if σ are true.
+        limit: f64,
+        /// By how much the σ were multiplied, the root of χ² over its degrees of freedom.
+        growth: f64,
+        /// Begin and end in s of the dwells or moves that fit the others least; several if nothing tells
+        /// them apart.
+        worst: Vec<[f64; 2]>,
+        /// χ² without any one of these.
+        without: f64,
     },
 }
 
@@ -277,12 +290,27 @@ impl fmt::Display for Finding {
                 "Not used, for a part of it is lost: section {}.",
                 labels.join(", ")
             ),
-            Self::ResidualsLarge { ratio } => write!(
-                f,
-                "Residuals of dwells and moves are {ratio:.1} times as large as noise figures and \
-                 Earth rate say: what is not modelled, such as flicker of the sensors or a hand that \
-                 is not still, is as much larger than noise, and the σ are as much too small."
-            ),
+            Self::ResidualsLarge {
+                of,
+                chi_square,
+                degrees,
+                limit,
+                growth,
+                worst,
+                without,
+            } => {
+                let times = |[begin, end]: &[f64; 2]| format!("{begin:.1} s to {end:.1} s");
+                let worst: Vec<String> = worst.iter().map(times).collect();
+                write!(
+                    f,
+                    "Residuals of {of} are larger than stated: χ² {chi_square:.4e} with {degrees} degrees of \
+                     freedom, where true σ stay below {limit:.1}. The σ were multiplied by {growth:.2}. What \
+                     fits the others least is at {}; without it χ² is {without:.4e}. If that is little, look \
+                     there: a bump, a wrong label or attitude; if not, at what all have in common: stated \
+                     noise, level and north, gravity's direction, a hand that is not still.",
+                    worst.join(" or ")
+                )
+            }
         }
     }
 }

@@ -40,6 +40,7 @@ mod prior_distance;
 mod problem;
 mod quality;
 mod record;
+mod residuals;
 pub mod result;
 mod scatter;
 mod schedule;

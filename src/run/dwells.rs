@@ -132,7 +132,7 @@ impl Run {
 pub struct MeanOutput {
     /// Normalised output per second, rad/s or m/s².
     pub output: Vector3<f64>,
-    /// Variance per axis by random walk, pulses and, where samples were interpolated, on the axis that
+    /// Variance per axis by the instrument's noise, pulses and, where samples were interpolated, on the axis that
     /// has most of that.
     pub variance: f64,
 }
@@ -146,6 +146,13 @@ impl Dwell {
         }
     }
 
+    /// Begin and end, s.
+    pub fn times(&self, run: &Run) -> [f64; 2] {
+        let imu = &run.recording.imu;
+        let begin = imu.time(self.samples.start);
+        [begin, begin + self.samples.len() as f64 * imu.period]
+    }
+
     /// Mean output of a triad over it.
     pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
         let samples = run.recording.imu.of(sensor);
@@ -157,9 +164,14 @@ impl Dwell {
                 interpolated[bridge.axis] += bridge.variance * part;
             }
         }
+        let span = self.times(run);
         MeanOutput {
             output: sum / duration,
-            variance: run.instrument.noise.get(sensor).random_walk.powi(2) / duration
+            variance: run
+                .instrument
+                .noise
+                .get(sensor)
+                .covariance_of_means(span, span)
                 + run.recording.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration)
                 + interpolated.max() / (duration * duration),
         }

@@ -11,7 +11,8 @@ use super::super::error::CalibrationError;
 use super::super::finding::Finding;
 use super::super::model::Model;
 use super::super::problem::Problem;
-use super::least_squares::{Position, across, both_triads};
+use super::least_squares::{across, both_triads};
+use super::observed::{Observed, Position};
 use super::result::{ClosedForm, Reference, remarks};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
@@ -22,6 +23,7 @@ use crate::run::{Dwell, Run};
 pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let (run, model): (&Run, &Model) = (problem.run(), &problem.model);
     let mut positions = PerSensor::<Vec<Position>>::default();
+    let mut times = PerSensor::<Vec<[f64; 2]>>::default();
     let mut turns = 0;
     let mut standing_time = 0.0;
     let sigma = run.segment_sigma;
@@ -38,10 +40,12 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
         let duration = section.samples.len() as f64 * run.recording.imu.period;
         let of_gyro = section.mean(Sensor::Gyro, run);
         let noise = Vector3::repeat(of_gyro.variance);
+        times.gyro.push(section.times(run));
         match motion {
             LabelledMotion::Stands { up } => {
                 let of_accel = section.mean(Sensor::Accel, run);
                 let white = Vector3::repeat(of_accel.variance);
+                times.accel.push(section.times(run));
                 let force = up * run.site.gravity;
                 positions
                     .accel
@@ -70,8 +74,14 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
             labels: run.recording.labels(),
         });
     }
-    let estimate = both_triads(&positions, problem)?;
-    let mut findings = remarks(model, &estimate, Reference::Labels);
+    let used = PerSensor::from_fn(|sensor| positions.get(sensor).len());
+    let observed = PerSensor::from_fn(|sensor| {
+        let noise = run.instrument.noise.get(sensor);
+        let positions = std::mem::take(positions.get_mut(sensor));
+        Observed::over(positions, std::mem::take(times.get_mut(sensor)), noise)
+    });
+    let (estimate, mut findings) = both_triads(&observed, problem)?;
+    findings.extend(remarks(model, &estimate, Reference::Labels));
     if !lost.is_empty() {
         findings.push(Finding::SectionsLost { labels: lost });
     }
@@ -80,8 +90,8 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
         estimate,
         reference: Reference::Labels,
         positions: PerSensor {
-            gyro: positions.gyro.len() - turns,
-            accel: positions.accel.len(),
+            gyro: used.gyro - turns,
+            accel: used.accel,
         },
         turns,
         standing_time,
