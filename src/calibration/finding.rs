@@ -8,6 +8,7 @@ use super::innovation::Inconsistency;
 use super::noise::SourceFigures;
 use super::prior_cause::PriorCause;
 use crate::imu::InstallationForm;
+use crate::run::motion::ContradictedLabel;
 use crate::units::DEGREE;
 
 /// A finding with its figures; [`fmt::Display`] words it.
@@ -119,6 +120,11 @@ pub enum Finding {
     SectionsLost {
         /// Their labels.
         labels: Vec<String>,
+    },
+    /// Sections whose labels the record contradicts.
+    LabelsContradicted {
+        /// Each of them.
+        contradicted: Vec<ContradictedLabel>,
     },
     /// Residuals of the closed form that are larger than chance makes them; its σ were widened.
     ResidualsLarge {
@@ -290,6 +296,11 @@ impl fmt::Display for Finding {
                 "Not used, for a part of it is lost: section {}.",
                 labels.join(", ")
             ),
+            Self::LabelsContradicted { contradicted } => {
+                let each: Vec<String> =
+                    contradicted.iter().map(ContradictedLabel::to_string).collect();
+                write!(f, "Labels and record disagree. Section {}.", each.join("; section "))
+            }
             Self::ResidualsLarge {
                 of,
                 chi_square,

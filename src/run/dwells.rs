@@ -88,12 +88,50 @@ impl Run {
     fn labelled_dwells(&self) -> Vec<Dwell> {
         let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
         let positions = self.recording.segments.iter().filter(|s| stands(s.motion));
-        // A row at the edge of a section may be of the one beside it.
-        let inside = positions.map(|segment| Dwell {
-            samples: segment.samples.start + 1..segment.samples.end.saturating_sub(1),
-            position: None,
+        let standstills = self.standstills_of_imu();
+        let inside = positions.map(|segment| {
+            // A row at the edge of a section may be of the one beside it.
+            let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
+            Dwell {
+                samples: self.standing_in(&samples, &standstills).unwrap_or(samples),
+                position: None,
+            }
         });
         inside.filter(|dwell| !dwell.samples.is_empty()).collect()
+    }
+
+    /// The longest of these standstills within some samples, where it turns in the others by more than a
+    /// position that is set by hand may be off.
+    pub(in crate::run) fn standing_in(
+        &self,
+        samples: &Range<usize>,
+        standstills: &[Dwell],
+    ) -> Option<Range<usize>> {
+        let within = standstills.iter().map(|standstill| {
+            let Range { start, end } = standstill.samples;
+            start.max(samples.start)..end.min(samples.end)
+        });
+        let longest = within.max_by_key(ExactSizeIterator::len)?;
+        let imu = &self.recording.imu;
+        if (longest.len() as f64) * imu.period < SHORTEST {
+            return None;
+        }
+        let zero = imu.gyro[longest.clone()].iter().sum::<Vector3<f64>>() / longest.len() as f64;
+        let limit = |count: usize| {
+            let random_walk = self.instrument.noise.gyro.random_walk;
+            self.segment_sigma + STILL_SIGMAS * random_walk * (count as f64 * imu.period).sqrt()
+        };
+        let turns = |beside: &mut dyn Iterator<Item = &Vector3<f64>>| {
+            let mut angle = Vector3::zeros();
+            beside.enumerate().any(|(count, increment)| {
+                angle += increment - zero;
+                angle.norm() > limit(count + 1)
+            })
+        };
+        let (before, after) = (samples.start..longest.start, longest.end..samples.end);
+        let beside =
+            turns(&mut imu.gyro[before].iter().rev()) || turns(&mut imu.gyro[after].iter());
+        beside.then_some(longest)
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {

@@ -5,7 +5,7 @@
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
 //! g-sensitivity.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::error::CalibrationError;
 use super::super::finding::Finding;
@@ -17,6 +17,7 @@ use super::result::{ClosedForm, Reference, remarks};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::LabelledMotion;
+use crate::run::motion::{self, ContradictedLabel};
 use crate::run::{Dwell, Run};
 
 /// Both triads from the sections whose labels say how the instrument stands or turns.
@@ -28,20 +29,38 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
     let mut standing_time = 0.0;
     let sigma = run.segment_sigma;
     let mut lost = Vec::new();
-    for segment in &run.recording.segments {
-        let Some(motion) = segment.motion else {
+    let mut contradicted = Vec::new();
+    let rests = motion::rests(run);
+    for check in motion::checks(run, &rests) {
+        let segment = &check.segment;
+        let Some(labelled) = segment.motion else {
             continue;
         };
         if run.recording.imu.is_lost(&segment.samples) {
             lost.push(format!("`{}`", segment.label));
             continue;
         }
-        let section = Dwell::of_segment(segment);
+        let used = check.as_labelled();
+        if let Some(said) = check.disagreement() {
+            contradicted.push(ContradictedLabel {
+                label: segment.label.clone(),
+                start: segment.start,
+                said,
+                used: used.is_some(),
+            });
+        }
+        let Some(samples) = used else {
+            continue;
+        };
+        let section = Dwell {
+            samples,
+            position: None,
+        };
         let duration = section.samples.len() as f64 * run.recording.imu.period;
         let of_gyro = section.mean(Sensor::Gyro, run);
         let noise = Vector3::repeat(of_gyro.variance);
         times.gyro.push(section.times(run));
-        match motion {
+        match labelled {
             LabelledMotion::Stands { up } => {
                 let of_accel = section.mean(Sensor::Accel, run);
                 let white = Vector3::repeat(of_accel.variance);
@@ -69,19 +88,28 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
             }
         }
     }
-    if positions.gyro.is_empty() {
+    if positions.gyro.is_empty() && contradicted.is_empty() {
         return Err(CalibrationError::NoSections {
             labels: run.recording.labels(),
         });
+    }
+    if positions.gyro.is_empty() {
+        return Err(CalibrationError::LabelsContradicted { contradicted });
     }
     let used = PerSensor::from_fn(|sensor| positions.get(sensor).len());
     let observed = PerSensor::from_fn(|sensor| {
         let noise = run.instrument.noise.get(sensor);
         let positions = std::mem::take(positions.get_mut(sensor));
-        Observed::over(positions, std::mem::take(times.get_mut(sensor)), noise)
+        Observed {
+            errors: shortened(&positions, sigma),
+            ..Observed::over(positions, std::mem::take(times.get_mut(sensor)), noise)
+        }
     });
     let (estimate, mut findings) = both_triads(&observed, problem)?;
     findings.extend(remarks(model, &estimate, Reference::Labels));
+    if !contradicted.is_empty() {
+        findings.push(Finding::LabelsContradicted { contradicted });
+    }
     if !lost.is_empty() {
         findings.push(Finding::SectionsLost { labels: lost });
     }
@@ -115,7 +143,8 @@ fn force_by_hand(
 /// An input along or about an axis that is within a degree or so of where it should be, and this noise.
 ///
 /// To first order that turns the input into the other two axes. Along the axis it takes off the second
-/// order: half the sum of two squared angles, whose mean square is twice the fourth power of one's σ.
+/// order: half the sum of two squared angles. That is the square of σ in the mean, the same for all
+/// positions ([`shortened`]), and scatters by as much.
 fn set_by_hand(
     sigma: f64,
     input: Vector3<f64>,
@@ -123,7 +152,7 @@ fn set_by_hand(
     noise: Vector3<f64>,
 ) -> Position {
     let turn = sigma.powi(2);
-    let along = input.map(|component| 2.0 * (component * turn).powi(2));
+    let along = input.map(|component| (component * turn).powi(2));
     let variance = noise + across(&input) * turn + along;
     Position {
         input,
@@ -133,6 +162,12 @@ fn set_by_hand(
     }
 }
 
+/// What tilts of this σ take off all inputs in the mean.
+fn shortened(positions: &[Position], sigma: f64) -> DMatrix<f64> {
+    let inputs = positions.iter().flat_map(|p| <[f64; 3]>::from(p.input));
+    DMatrix::from_iterator(3 * positions.len(), 1, inputs) * -sigma.powi(2)
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::SVector;
@@ -140,7 +175,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    use super::super::least_squares::six_position_triad;
+    use super::super::least_squares::{Fit, determined};
     use super::*;
     use crate::attitude::exp;
     use crate::calibration::mean_square_interval;
@@ -151,6 +186,7 @@ mod tests {
     /// positions that are each off by random tilts.
     fn mean_squares(
         sets: usize,
+        tilt: f64,
         make: impl Fn(&mut dyn FnMut(f64) -> Vector3<f64>, &Triad) -> Vec<Position>,
     ) -> [f64; 3] {
         let form = InstallationForm::General;
@@ -166,8 +202,14 @@ mod tests {
                 v * sigma
             };
             let positions = make(&mut draw, &truth);
-            let (found, covariance) = six_position_triad(&positions, form).unwrap();
-            let error = found.to_vector() - truth.to_vector();
+            let observed = Observed {
+                errors: shortened(&positions, tilt),
+                ..Observed::independent(&positions)
+            };
+            let Fit {
+                triad, covariance, ..
+            } = determined(&observed, form).unwrap();
+            let error = triad.to_vector() - truth.to_vector();
             for (k, e) in error.iter().enumerate() {
                 let place = match Triad::kind(k) {
                     ParameterKind::Scale => 0,
@@ -185,7 +227,7 @@ mod tests {
     fn positions_that_a_hand_tilts_are_as_wrong_as_their_sigma_says() {
         const SETS: usize = 400;
         let (tilt, noise) = (2.0 * DEGREE, 2e-3);
-        let squares = mean_squares(SETS, |draw, truth| {
+        let squares = mean_squares(SETS, tilt, |draw, truth| {
             let axes = (0..6).map(|k| Vector3::ith(k / 2, if k % 2 == 0 { 9.8 } else { -9.8 }));
             axes.map(|force| {
                 let sensed = truth.output(&(exp(draw(tilt)) * force)) + draw(noise);
@@ -207,7 +249,7 @@ mod tests {
         const SETS: usize = 400;
         let (tilt, noise, duration) = (2.0 * DEGREE, 1e-4, 4.0);
         let end = tilt / duration;
-        let squares = mean_squares(SETS, |draw, truth| {
+        let squares = mean_squares(SETS, tilt, |draw, truth| {
             let turns = (0..3).map(|k| Vector3::ith(k, std::f64::consts::TAU / duration));
             let turns: Vec<_> = turns
                 .map(|rate| {

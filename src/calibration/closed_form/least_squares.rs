@@ -23,12 +23,12 @@ const STEPS: usize = 6;
 const SMALL: f64 = 1e-6;
 
 /// One triad with what its estimate follows.
-struct Fit {
-    triad: Triad,
+pub(super) struct Fit {
+    pub triad: Triad,
     /// How parameters follow all outputs.
-    gain: DMatrix<f64>,
+    pub gain: DMatrix<f64>,
     /// Of the parameters.
-    covariance: DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
 }
 
 /// Both triads from positions; with what is known beforehand where they do not determine a triad. Where
@@ -192,7 +192,7 @@ pub fn six_position_triad(
 }
 
 /// The same with all that the positions have in common.
-fn determined(observed: &Observed, form: InstallationForm) -> Option<Fit> {
+pub(super) fn determined(observed: &Observed, form: InstallationForm) -> Option<Fit> {
     let positions = &observed.positions;
     let size = observed.size();
     if positions.len() < 4 || size <= 0.0 || in_a_plane(positions, size) {
