@@ -136,7 +136,7 @@ pub enum Finding {
         degrees: usize,
         /// … and what it stays below in 999 runs of 1000, for both triads at once, if σ are true.
         limit: f64,
-        /// By how much the σ were multiplied, the root of χ² over its degrees of freedom.
+        /// By how much the largest σ grew.
         growth: f64,
         /// Begin and end in s of the dwells or moves that fit the others least; several if nothing tells
         /// them apart.
@@ -315,7 +315,7 @@ impl fmt::Display for Finding {
                 write!(
                     f,
                     "Residuals of {of} are larger than stated: χ² {chi_square:.4e} with {degrees} degrees of \
-                     freedom, where true σ stay below {limit:.1}. The σ were multiplied by {growth:.2}. What \
+                     freedom, where true σ stay below {limit:.1}. σ were widened by it, up to {growth:.2} times. What \
                      fits the others least is at {}; without it χ² is {without:.4e}. If that is little, look \
                      there: a bump, a wrong label or attitude; if not, at what all have in common: stated \
                      noise, level and north, gravity's direction, a hand that is not still.",

@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use turncal::attitude::{exp, log};
 use turncal::calibration::{
-    ClosedForm, Finding, Options, PARAMETERS, Problem, Reference, in_body_frame, in_general_form,
-    mean_square_interval, nees, six_position, to_vector,
+    ClosedForm, Finding, Method, Options, Problem, Solution, in_body_frame, in_general_form,
+    mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{GaussMarkov, PerSensor};
 use turncal::recording::{LabelledMotion, Segment};
@@ -21,52 +21,68 @@ use turncal::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G};
 /// Chance that a mean over right runs lies outside its interval.
 const OUTSIDE: f64 = 2e-3;
 
-/// NEES and what it is a sum of.
-fn sum_of_squares(closed_form: &ClosedForm, made: &Simulated) -> (f64, usize) {
-    let truth = in_body_frame(
-        &in_general_form(&made.truth),
-        closed_form.reference.body_frame(),
-    );
+/// NEES, the number of squares that it is a sum of, and the largest error over its σ.
+fn squares(closed_form: &ClosedForm, made: &Simulated) -> (f64, usize, f64) {
+    let frame = closed_form.reference.body_frame();
+    let truth = in_body_frame(&in_general_form(&made.truth), frame);
     let estimate = &closed_form.estimate;
-    let difference = estimate.vector() - to_vector(&truth);
-    let all: Vec<usize> = (0..PARAMETERS).collect();
-    let nees = nees(&difference, &estimate.covariance, &all).unwrap();
-    (nees.mean * nees.count as f64, nees.count)
+    let error = estimate.vector() - to_vector(&truth);
+    let all: Vec<usize> = estimate.estimated().collect();
+    let nees = nees(&error, &estimate.covariance, &all).unwrap();
+    let sigma = estimate.sigma();
+    let each = all.iter().map(|&k| (error[k] / sigma[k]).abs());
+    (
+        nees.mean * nees.count as f64,
+        nees.count,
+        each.fold(0.0, f64::max),
+    )
 }
 
-/// How residuals rang.
-fn rings(closed_form: &ClosedForm) -> bool {
-    let large = |finding: &Finding| matches!(finding, Finding::ResidualsLarge { .. });
-    closed_form.findings.iter().any(large)
-}
-
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Tried {
     nees: f64,
     interval: (f64, f64),
     /// The largest of one run.
     worst: f64,
+    /// The largest error over its σ.
+    sigmas: f64,
+    /// Runs in which the record contradicted labels.
+    contradicted: usize,
+    /// Runs refused.
+    refused: usize,
+    /// Runs in which a parameter was off by more than four σ without a word.
+    silent: usize,
     rang: usize,
 }
 
 /// Mean NEES/n of the closed form over so many runs.
 fn tried(runs: u64, make: impl Fn(u64) -> Simulated) -> Tried {
-    let (mut sum, mut count, mut worst, mut rang) = (0.0, 0, 0f64, 0);
+    let mut all = Tried::default();
+    let (mut sum, mut count) = (0.0, 0);
     for seed in 0..runs {
         let made = make(seed);
-        let closed_form = six_position(&Problem::new(&made.run, &Options::default())).unwrap();
-        let (squares, n) = sum_of_squares(&closed_form, &made);
+        let problem = Problem::new(&made.run, &Options::default());
+        let Ok(Solution::ClosedForm(closed_form)) = problem.solve(Method::SixPosition, &|_| {})
+        else {
+            all.refused += 1;
+            continue;
+        };
+        let (squares, n, sigmas) = squares(&closed_form, &made);
         sum += squares;
         count += n;
-        worst = worst.max(squares / n as f64);
-        rang += usize::from(rings(&closed_form));
+        all.worst = all.worst.max(squares / n as f64);
+        all.sigmas = all.sigmas.max(sigmas);
+        let has = |is: fn(&Finding) -> bool| closed_form.findings.iter().any(is);
+        let rang = has(|f| matches!(f, Finding::ResidualsLarge { .. }));
+        let contradicted = has(|f| matches!(f, Finding::LabelsContradicted { .. }));
+        let far = has(|f| matches!(f, Finding::FarFromPrior { .. }));
+        all.rang += usize::from(rang);
+        all.contradicted += usize::from(contradicted);
+        all.silent += usize::from(sigmas > 4.0 && !(rang || contradicted || far));
     }
-    Tried {
-        nees: sum / count as f64,
-        interval: mean_square_interval(count, OUTSIDE),
-        worst,
-        rang,
-    }
+    all.nees = sum / count as f64;
+    all.interval = mean_square_interval(count, OUTSIDE);
+    all
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
@@ -90,7 +106,7 @@ fn by_hand(scenario: &Scenario, tilt: f64, seed: u64) -> Simulated {
     let mut go = |vector: Vector3<f64>| {
         steps.push(BodyStep {
             rotation: Rotation::By(vector),
-            duration: (vector.norm() / (45.0 * DEGREE)).max(2.0),
+            duration: vector.norm() / (30.0 * DEGREE) + 3.0,
             acceleration: 90.0 * DEGREE,
             dwell: 10.0,
         });
@@ -150,6 +166,166 @@ const SCENARIOS: [&str; 5] = [
     "two-axis",
     "nineteen-position",
 ];
+
+pub fn measure(runs: u64, which: &str) {
+    let of_hands = Scenario::load("mems").unwrap().table;
+    for name in SCENARIOS {
+        if which.contains("wrong") {
+            continue;
+        }
+        let scenario = Scenario::load(name).unwrap();
+        if !which.contains("labels") {
+            let by_table = tried(runs, |seed| scenario.simulate(seed, 0).unwrap());
+            println!("{name} table: {by_table:.3?}");
+        }
+        let mut hand = scenario.clone();
+        hand.table = of_hands.clone();
+        let by_labels = tried(runs, |seed| by_hand(&hand, DEGREE, seed));
+        println!("{name} labels: {by_labels:.3?}");
+        let by_gravity = tried(runs, |seed| {
+            let mut s = scenario.simulate(seed, 0).unwrap();
+            s.run.recording.table = None;
+            s
+        });
+        println!("{name} gravity: {by_gravity:.3?}");
+    }
+    for name in ["demo-six-position", "mems", "nineteen-position"] {
+        for (wrong, what) in WRONG {
+            let tried = tried(runs, |seed| {
+                made_wrong(&Scenario::load(name).unwrap(), what, seed)
+            });
+            println!("{name} {wrong}: {tried:.3?}");
+        }
+        for (wrong, what) in WRONG_LABELS {
+            let tried = tried(runs, |seed| {
+                let mut hand = Scenario::load(name).unwrap();
+                hand.table = of_hands.clone();
+                let mut made = by_hand(&hand, DEGREE, seed);
+                what(&mut made.run, seed as usize);
+                made
+            });
+            println!("{name} {wrong}: {tried:.3?}");
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Wrong {
+    Instability { stated: bool },
+    Level { sigma: f64, stated: bool },
+    Bump,
+    Noise,
+}
+
+const WRONG: [(&str, Wrong); 6] = [
+    ("instability stated", Wrong::Instability { stated: true }),
+    (
+        "instability not stated",
+        Wrong::Instability { stated: false },
+    ),
+    (
+        "level 30″ stated",
+        Wrong::Level {
+            sigma: 30.0 * ARCSEC,
+            stated: true,
+        },
+    ),
+    (
+        "level 0.05° not stated",
+        Wrong::Level {
+            sigma: 0.05 * DEGREE,
+            stated: false,
+        },
+    ),
+    ("bump of 0.1°", Wrong::Bump),
+    ("noise stated 100 times too small", Wrong::Noise),
+];
+
+/// A run on a table that is not as it is stated.
+fn made_wrong(scenario: &Scenario, wrong: Wrong, seed: u64) -> Simulated {
+    let mut scenario = scenario.clone();
+    let stated = scenario.instrument.noise;
+    match wrong {
+        Wrong::Instability { .. } => {
+            let sigma = PerSensor {
+                gyro: 0.1 * DEG_PER_H,
+                accel: 30.0 * MICRO_G,
+            };
+            let gauss_markov = |sigma| {
+                Some(GaussMarkov {
+                    sigma,
+                    correlation_time: 100.0,
+                })
+            };
+            scenario.instrument.noise.gyro.gauss_markov = gauss_markov(sigma.gyro);
+            scenario.instrument.noise.accel.gauss_markov = gauss_markov(sigma.accel);
+        }
+        Wrong::Level { sigma, .. } => scenario.table.errors.level = sigma,
+        Wrong::Bump | Wrong::Noise => {}
+    }
+    let mut made = scenario.simulate(seed, 0).unwrap();
+    let run = &mut made.run;
+    match wrong {
+        Wrong::Instability { stated: false } => run.instrument.noise = stated,
+        Wrong::Level { stated: false, .. } => run.table.geometry.base.fill(0.0),
+        Wrong::Bump => {
+            let dwells = run.dwells(Aiding::Table);
+            let bumped = &dwells[(dwells.len() - 1 - seed as usize % 6).min(dwells.len() - 1)];
+            let readings = bumped.position.as_ref().unwrap().readings.clone();
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let bump = exp(normal(&mut rng).normalize() * (0.1 * DEGREE));
+            for attitude in &mut run.recording.table.as_mut().unwrap().attitude[readings] {
+                *attitude = bump * *attitude;
+            }
+        }
+        Wrong::Noise => {
+            run.instrument.noise.gyro.random_walk /= 100.0;
+            run.instrument.noise.accel.random_walk /= 100.0;
+        }
+        _ => {}
+    }
+    made
+}
+
+type OfLabels = fn(&mut Run, usize);
+
+const WRONG_LABELS: [(&str, OfLabels); 5] = [
+    ("labels 0.5 s early", |run, _| {
+        shift(run, -0.5);
+    }),
+    ("labels 3 s early", |run, _| {
+        shift(run, -3.0);
+    }),
+    ("one turn's sign", |run, seed| {
+        let segment = &mut run.recording.segments[1 + 2 * (seed % 6)];
+        if let Some(LabelledMotion::Turns { angle, .. }) = &mut segment.motion {
+            *angle = -*angle;
+        }
+    }),
+    ("all turns' signs", |run, _| {
+        for segment in &mut run.recording.segments {
+            if let Some(LabelledMotion::Turns { angle, .. }) = &mut segment.motion {
+                *angle = -*angle;
+            }
+        }
+    }),
+    ("an axis up and down swapped", |run, seed| {
+        for place in [4 * (seed % 3), 4 * (seed % 3) + 2] {
+            if let Some(LabelledMotion::Stands { up }) = &mut run.recording.segments[place].motion {
+                *up = -*up;
+            }
+        }
+    }),
+];
+
+fn shift(run: &mut Run, by: f64) {
+    let (period, count) = (run.recording.imu.period, run.recording.imu.len());
+    let shifted = |sample: usize| (sample as f64 + by / period).clamp(0.0, count as f64) as usize;
+    for segment in &mut run.recording.segments {
+        let std::ops::Range { start, end } = segment.samples;
+        segment.samples = shifted(start)..shifted(end);
+    }
+}
 
 #[test]
 #[ignore = "statistical: 200 runs"]

@@ -69,9 +69,12 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
                 positions
                     .accel
                     .push(force_by_hand(sigma, force, of_accel.output, white));
-                // Which way is north is not known, so what is level of Earth rate is noise.
+                // Which way is north is not known, so what is level of Earth rate is noise; a tilt brings
+                // some of it to the axis that is up.
                 let earth_rate = run.site.earth_rate_n();
-                let level = across(&up) * (0.5 * earth_rate.y.powi(2));
+                let level = earth_rate.y.powi(2);
+                let level =
+                    across(&up) * (0.5 * level) + up.component_mul(&up) * (level * sigma.powi(2));
                 let rate = up * earth_rate.z;
                 let gyro = set_by_hand(sigma, rate, of_gyro.output, noise + level);
                 positions.gyro.push(gyro);

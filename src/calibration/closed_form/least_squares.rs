@@ -45,9 +45,15 @@ pub(super) fn both_triads(
     for sensor in Sensor::ALL {
         let stated = observed.get(sensor);
         let fit = fitted(stated, problem, sensor)?;
-        let (fit, growth) = match ringing(stated, &fit.triad) {
-            None => (fit, 1.0),
-            Some((growth, residuals)) => {
+        let residuals = left_by(stated, &fit.triad);
+        let rings = residuals
+            .as_ref()
+            .filter(|residuals| residuals.growth().is_some());
+        let fit = match rings {
+            None => fit,
+            Some(residuals) => {
+                let wider = stated.widened(unexplained(stated, &fit.triad));
+                let wider = fitted(&wider, problem, sensor)?;
                 let worst = residuals.worst(&by_position(stated.positions.len()));
                 let times = worst.groups.iter().map(|&k| stated.times[k]);
                 findings.push(Finding::ResidualsLarge {
@@ -55,11 +61,11 @@ pub(super) fn both_triads(
                     chi_square: residuals.chi_square(),
                     degrees: residuals.degrees(),
                     limit: residuals.limit(),
-                    growth,
+                    growth: largest_growth(&fit, &wider),
                     worst: times.collect(),
                     without: worst.without,
                 });
-                (fitted(&stated.widened(growth), problem, sensor)?, growth)
+                wider
             }
         };
         *triads.get_mut(sensor) = fit.triad;
@@ -67,7 +73,7 @@ pub(super) fn both_triads(
         covariance
             .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
             .copy_from(&fit.covariance);
-        common.push(fit.gain * stated.output_errors(&fit.triad.sensitivity()) * growth);
+        common.push(fit.gain * stated.output_errors(&fit.triad.sensitivity()));
     }
     // Both triads stand on one table.
     if let [of_gyro, of_accel] = &common[..]
@@ -84,8 +90,8 @@ pub(super) fn both_triads(
     Ok((Estimate { triads, covariance }, findings))
 }
 
-/// Residuals beyond chance, and by how much σ are to grow.
-fn ringing(observed: &Observed, triad: &Triad) -> Option<(f64, Residuals)> {
+/// What positions leave of any triad, their inputs' errors taken through this one.
+fn left_by(observed: &Observed, triad: &Triad) -> Option<Residuals> {
     let inputs: Vec<Vector3<f64>> = observed.positions.iter().map(|p| p.input).collect();
     let errors = observed
         .positions
@@ -94,8 +100,51 @@ fn ringing(observed: &Observed, triad: &Triad) -> Option<(f64, Residuals)> {
     let errors = DVector::from_iterator(3 * inputs.len(), errors);
     let covariance = observed.covariance(&triad.sensitivity());
     let design = linear_design(&inputs, observed.size());
-    let residuals = Residuals::new(&design, &errors, &covariance)?;
-    residuals.growth().map(|growth| (growth, residuals))
+    Residuals::new(&design, &errors, &covariance)
+}
+
+/// The variance that every axis of every position must have more for χ² of the residuals to be what is
+/// expected of it.
+///
+/// It is added, not multiplied: residuals may all be of axes across the input, where a table's attitude
+/// makes stated σ large, and say nothing of how far those along it, which tell scale factors, are off.
+fn unexplained(observed: &Observed, triad: &Triad) -> f64 {
+    /// A factor of two a step, down to rounding.
+    const HALVINGS: i32 = 60;
+    let errors = observed.positions.iter();
+    let errors = errors.map(|p| (p.output - triad.output(&p.input)).norm_squared());
+    let most: f64 = errors.sum();
+    let is_enough = |variance: f64| {
+        let residuals = left_by(&observed.widened(variance), triad);
+        residuals.is_none_or(|left| left.chi_square() <= left.degrees() as f64)
+    };
+    let halved = |times: i32| most * 0.5f64.powi(times);
+    let last = (0..HALVINGS).find(|&times| !is_enough(halved(times)));
+    let (mut low, mut high) = match last {
+        None => return halved(HALVINGS),
+        Some(times) => (halved(times), halved(times - 1)),
+    };
+    // χ² over its degrees of freedom scatters by far more than these leave.
+    for _ in 0..6 {
+        let middle = 0.5 * (low + high);
+        *if is_enough(middle) {
+            &mut high
+        } else {
+            &mut low
+        } = middle;
+    }
+    high
+}
+
+/// By how much the σ that grew most did.
+fn largest_growth(from: &Fit, to: &Fit) -> f64 {
+    let variances = from.covariance.diagonal();
+    let grown = to.covariance.diagonal();
+    let pairs = variances.iter().zip(&grown);
+    let ratios = pairs
+        .filter(|(before, _)| **before > 0.0)
+        .map(|(before, after)| after / before);
+    ratios.fold(1.0, f64::max).sqrt()
 }
 
 fn fitted(observed: &Observed, problem: &Problem, sensor: Sensor) -> Result<Fit, CalibrationError> {

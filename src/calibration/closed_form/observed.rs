@@ -65,19 +65,16 @@ impl Observed {
         sizes.fold(0.0, f64::max)
     }
 
-    /// The same as if all σ were so many times as large.
-    pub fn widened(&self, factor: f64) -> Self {
-        let square = factor.powi(2);
+    /// The same with this variance more on every axis of every position, as of a bias that is new at each.
+    pub fn widened(&self, variance: f64) -> Self {
         let wider = |position: &Position| Position {
-            variance: position.variance * square,
-            weighted: position.weighted * square,
+            variance: position.variance.add_scalar(variance),
+            weighted: position.weighted.add_scalar(variance),
             ..*position
         };
         Self {
             positions: self.positions.iter().map(wider).collect(),
-            times: self.times.clone(),
-            between: &self.between * square,
-            errors: &self.errors * factor,
+            ..self.clone()
         }
     }
 
