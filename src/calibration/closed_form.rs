@@ -13,6 +13,7 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::parameters::parameter;
 use super::problem::Problem;
+use super::rest_scatter::scatter_at_rest;
 use crate::earth::Site;
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
@@ -57,6 +58,7 @@ pub(super) fn six_position_by(
         Reference::Labels => labels::by_labels(problem),
         Reference::Gravity => gravity::by_gravity(problem),
     }?;
+    closed_form.findings.extend(scatter_at_rest(problem));
     share_gravity(&mut closed_form.estimate, &problem.run().site);
     Ok(closed_form)
 }

@@ -126,6 +126,19 @@ pub enum Finding {
         /// Each of them.
         contradicted: Vec<ContradictedLabel>,
     },
+    /// Rows at rest that scatter by more or less than the stated noise.
+    ScatterAtRest {
+        /// `gyro` or `accel`.
+        of: &'static str,
+        /// The key in `[imu.noise]` of the next two, in its unit.
+        figure: &'static str,
+        /// What the rows scatter by over a tenth of a second, as random walk.
+        found: f64,
+        /// The same as stated, with a bias and pulses.
+        stated: f64,
+        /// What their ratio stays within, for both triads at once, in 999 runs of 1000 if that is right.
+        limits: (f64, f64),
+    },
     /// Residuals of the closed form that are larger than chance makes them; its σ were widened.
     ResidualsLarge {
         /// `gyro`, `accel` or `both triads`.
@@ -295,6 +308,20 @@ impl fmt::Display for Finding {
                 f,
                 "Not used, for a part of it is lost: section {}.",
                 labels.join(", ")
+            ),
+            Self::ScatterAtRest {
+                of,
+                figure,
+                found,
+                stated,
+                limits: (low, high),
+            } => write!(
+                f,
+                "At rest the rows of the {of} scatter by {:.3} times what is stated: as by {figure} = \
+                 {found:.4}, where noise and pulses as stated make {stated:.4}, within {low:.3} to {high:.3} \
+                 of it in 999 runs of 1000. It is seen over a tenth of a second, so a mount that shakes is \
+                 in it; `turncal allan` tells more.",
+                found / stated
             ),
             Self::LabelsContradicted { contradicted } => {
                 let each: Vec<String> =

@@ -41,6 +41,7 @@ mod problem;
 mod quality;
 mod record;
 mod residuals;
+mod rest_scatter;
 pub mod result;
 mod scatter;
 mod schedule;

@@ -53,6 +53,8 @@ struct Tried {
     /// Runs in which a parameter was off by more than four σ without a word.
     silent: usize,
     rang: usize,
+    /// Runs whose rows scattered at rest otherwise than stated.
+    scatters: usize,
 }
 
 /// Mean NEES/n of the closed form over so many runs.
@@ -75,10 +77,12 @@ fn tried(runs: u64, make: impl Fn(u64) -> Simulated) -> Tried {
         let has = |is: fn(&Finding) -> bool| closed_form.findings.iter().any(is);
         let rang = has(|f| matches!(f, Finding::ResidualsLarge { .. }));
         let contradicted = has(|f| matches!(f, Finding::LabelsContradicted { .. }));
+        let scatters = has(|f| matches!(f, Finding::ScatterAtRest { .. }));
+        all.scatters += usize::from(scatters);
         let far = has(|f| matches!(f, Finding::FarFromPrior { .. }));
         all.rang += usize::from(rang);
         all.contradicted += usize::from(contradicted);
-        all.silent += usize::from(sigmas > 4.0 && !(rang || contradicted || far));
+        all.silent += usize::from(sigmas > 4.0 && !(rang || contradicted || far || scatters));
     }
     all.nees = sum / count as f64;
     all.interval = mean_square_interval(count, OUTSIDE);
@@ -167,48 +171,6 @@ const SCENARIOS: [&str; 5] = [
     "nineteen-position",
 ];
 
-pub fn measure(runs: u64, which: &str) {
-    let of_hands = Scenario::load("mems").unwrap().table;
-    for name in SCENARIOS {
-        if which.contains("wrong") {
-            continue;
-        }
-        let scenario = Scenario::load(name).unwrap();
-        if !which.contains("labels") {
-            let by_table = tried(runs, |seed| scenario.simulate(seed, 0).unwrap());
-            println!("{name} table: {by_table:.3?}");
-        }
-        let mut hand = scenario.clone();
-        hand.table = of_hands.clone();
-        let by_labels = tried(runs, |seed| by_hand(&hand, DEGREE, seed));
-        println!("{name} labels: {by_labels:.3?}");
-        let by_gravity = tried(runs, |seed| {
-            let mut s = scenario.simulate(seed, 0).unwrap();
-            s.run.recording.table = None;
-            s
-        });
-        println!("{name} gravity: {by_gravity:.3?}");
-    }
-    for name in ["demo-six-position", "mems", "nineteen-position"] {
-        for (wrong, what) in WRONG {
-            let tried = tried(runs, |seed| {
-                made_wrong(&Scenario::load(name).unwrap(), what, seed)
-            });
-            println!("{name} {wrong}: {tried:.3?}");
-        }
-        for (wrong, what) in WRONG_LABELS {
-            let tried = tried(runs, |seed| {
-                let mut hand = Scenario::load(name).unwrap();
-                hand.table = of_hands.clone();
-                let mut made = by_hand(&hand, DEGREE, seed);
-                what(&mut made.run, seed as usize);
-                made
-            });
-            println!("{name} {wrong}: {tried:.3?}");
-        }
-    }
-}
-
 #[derive(Clone, Copy)]
 enum Wrong {
     Instability { stated: bool },
@@ -217,28 +179,32 @@ enum Wrong {
     Noise,
 }
 
-const WRONG: [(&str, Wrong); 6] = [
-    ("instability stated", Wrong::Instability { stated: true }),
+/// With whether it is stated.
+const WRONG: [(&str, Wrong, bool); 6] = [
+    ("instability", Wrong::Instability { stated: true }, true),
     (
-        "instability not stated",
+        "instability, not stated",
         Wrong::Instability { stated: false },
+        false,
     ),
     (
-        "level 30″ stated",
+        "level 30″",
         Wrong::Level {
             sigma: 30.0 * ARCSEC,
             stated: true,
         },
+        true,
     ),
     (
-        "level 0.05° not stated",
+        "level 0.05°, not stated",
         Wrong::Level {
             sigma: 0.05 * DEGREE,
             stated: false,
         },
+        false,
     ),
-    ("bump of 0.1°", Wrong::Bump),
-    ("noise stated 100 times too small", Wrong::Noise),
+    ("a bump of 0.1°", Wrong::Bump, false),
+    ("noise stated 100 times too small", Wrong::Noise, false),
 ];
 
 /// A run on a table that is not as it is stated.
@@ -327,20 +293,46 @@ fn shift(run: &mut Run, by: f64) {
     }
 }
 
+const RUNS: u64 = 12;
+
 #[test]
-#[ignore = "statistical: 200 runs"]
-fn the_closed_form_is_as_wrong_as_its_sigma_say() {
-    const RUNS: u64 = 20;
-    let runs = std::env::var("RUNS").map_or(RUNS, |v| v.parse().unwrap());
-    let of_hands = Scenario::load("mems").unwrap().table;
+#[ignore = "statistical: 252 runs"]
+fn the_closed_form_is_as_wrong_as_its_sigma_say_or_says_what_is_wrong() {
+    let as_stated = |what: &str, tried: &Tried| {
+        println!("{what}: {tried:.3?}");
+        let (low, high) = tried.interval;
+        assert!((low..=high).contains(&tried.nees), "{what}");
+        assert_eq!((tried.refused, tried.silent), (0, 0), "{what}");
+    };
+    let hands = Scenario::load("mems").unwrap().table;
     for name in SCENARIOS {
         let scenario = Scenario::load(name).unwrap();
-        let by_table = tried(runs, |seed| scenario.simulate(seed, 0).unwrap());
-        let mut hand = scenario.clone();
-        hand.table = of_hands.clone();
-        let by_labels = tried(runs, |seed| by_hand(&hand, DEGREE, seed));
+        let by_table = tried(RUNS, |seed| scenario.simulate(seed, 0).unwrap());
+        let table = hands.clone();
+        let hand = Scenario { table, ..scenario };
+        let by_labels = tried(RUNS, |seed| by_hand(&hand, DEGREE, seed));
         for (from, tried) in [("table", by_table), ("labels", by_labels)] {
-            println!("{name} {from}: {tried:.3?}");
+            as_stated(&format!("{name} by {from}"), &tried);
+            assert_eq!((tried.rang, tried.contradicted, tried.scatters), (0, 0, 0));
         }
+    }
+    let positions = Scenario::load("demo-six-position").unwrap();
+    for (what, wrong, stated) in WRONG {
+        let tried = tried(RUNS, |seed| made_wrong(&positions, wrong, seed));
+        if stated {
+            as_stated(what, &tried);
+        } else {
+            println!("{what}: {tried:.3?}");
+            assert_eq!((tried.rang, tried.silent), (RUNS as usize, 0), "{what}");
+        }
+    }
+    for (what, wrong) in WRONG_LABELS {
+        let tried = tried(RUNS, |seed| {
+            let mut made = by_hand(&Scenario::load("mems").unwrap(), DEGREE, seed);
+            wrong(&mut made.run, seed as usize);
+            made
+        });
+        as_stated(what, &tried);
+        assert_eq!(tried.contradicted, RUNS as usize, "{what}");
     }
 }
