@@ -40,12 +40,15 @@ impl Residuals {
         for mut column in design.column_iter_mut() {
             column.try_normalize_mut(0.0);
         }
-        let svd = design.svd(true, false);
-        let u = svd.u?;
-        let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
-        let explains = |&k: &usize| svd.singular_values[k] > ROUNDING * largest;
-        let columns: Vec<usize> = (0..u.ncols()).filter(explains).collect();
-        let explained = u.select_columns(&columns);
+        let explained = if design.is_empty() {
+            DMatrix::zeros(errors.len(), 0)
+        } else {
+            let svd = design.svd(true, false);
+            let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
+            let explains = |&k: &usize| svd.singular_values[k] > ROUNDING * largest;
+            let columns: Vec<usize> = (0..svd.singular_values.len()).filter(explains).collect();
+            svd.u?.select_columns(&columns)
+        };
         let whitened = factor.solve_lower_triangular(errors)?;
         let whitened = &whitened - &explained * explained.tr_mul(&whitened);
         let count = errors.len();

@@ -14,6 +14,7 @@ use super::super::problem::Problem;
 use super::least_squares::{across, both_triads};
 use super::observed::{Observed, Position};
 use super::result::{ClosedForm, Reference, remarks};
+use crate::attitude::skew;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::LabelledMotion;
@@ -104,7 +105,10 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
         let noise = run.instrument.noise.get(sensor);
         let positions = std::mem::take(positions.get_mut(sensor));
         Observed {
-            errors: shortened(&positions, sigma),
+            errors: match sensor {
+                Sensor::Gyro => shortened(&positions, sigma),
+                Sensor::Accel => by_tilts(&positions, sigma),
+            },
             ..Observed::over(positions, std::mem::take(times.get_mut(sensor)), noise)
         }
     });
@@ -130,7 +134,7 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
 }
 
 /// Gravity along an axis. It is weighted as if nothing were known of how it falls on the other two axes:
-/// so the bias of each comes from its own two positions, as in half sums.
+/// so the bias of each comes from its own two positions, as in half sums. What falls there is of [`by_tilts`].
 fn force_by_hand(
     sigma: f64,
     force: Vector3<f64>,
@@ -138,9 +142,15 @@ fn force_by_hand(
     noise: Vector3<f64>,
 ) -> Position {
     Position {
+        variance: noise + along(sigma, &force),
         weighted: noise + across(&force),
         ..set_by_hand(sigma, force, output, noise)
     }
+}
+
+/// Variance of what a tilt takes off an input.
+fn along(sigma: f64, input: &Vector3<f64>) -> Vector3<f64> {
+    input.map(|component| (component * sigma.powi(2)).powi(2))
 }
 
 /// An input along or about an axis that is within a degree or so of where it should be, and this noise.
@@ -154,9 +164,7 @@ fn set_by_hand(
     output: Vector3<f64>,
     noise: Vector3<f64>,
 ) -> Position {
-    let turn = sigma.powi(2);
-    let along = input.map(|component| (component * turn).powi(2));
-    let variance = noise + across(&input) * turn + along;
+    let variance = noise + across(&input) * sigma.powi(2) + along(sigma, &input);
     Position {
         input,
         output,
@@ -169,6 +177,20 @@ fn set_by_hand(
 fn shortened(positions: &[Position], sigma: f64) -> DMatrix<f64> {
     let inputs = positions.iter().flat_map(|p| <[f64; 3]>::from(p.input));
     DMatrix::from_iterator(3 * positions.len(), 1, inputs) * -sigma.powi(2)
+}
+
+/// The same, and then what each position is tilted by about each axis, for misaligned axes bring that to
+/// the one that is up. Not so of turns: tilts of their own make what is found of misalignment there.
+fn by_tilts(positions: &[Position], sigma: f64) -> DMatrix<f64> {
+    let count = positions.len();
+    let mut errors = shortened(positions, sigma).resize_horizontally(1 + 3 * count, 0.0);
+    for (k, position) in positions.iter().enumerate() {
+        let turned = skew(position.input) * sigma;
+        errors
+            .fixed_view_mut::<3, 3>(3 * k, 1 + 3 * k)
+            .copy_from(&turned);
+    }
+    errors
 }
 
 #[cfg(test)]
@@ -190,6 +212,7 @@ mod tests {
     fn mean_squares(
         sets: usize,
         tilt: f64,
+        errors: fn(&[Position], f64) -> DMatrix<f64>,
         make: impl Fn(&mut dyn FnMut(f64) -> Vector3<f64>, &Triad) -> Vec<Position>,
     ) -> [f64; 3] {
         let form = InstallationForm::General;
@@ -206,7 +229,7 @@ mod tests {
             };
             let positions = make(&mut draw, &truth);
             let observed = Observed {
-                errors: shortened(&positions, tilt),
+                errors: errors(&positions, tilt),
                 ..Observed::independent(&positions)
             };
             let Fit {
@@ -230,7 +253,7 @@ mod tests {
     fn positions_that_a_hand_tilts_are_as_wrong_as_their_sigma_says() {
         const SETS: usize = 400;
         let (tilt, noise) = (2.0 * DEGREE, 2e-3);
-        let squares = mean_squares(SETS, tilt, |draw, truth| {
+        let squares = mean_squares(SETS, tilt, by_tilts, |draw, truth| {
             let axes = (0..6).map(|k| Vector3::ith(k / 2, if k % 2 == 0 { 9.8 } else { -9.8 }));
             axes.map(|force| {
                 let sensed = truth.output(&(exp(draw(tilt)) * force)) + draw(noise);
@@ -252,7 +275,7 @@ mod tests {
         const SETS: usize = 400;
         let (tilt, noise, duration) = (2.0 * DEGREE, 1e-4, 4.0);
         let end = tilt / duration;
-        let squares = mean_squares(SETS, tilt, |draw, truth| {
+        let squares = mean_squares(SETS, tilt, shortened, |draw, truth| {
             let turns = (0..3).map(|k| Vector3::ith(k, std::f64::consts::TAU / duration));
             let turns: Vec<_> = turns
                 .map(|rate| {
