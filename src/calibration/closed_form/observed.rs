@@ -1,6 +1,6 @@
 //! What a triad gave under known inputs, and how uncertain both are together.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::imu::Noise;
 
@@ -94,8 +94,21 @@ impl Observed {
         self.with_variance(sensitivity, |position| position.variance)
     }
 
-    /// What they are weighted by: the inverse of this.
+    /// What they are weighted by: the inverse of this. Weights that are chosen are used as they are.
     pub fn weights(&self, sensitivity: &Matrix3<f64>) -> DMatrix<f64> {
+        let chosen = |position: &Position| position.weighted != position.variance;
+        if self.positions.iter().any(chosen) {
+            let diagonal = self
+                .positions
+                .iter()
+                .flat_map(|p| <[f64; 3]>::from(p.weighted));
+            let least = (NOISELESS * self.size()).powi(2);
+            let diagonal = diagonal.map(|variance| variance.max(least));
+            return DMatrix::from_diagonal(&DVector::from_iterator(
+                3 * self.positions.len(),
+                diagonal,
+            ));
+        }
         self.with_variance(sensitivity, |position| position.weighted)
     }
 
