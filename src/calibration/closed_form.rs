@@ -5,6 +5,7 @@
 mod gravity;
 mod labels;
 mod least_squares;
+mod observed;
 mod result;
 mod table;
 
@@ -12,10 +13,14 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::parameters::parameter;
 use super::problem::Problem;
+use super::rest_scatter::scatter_at_rest;
 use crate::earth::Site;
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
-pub use least_squares::{Position, six_position_triad};
+pub use least_squares::six_position_triad;
+#[cfg(test)]
+pub(super) use least_squares::{by_position, linear_design};
+pub use observed::Position;
 pub use result::{ClosedForm, Reference};
 pub use table::six_position_of;
 
@@ -53,6 +58,7 @@ pub(super) fn six_position_by(
         Reference::Labels => labels::by_labels(problem),
         Reference::Gravity => gravity::by_gravity(problem),
     }?;
+    closed_form.findings.extend(scatter_at_rest(problem));
     share_gravity(&mut closed_form.estimate, &problem.run().site);
     Ok(closed_form)
 }

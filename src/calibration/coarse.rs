@@ -3,6 +3,7 @@
 mod equations;
 mod gravity;
 mod heading;
+mod shared_noise;
 mod table;
 mod turns;
 
@@ -12,11 +13,11 @@ use nalgebra::Vector3;
 
 use super::error::CalibrationError;
 use super::estimate::Estimate;
+use super::finding::Finding;
 use super::linearisation::{AttitudePrior, Linearisation, singular};
 use super::problem::Problem;
 use crate::attitude::exp;
 use crate::imu::TermVector;
-pub(super) use equations::{Equations, gauss_newton};
 use turns::Turned;
 
 /// Where the filter begins.
@@ -102,20 +103,43 @@ fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ByGravity {
     pub estimate: Estimate,
-    /// Mean square of the residuals, each over its σ; one if nothing but noise is left.
-    pub misfit: f64,
+    /// Residuals beyond chance, by which the covariance was widened.
+    pub ringing: Option<Finding>,
 }
 
 /// The coarse start without a table, with its covariance.
 pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
     enough(problem)?;
     let triads = gravity::accelerometers(problem)?;
-    let Turned { at, equations, .. } = turns::triads_and_attitudes(problem, &triads)?;
+    let Turned {
+        at,
+        equations,
+        shared,
+        ..
+    } = turns::triads_and_attitudes(problem, &triads)?;
     let triads = at.triads;
-    let covariance = equations.covariance().ok_or_else(|| singular(&triads))?;
+    let singular = || singular(&triads);
+    let residuals = equations.residuals(&shared).ok_or_else(singular)?;
+    let growth = residuals.growth();
+    let covariance = equations.covariance_by(&shared, growth.unwrap_or(1.0));
     Ok(ByGravity {
-        estimate: Estimate { triads, covariance },
-        misfit: equations.misfit(),
+        estimate: Estimate {
+            triads,
+            covariance: covariance.ok_or_else(singular)?,
+        },
+        ringing: growth.map(|growth| {
+            let (groups, times) = turns::dwells_and_moves(problem);
+            let worst = residuals.worst(&groups);
+            Finding::ResidualsLarge {
+                of: "both triads",
+                chi_square: residuals.chi_square(),
+                degrees: residuals.degrees(),
+                limit: residuals.limit(),
+                growth,
+                worst: worst.groups.iter().map(|&k| times[k]).collect(),
+                without: worst.without,
+            }
+        }),
     })
 }
 

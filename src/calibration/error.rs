@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::mounting::Mounting;
 use crate::imu::Sensor;
+use crate::run::motion::ContradictedLabel;
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
 /// and what to do.
@@ -41,6 +42,15 @@ pub enum CalibrationError {
     NoSections {
         /// Labels of the sections.
         labels: Vec<String>,
+    },
+    /// No labelled section does what its label says.
+    #[error(
+        "no labelled section does what its label says, expected at least one: {}; correct [segments], or \
+         leave it out and let every dwell and turn count", .contradicted.iter().map(ContradictedLabel::to_string).collect::<Vec<_>>().join("; ")
+    )]
+    LabelsContradicted {
+        /// All of them.
+        contradicted: Vec<ContradictedLabel>,
     },
     /// Something that batch least squares does not have.
     #[error(

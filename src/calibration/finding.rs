@@ -8,6 +8,7 @@ use super::innovation::Inconsistency;
 use super::noise::SourceFigures;
 use super::prior_cause::PriorCause;
 use crate::imu::InstallationForm;
+use crate::run::motion::ContradictedLabel;
 use crate::units::DEGREE;
 
 /// A finding with its figures; [`fmt::Display`] words it.
@@ -120,10 +121,41 @@ pub enum Finding {
         /// Their labels.
         labels: Vec<String>,
     },
-    /// Residuals of the closed form that are larger than noise.
+    /// Sections whose labels the record contradicts.
+    LabelsContradicted {
+        /// Each of them.
+        contradicted: Vec<ContradictedLabel>,
+    },
+    /// Rows at rest that scatter by more or less than the stated noise.
+    ScatterAtRest {
+        /// `gyro` or `accel`.
+        of: &'static str,
+        /// The key in `[imu.noise]` of the next two, in its unit.
+        figure: &'static str,
+        /// What the rows scatter by over a tenth of a second, as random walk.
+        found: f64,
+        /// The same as stated, with a bias and pulses.
+        stated: f64,
+        /// What their ratio stays within, for both triads at once, in 999 runs of 1000 if that is right.
+        limits: (f64, f64),
+    },
+    /// Residuals of the closed form that are larger than chance makes them; its σ were widened.
     ResidualsLarge {
-        /// RMS of residuals, each over its σ.
-        ratio: f64,
+        /// `gyro`, `accel` or `both triads`.
+        of: &'static str,
+        /// Sum of their squares, each over its variance …
+        chi_square: f64,
+        /// … with so many degrees of freedom …
+        degrees: usize,
+        /// … and what it stays below in 999 runs of 1000, for both triads at once, if σ are true.
+        limit: f64,
+        /// By how much the largest σ grew.
+        growth: f64,
+        /// Begin and end in s of the dwells or moves that fit the others least; several if nothing tells
+        /// them apart.
+        worst: Vec<[f64; 2]>,
+        /// χ² without any one of these.
+        without: f64,
     },
 }
 
@@ -277,12 +309,46 @@ impl fmt::Display for Finding {
                 "Not used, for a part of it is lost: section {}.",
                 labels.join(", ")
             ),
-            Self::ResidualsLarge { ratio } => write!(
+            Self::ScatterAtRest {
+                of,
+                figure,
+                found,
+                stated,
+                limits: (low, high),
+            } => write!(
                 f,
-                "Residuals of dwells and moves are {ratio:.1} times as large as noise figures and \
-                 Earth rate say: what is not modelled, such as flicker of the sensors or a hand that \
-                 is not still, is as much larger than noise, and the σ are as much too small."
+                "At rest the rows of the {of} scatter by {:.3} times what is stated: as by {figure} = \
+                 {found:.4}, where noise and pulses as stated make {stated:.4}, within {low:.3} to {high:.3} \
+                 of it in 999 runs of 1000. It is seen over a tenth of a second, so a mount that shakes is \
+                 in it; `turncal allan` tells more.",
+                found / stated
             ),
+            Self::LabelsContradicted { contradicted } => {
+                let each: Vec<String> =
+                    contradicted.iter().map(ContradictedLabel::to_string).collect();
+                write!(f, "Labels and record disagree. Section {}.", each.join("; section "))
+            }
+            Self::ResidualsLarge {
+                of,
+                chi_square,
+                degrees,
+                limit,
+                growth,
+                worst,
+                without,
+            } => {
+                let times = |[begin, end]: &[f64; 2]| format!("{begin:.1} s to {end:.1} s");
+                let worst: Vec<String> = worst.iter().map(times).collect();
+                write!(
+                    f,
+                    "Residuals of {of} are larger than stated: χ² {chi_square:.4e} with {degrees} degrees of \
+                     freedom, where true σ stay below {limit:.1}. σ were widened by it, up to {growth:.2} times. What \
+                     fits the others least is at {}; without it χ² is {without:.4e}. If that is little, look \
+                     there: a bump, a wrong label or attitude; if not, at what all have in common: stated \
+                     noise, level and north, gravity's direction, a hand that is not still.",
+                    worst.join(" or ")
+                )
+            }
         }
     }
 }

@@ -20,6 +20,7 @@ use super::parameters::{ParameterMatrix, parameter_name};
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
+use super::rest_scatter::scatter_at_rest;
 use crate::imu::Sensor;
 use crate::run::Aiding;
 
@@ -222,6 +223,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             sources: noise.sources.clone(),
         });
     }
+    findings.extend(scatter_at_rest(problem));
     findings.extend(far_from_prior(&problem.model, &outcome.estimate));
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();

@@ -40,6 +40,8 @@ mod prior_distance;
 mod problem;
 mod quality;
 mod record;
+mod residuals;
+mod rest_scatter;
 pub mod result;
 mod scatter;
 mod schedule;

@@ -33,6 +33,48 @@ pub struct GaussMarkov {
     pub correlation_time: f64,
 }
 
+impl Noise {
+    /// Covariance on one axis of the mean outputs over two spans of time, each from begin to end in s:
+    /// (rad/s)² or (m/s²)². Of a span with itself it is the variance of its mean.
+    ///
+    /// Random walk is common to both where they overlap; the Gauss–Markov bias is the double integral of
+    /// its autocovariance `σ² exp(−|t|/τ)` over both.
+    pub fn covariance_of_means(&self, one: [f64; 2], other: [f64; 2]) -> f64 {
+        let product = (one[1] - one[0]) * (other[1] - other[0]);
+        let overlap = (one[1].min(other[1]) - one[0].max(other[0])).max(0.0);
+        let white = self.random_walk.powi(2) * overlap;
+        let bias = self.gauss_markov.map_or(0.0, |gauss_markov| {
+            let GaussMarkov {
+                sigma,
+                correlation_time: tau,
+            } = gauss_markov;
+            // Between the spans each integral is a factor: nothing is lost of spans that are long or far
+            // apart.
+            let (first, second) = if one[0] <= other[0] {
+                (one, other)
+            } else {
+                (other, one)
+            };
+            let decayed = |time: f64| -(-time / tau).exp_m1();
+            let double_integral = if second[0] >= first[1] {
+                let apart = (-(second[0] - first[1]) / tau).exp();
+                decayed(first[1] - first[0]) * decayed(second[1] - second[0]) * apart
+            } else {
+                // The second antiderivative of exp(−|t|/τ), over τ².
+                let whole = |time: f64| {
+                    let time = time.abs() / tau;
+                    (-time).exp_m1() + time
+                };
+                whole(first[1] - second[0]) + whole(first[0] - second[1])
+                    - whole(first[0] - second[0])
+                    - whole(first[1] - second[1])
+            };
+            (sigma * tau).powi(2) * double_integral
+        });
+        (white + bias) / product
+    }
+}
+
 /// Draws a triad's noise, sample by sample.
 #[derive(Debug, Clone)]
 pub struct NoiseSource {
@@ -105,6 +147,46 @@ mod tests {
             sum += pulses.count(rate);
             let lag = sum - rate * f64::from(k);
             assert!(lag.amax() <= 0.5 + 1e-9);
+        }
+    }
+
+    #[test]
+    fn means_over_two_spans_vary_together_as_drawn_ones_do() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let noise = Noise {
+            random_walk: 0.5,
+            gauss_markov: Some(GaussMarkov {
+                sigma: 1.0,
+                correlation_time: 2.0,
+            }),
+        };
+        let (period, sets) = (0.05, 4000);
+        // Apart, and overlapping; in samples.
+        let spans = [0..40, 60..100, 20..90];
+        let mut products = [[0.0; 3]; 3];
+        for _ in 0..sets {
+            let mut source = NoiseSource::new(noise, period, &mut rng);
+            let drawn: Vec<Vector3<f64>> = (0..100).map(|_| source.draw(&mut rng)).collect();
+            let mean = |span: &std::ops::Range<usize>| {
+                drawn[span.clone()].iter().sum::<Vector3<f64>>() / (span.len() as f64 * period)
+            };
+            for (i, one) in spans.iter().enumerate() {
+                for (j, other) in spans.iter().enumerate() {
+                    products[i][j] += mean(one).dot(&mean(other)) / 3.0 / f64::from(sets);
+                }
+            }
+        }
+        let times = spans.map(|span| [span.start as f64 * period, span.end as f64 * period]);
+        for i in 0..3 {
+            for j in 0..3 {
+                let stated = noise.covariance_of_means(times[i], times[j]);
+                let variances = noise.covariance_of_means(times[i], times[i])
+                    * noise.covariance_of_means(times[j], times[j]);
+                // Of a mean of products of normal numbers, at four of its σ; sampling adds a fortieth.
+                let limit = 4.0 * ((variances + stated.powi(2)) / 3.0 / f64::from(sets)).sqrt();
+                let off = (products[i][j] - stated).abs();
+                assert!(off < limit + 0.025 * stated, "{i} {j}: {off} {limit}");
+            }
         }
     }
 

@@ -82,12 +82,50 @@ impl Run {
     fn labelled_dwells(&self) -> Vec<Dwell> {
         let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
         let positions = self.recording.segments.iter().filter(|s| stands(s.motion));
-        // A row at the edge of a section may be of the one beside it.
-        let inside = positions.map(|segment| Dwell {
-            samples: segment.samples.start + 1..segment.samples.end.saturating_sub(1),
-            position: None,
+        let standstills = self.standstills_of_imu();
+        let inside = positions.map(|segment| {
+            // A row at the edge of a section may be of the one beside it.
+            let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
+            Dwell {
+                samples: self.standing_in(&samples, &standstills).unwrap_or(samples),
+                position: None,
+            }
         });
         inside.filter(|dwell| !dwell.samples.is_empty()).collect()
+    }
+
+    /// The longest of these standstills within some samples, where it turns in the others by more than a
+    /// position that is set by hand may be off.
+    pub(in crate::run) fn standing_in(
+        &self,
+        samples: &Range<usize>,
+        standstills: &[Dwell],
+    ) -> Option<Range<usize>> {
+        let within = standstills.iter().map(|standstill| {
+            let Range { start, end } = standstill.samples;
+            start.max(samples.start)..end.min(samples.end)
+        });
+        let longest = within.max_by_key(ExactSizeIterator::len)?;
+        let imu = &self.recording.imu;
+        if (longest.len() as f64) * imu.period < SHORTEST {
+            return None;
+        }
+        let zero = imu.gyro[longest.clone()].iter().sum::<Vector3<f64>>() / longest.len() as f64;
+        let limit = |count: usize| {
+            let random_walk = self.instrument.noise.gyro.random_walk;
+            self.segment_sigma + STILL_SIGMAS * random_walk * (count as f64 * imu.period).sqrt()
+        };
+        let turns = |beside: &mut dyn Iterator<Item = &Vector3<f64>>| {
+            let mut angle = Vector3::zeros();
+            beside.enumerate().any(|(count, increment)| {
+                angle += increment - zero;
+                angle.norm() > limit(count + 1)
+            })
+        };
+        let (before, after) = (samples.start..longest.start, longest.end..samples.end);
+        let beside =
+            turns(&mut imu.gyro[before].iter().rev()) || turns(&mut imu.gyro[after].iter());
+        beside.then_some(longest)
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {
@@ -126,7 +164,7 @@ impl Run {
 pub struct MeanOutput {
     /// Normalised output per second, rad/s or m/s².
     pub output: Vector3<f64>,
-    /// Variance per axis by random walk, pulses and, where samples were interpolated, on the axis that
+    /// Variance per axis by the instrument's noise, pulses and, where samples were interpolated, on the axis that
     /// has most of that.
     pub variance: f64,
 }
@@ -140,6 +178,13 @@ impl Dwell {
         }
     }
 
+    /// Begin and end, s.
+    pub fn times(&self, run: &Run) -> [f64; 2] {
+        let imu = &run.recording.imu;
+        let begin = imu.time(self.samples.start);
+        [begin, begin + self.samples.len() as f64 * imu.period]
+    }
+
     /// Mean output of a triad over it.
     pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
         let samples = run.recording.imu.of(sensor);
@@ -151,9 +196,14 @@ impl Dwell {
                 interpolated[bridge.axis] += bridge.variance * part;
             }
         }
+        let span = self.times(run);
         MeanOutput {
             output: sum / duration,
-            variance: run.instrument.noise.get(sensor).random_walk.powi(2) / duration
+            variance: run
+                .instrument
+                .noise
+                .get(sensor)
+                .covariance_of_means(span, span)
                 + run.recording.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration)
                 + interpolated.max() / (duration * duration),
         }

@@ -5,6 +5,7 @@
 //! the files' units and axes end in [`crate::formats`].
 
 mod dwells;
+pub mod motion;
 
 pub use dwells::{Dwell, MeanOutput, Position};
 

@@ -1,20 +1,15 @@
 //! What a record holds, and what the methods could see of the instrument in it. Nothing is calibrated: all
 //! is by nominal scales and prior biases.
 
-mod label;
 mod outlook;
-mod rest;
-mod turn;
 
 use crate::calibration::{Mounting, Options, Problem};
 use crate::imu::{PerSensor, Sensor};
 use crate::run::Run;
+use crate::run::motion::{self, LabelCheck, Rest, Turn};
 use crate::units::DEGREE;
 
-pub use label::{LabelCheck, Verdict};
 pub use outlook::{Expected, MethodOutlook, Path};
-pub use rest::{Rest, Up};
-pub use turn::Turn;
 
 /// What a record holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,11 +48,11 @@ pub struct Standing {
 impl Survey {
     /// Looks at a run.
     pub fn of(run: &Run) -> Self {
-        let rests = rest::rests(run);
+        let rests = motion::rests(run);
         let durations = || rests.iter().map(|rest| rest.duration(run));
         Self {
-            turns: turn::turns(run, &rests),
-            labels: label::checks(run, &rests),
+            turns: motion::turns(run, &rests),
+            labels: motion::checks(run, &rests),
             methods: outlook::methods(run),
             mounting: Mounting::contradicted(&Problem::new(run, &Options::default())),
             standing: Standing {

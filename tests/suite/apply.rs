@@ -224,7 +224,7 @@ fn a_simulated_instrument_gives_back_what_the_body_did() {
     for (term, sensor, bound) in [
         // The square of what gravity moves by within a sample at 60 °/s, over 12.
         (Term::AccelSecondOrder, Sensor::Accel, 4e-8),
-        (Term::AccelAsymmetry, Sensor::Accel, 3e-6),
+        (Term::AccelAsymmetry, Sensor::Accel, 6e-6),
         (Term::SizeEffect, Sensor::Accel, 6e-5),
         (Term::TimeOffset, Sensor::Accel, 7.2e-6),
         (Term::GSensitivity, Sensor::Gyro, 1e-12),

@@ -7,6 +7,7 @@ mod by_hand;
 mod calibration_file;
 mod check;
 mod cli;
+mod closed_form;
 mod compare;
 mod door;
 mod error_terms;

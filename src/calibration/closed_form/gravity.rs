@@ -2,22 +2,15 @@
 
 use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
-use super::super::finding::Finding;
 use super::super::problem::Problem;
 use super::result::{ClosedForm, Reference, remarks};
 use crate::imu::PerSensor;
 
-/// Weighted residuals above this times what noise makes are worth a warning.
-const DOUBTFUL: f64 = 1.2;
-
 /// Both triads from whatever positions there are, tied down by the prior where they are too few.
 pub(super) fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
-    let ByGravity { estimate, misfit } = coarse::by_gravity(problem)?;
+    let ByGravity { estimate, ringing } = coarse::by_gravity(problem)?;
     let mut findings = remarks(&problem.model, &estimate, Reference::Gravity);
-    let ratio = misfit.sqrt();
-    if ratio > DOUBTFUL {
-        findings.push(Finding::ResidualsLarge { ratio });
-    }
+    findings.extend(ringing);
     let stretches = problem.stretches();
     let time_at_rest = stretches.iter().map(|stretch| {
         let samples: usize = stretch.dwells.iter().map(|dwell| dwell.samples.len()).sum();

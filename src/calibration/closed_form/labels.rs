@@ -5,50 +5,79 @@
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
 //! g-sensitivity.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::error::CalibrationError;
 use super::super::finding::Finding;
 use super::super::model::Model;
 use super::super::problem::Problem;
-use super::least_squares::{Position, across, both_triads};
+use super::least_squares::{across, both_triads};
+use super::observed::{Observed, Position};
 use super::result::{ClosedForm, Reference, remarks};
+use crate::attitude::skew;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::LabelledMotion;
+use crate::run::motion::{self, ContradictedLabel};
 use crate::run::{Dwell, Run};
 
 /// Both triads from the sections whose labels say how the instrument stands or turns.
 pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let (run, model): (&Run, &Model) = (problem.run(), &problem.model);
     let mut positions = PerSensor::<Vec<Position>>::default();
+    let mut times = PerSensor::<Vec<[f64; 2]>>::default();
     let mut turns = 0;
     let mut standing_time = 0.0;
     let sigma = run.segment_sigma;
     let mut lost = Vec::new();
-    for segment in &run.recording.segments {
-        let Some(motion) = segment.motion else {
+    let mut contradicted = Vec::new();
+    let rests = motion::rests(run);
+    for check in motion::checks(run, &rests) {
+        let segment = &check.segment;
+        let Some(labelled) = segment.motion else {
             continue;
         };
         if run.recording.imu.is_lost(&segment.samples) {
             lost.push(format!("`{}`", segment.label));
             continue;
         }
-        let section = Dwell::of_segment(segment);
+        let used = check.as_labelled();
+        // Borders that are drawn a little wide do no harm.
+        let as_stated = used.as_ref() == Some(&segment.samples);
+        if let Some(said) = check.disagreement().filter(|_| !as_stated) {
+            contradicted.push(ContradictedLabel {
+                label: segment.label.clone(),
+                start: segment.start,
+                said,
+                used: used.is_some(),
+            });
+        }
+        let Some(samples) = used else {
+            continue;
+        };
+        let section = Dwell {
+            samples,
+            position: None,
+        };
         let duration = section.samples.len() as f64 * run.recording.imu.period;
         let of_gyro = section.mean(Sensor::Gyro, run);
         let noise = Vector3::repeat(of_gyro.variance);
-        match motion {
+        times.gyro.push(section.times(run));
+        match labelled {
             LabelledMotion::Stands { up } => {
                 let of_accel = section.mean(Sensor::Accel, run);
                 let white = Vector3::repeat(of_accel.variance);
+                times.accel.push(section.times(run));
                 let force = up * run.site.gravity;
                 positions
                     .accel
                     .push(force_by_hand(sigma, force, of_accel.output, white));
-                // Which way is north is not known, so what is level of Earth rate is noise.
+                // Which way is north is not known, so what is level of Earth rate is noise; a tilt brings
+                // some of it to the axis that is up.
                 let earth_rate = run.site.earth_rate_n();
-                let level = across(&up) * (0.5 * earth_rate.y.powi(2));
+                let level = earth_rate.y.powi(2);
+                let level =
+                    across(&up) * (0.5 * level) + up.component_mul(&up) * (level * sigma.powi(2));
                 let rate = up * earth_rate.z;
                 let gyro = set_by_hand(sigma, rate, of_gyro.output, noise + level);
                 positions.gyro.push(gyro);
@@ -65,13 +94,31 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
             }
         }
     }
-    if positions.gyro.is_empty() {
+    if positions.gyro.is_empty() && contradicted.is_empty() {
         return Err(CalibrationError::NoSections {
             labels: run.recording.labels(),
         });
     }
-    let estimate = both_triads(&positions, problem)?;
-    let mut findings = remarks(model, &estimate, Reference::Labels);
+    if positions.gyro.is_empty() {
+        return Err(CalibrationError::LabelsContradicted { contradicted });
+    }
+    let used = PerSensor::from_fn(|sensor| positions.get(sensor).len());
+    let observed = PerSensor::from_fn(|sensor| {
+        let noise = run.instrument.noise.get(sensor);
+        let positions = std::mem::take(positions.get_mut(sensor));
+        Observed {
+            errors: match sensor {
+                Sensor::Gyro => shortened(&positions, sigma),
+                Sensor::Accel => by_tilts(&positions, sigma),
+            },
+            ..Observed::over(positions, std::mem::take(times.get_mut(sensor)), noise)
+        }
+    });
+    let (estimate, mut findings) = both_triads(&observed, problem)?;
+    findings.extend(remarks(model, &estimate, Reference::Labels));
+    if !contradicted.is_empty() {
+        findings.push(Finding::LabelsContradicted { contradicted });
+    }
     if !lost.is_empty() {
         findings.push(Finding::SectionsLost { labels: lost });
     }
@@ -80,8 +127,8 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
         estimate,
         reference: Reference::Labels,
         positions: PerSensor {
-            gyro: positions.gyro.len() - turns,
-            accel: positions.accel.len(),
+            gyro: used.gyro - turns,
+            accel: used.accel,
         },
         turns,
         standing_time,
@@ -89,7 +136,7 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
 }
 
 /// Gravity along an axis. It is weighted as if nothing were known of how it falls on the other two axes:
-/// so the bias of each comes from its own two positions, as in half sums.
+/// so the bias of each comes from its own two positions, as in half sums. What falls there is of [`by_tilts`].
 fn force_by_hand(
     sigma: f64,
     force: Vector3<f64>,
@@ -97,30 +144,55 @@ fn force_by_hand(
     noise: Vector3<f64>,
 ) -> Position {
     Position {
+        variance: noise + along(sigma, &force),
         weighted: noise + across(&force),
         ..set_by_hand(sigma, force, output, noise)
     }
 }
 
+/// Variance of what a tilt takes off an input.
+fn along(sigma: f64, input: &Vector3<f64>) -> Vector3<f64> {
+    input.map(|component| (component * sigma.powi(2)).powi(2))
+}
+
 /// An input along or about an axis that is within a degree or so of where it should be, and this noise.
 ///
 /// To first order that turns the input into the other two axes. Along the axis it takes off the second
-/// order: half the sum of two squared angles, whose mean square is twice the fourth power of one's σ.
+/// order: half the sum of two squared angles. That is the square of σ in the mean, the same for all
+/// positions ([`shortened`]), and scatters by as much.
 fn set_by_hand(
     sigma: f64,
     input: Vector3<f64>,
     output: Vector3<f64>,
     noise: Vector3<f64>,
 ) -> Position {
-    let turn = sigma.powi(2);
-    let along = input.map(|component| 2.0 * (component * turn).powi(2));
-    let variance = noise + across(&input) * turn + along;
+    let variance = noise + across(&input) * sigma.powi(2) + along(sigma, &input);
     Position {
         input,
         output,
         variance,
         weighted: variance,
     }
+}
+
+/// What tilts of this σ take off all inputs in the mean.
+fn shortened(positions: &[Position], sigma: f64) -> DMatrix<f64> {
+    let inputs = positions.iter().flat_map(|p| <[f64; 3]>::from(p.input));
+    DMatrix::from_iterator(3 * positions.len(), 1, inputs) * -sigma.powi(2)
+}
+
+/// The same, and then what each position is tilted by about each axis, for misaligned axes bring that to
+/// the one that is up. Not so of turns: tilts of their own make what is found of misalignment there.
+fn by_tilts(positions: &[Position], sigma: f64) -> DMatrix<f64> {
+    let count = positions.len();
+    let mut errors = shortened(positions, sigma).resize_horizontally(1 + 3 * count, 0.0);
+    for (k, position) in positions.iter().enumerate() {
+        let turned = skew(position.input) * sigma;
+        errors
+            .fixed_view_mut::<3, 3>(3 * k, 1 + 3 * k)
+            .copy_from(&turned);
+    }
+    errors
 }
 
 #[cfg(test)]
@@ -130,7 +202,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    use super::super::least_squares::six_position_triad;
+    use super::super::least_squares::{Fit, determined};
     use super::*;
     use crate::attitude::exp;
     use crate::calibration::mean_square_interval;
@@ -141,6 +213,8 @@ mod tests {
     /// positions that are each off by random tilts.
     fn mean_squares(
         sets: usize,
+        tilt: f64,
+        errors: fn(&[Position], f64) -> DMatrix<f64>,
         make: impl Fn(&mut dyn FnMut(f64) -> Vector3<f64>, &Triad) -> Vec<Position>,
     ) -> [f64; 3] {
         let form = InstallationForm::General;
@@ -156,8 +230,14 @@ mod tests {
                 v * sigma
             };
             let positions = make(&mut draw, &truth);
-            let (found, covariance) = six_position_triad(&positions, form).unwrap();
-            let error = found.to_vector() - truth.to_vector();
+            let observed = Observed {
+                errors: errors(&positions, tilt),
+                ..Observed::independent(&positions)
+            };
+            let Fit {
+                triad, covariance, ..
+            } = determined(&observed, form).unwrap();
+            let error = triad.to_vector() - truth.to_vector();
             for (k, e) in error.iter().enumerate() {
                 let place = match Triad::kind(k) {
                     ParameterKind::Scale => 0,
@@ -175,7 +255,7 @@ mod tests {
     fn positions_that_a_hand_tilts_are_as_wrong_as_their_sigma_says() {
         const SETS: usize = 400;
         let (tilt, noise) = (2.0 * DEGREE, 2e-3);
-        let squares = mean_squares(SETS, |draw, truth| {
+        let squares = mean_squares(SETS, tilt, by_tilts, |draw, truth| {
             let axes = (0..6).map(|k| Vector3::ith(k / 2, if k % 2 == 0 { 9.8 } else { -9.8 }));
             axes.map(|force| {
                 let sensed = truth.output(&(exp(draw(tilt)) * force)) + draw(noise);
@@ -197,7 +277,7 @@ mod tests {
         const SETS: usize = 400;
         let (tilt, noise, duration) = (2.0 * DEGREE, 1e-4, 4.0);
         let end = tilt / duration;
-        let squares = mean_squares(SETS, |draw, truth| {
+        let squares = mean_squares(SETS, tilt, shortened, |draw, truth| {
             let turns = (0..3).map(|k| Vector3::ith(k, std::f64::consts::TAU / duration));
             let turns: Vec<_> = turns
                 .map(|rate| {

@@ -1,105 +1,231 @@
-//! Triads from positions with known input, by least squares.
+//! Triads from positions with known input, by generalised least squares.
 
-use faer::Mat;
-use faer::linalg::solvers::SolveLstsq;
-use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
-use super::super::coarse::{Equations, gauss_newton};
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
+use super::super::finding::Finding;
 use super::super::linearisation::singular;
 use super::super::parameters::{ParameterMatrix, from_vector, parameter};
 use super::super::problem::Problem;
+use super::super::residuals::Residuals;
+use super::observed::{NOISELESS, Observed, Position};
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
 use crate::run::Aiding;
 
-/// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Position {
-    /// Mean input along body axes, rad/s or m/s².
-    pub input: Vector3<f64>,
-    /// Mean normalised output, rad/s or m/s².
-    pub output: Vector3<f64>,
-    /// Variance of each output axis, (rad/s)² or (m/s²)².
-    pub variance: Vector3<f64>,
-    /// The same, by which it is weighted: the variance itself unless that would trust it too much.
-    pub weighted: Vector3<f64>,
-}
-
 /// Least eigenvalue of the correlations of a row's unknowns.
 const SMALLEST_EIGENVALUE: f64 = 1e-4;
+/// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
+const STEPS: usize = 6;
+/// A step below this part of the σ before is no step.
+const SMALL: f64 = 1e-6;
 
-/// Relative σ of an output for which no noise is stated.
-const NOISELESS: f64 = 1e-9;
+/// One triad with what its estimate follows.
+pub(super) struct Fit {
+    pub triad: Triad,
+    /// How parameters follow all outputs.
+    pub gain: DMatrix<f64>,
+    /// Of the parameters.
+    pub covariance: DMatrix<f64>,
+}
 
-/// Both triads from positions; with what is known beforehand where they do not determine a triad.
+/// Both triads from positions; with what is known beforehand where they do not determine a triad. Where
+/// residuals ring, σ are widened until they do not, and a finding says so.
 pub(super) fn both_triads(
-    positions: &PerSensor<Vec<Position>>,
+    observed: &PerSensor<Observed>,
     problem: &Problem,
-) -> Result<Estimate, CalibrationError> {
+) -> Result<(Estimate, Vec<Finding>), CalibrationError> {
     let form = problem.model.form;
     let mut covariance = ParameterMatrix::zeros();
     let mut triads = PerSensor::from_fn(|_| Triad::ideal(form));
+    let mut findings = Vec::new();
+    let mut common = Vec::new();
     for sensor in Sensor::ALL {
-        let positions = positions.get(sensor);
-        let (triad, of_triad) = match six_position_triad(positions, form) {
-            Some(determined) if knows_more(problem, sensor, &determined.1) => determined,
-            _ => with_prior(problem, sensor, positions)?,
+        let stated = observed.get(sensor);
+        let fit = fitted(stated, problem, sensor)?;
+        let residuals = left_by(stated, &fit.triad);
+        let rings = residuals
+            .as_ref()
+            .filter(|residuals| residuals.growth().is_some());
+        let fit = match rings {
+            None => fit,
+            Some(residuals) => {
+                let wider = stated.widened(unexplained(stated, &fit.triad));
+                let wider = fitted(&wider, problem, sensor)?;
+                let worst = residuals.worst(&by_position(stated.positions.len()));
+                let times = worst.groups.iter().map(|&k| stated.times[k]);
+                findings.push(Finding::ResidualsLarge {
+                    of: sensor.name(),
+                    chi_square: residuals.chi_square(),
+                    degrees: residuals.degrees(),
+                    limit: residuals.limit(),
+                    growth: largest_growth(&fit, &wider),
+                    worst: times.collect(),
+                    without: worst.without,
+                });
+                wider
+            }
         };
-        *triads.get_mut(sensor) = triad;
+        *triads.get_mut(sensor) = fit.triad;
         let first = parameter(sensor, 0);
         covariance
-            .fixed_view_mut::<PER_TRIAD, PER_TRIAD>(first, first)
-            .copy_from(&of_triad);
+            .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
+            .copy_from(&fit.covariance);
+        common.push(fit.gain * stated.output_errors(&fit.triad.sensitivity()));
     }
-    Ok(Estimate { triads, covariance })
+    // Both triads stand on one table.
+    if let [of_gyro, of_accel] = &common[..]
+        && of_gyro.ncols() == of_accel.ncols()
+    {
+        let across = of_gyro * of_accel.transpose();
+        let (gyro, accel) = (parameter(Sensor::Gyro, 0), parameter(Sensor::Accel, 0));
+        let size = (PER_TRIAD, PER_TRIAD);
+        covariance.view_mut((gyro, accel), size).copy_from(&across);
+        covariance
+            .view_mut((accel, gyro), size)
+            .copy_from(&across.transpose());
+    }
+    Ok((Estimate { triads, covariance }, findings))
+}
+
+/// What positions leave of any triad, their inputs' errors taken through this one.
+fn left_by(observed: &Observed, triad: &Triad) -> Option<Residuals> {
+    let inputs: Vec<Vector3<f64>> = observed.positions.iter().map(|p| p.input).collect();
+    let errors = observed
+        .positions
+        .iter()
+        .flat_map(|p| <[f64; 3]>::from(p.output - triad.output(&p.input)));
+    let errors = DVector::from_iterator(3 * inputs.len(), errors);
+    let covariance = observed.covariance(&triad.sensitivity());
+    let design = linear_design(&inputs, observed.size());
+    Residuals::new(&design, &errors, &covariance)
+}
+
+/// The variance that every axis of every position must have more for χ² of the residuals to be what is
+/// expected of it.
+///
+/// It is added, not multiplied: residuals may all be of axes across the input, where a table's attitude
+/// makes stated σ large, and say nothing of how far those along it, which tell scale factors, are off.
+fn unexplained(observed: &Observed, triad: &Triad) -> f64 {
+    /// A factor of two a step, down to rounding.
+    const HALVINGS: i32 = 60;
+    let errors = observed.positions.iter();
+    let errors = errors.map(|p| (p.output - triad.output(&p.input)).norm_squared());
+    let most: f64 = errors.sum();
+    let is_enough = |variance: f64| {
+        let residuals = left_by(&observed.widened(variance), triad);
+        residuals.is_none_or(|left| left.chi_square() <= left.degrees() as f64)
+    };
+    let halved = |times: i32| most * 0.5f64.powi(times);
+    let last = (0..HALVINGS).find(|&times| !is_enough(halved(times)));
+    let (mut low, mut high) = match last {
+        None => return halved(HALVINGS),
+        Some(times) => (halved(times), halved(times - 1)),
+    };
+    // χ² over its degrees of freedom scatters by far more than these leave.
+    for _ in 0..6 {
+        let middle = 0.5 * (low + high);
+        *if is_enough(middle) {
+            &mut high
+        } else {
+            &mut low
+        } = middle;
+    }
+    high
+}
+
+/// By how much the σ that grew most did.
+fn largest_growth(from: &Fit, to: &Fit) -> f64 {
+    let variances = from.covariance.diagonal();
+    let grown = to.covariance.diagonal();
+    let pairs = variances.iter().zip(&grown);
+    let ratios = pairs
+        .filter(|(before, _)| **before > 0.0)
+        .map(|(before, after)| after / before);
+    ratios.fold(1.0, f64::max).sqrt()
+}
+
+fn fitted(observed: &Observed, problem: &Problem, sensor: Sensor) -> Result<Fit, CalibrationError> {
+    match determined(observed, problem.model.form) {
+        Some(fit) if knows_more(problem, sensor, &fit.covariance) => Ok(fit),
+        _ => with_prior(problem, sensor, observed),
+    }
 }
 
 /// Whether positions alone know every parameter better than the prior does.
-fn knows_more(
-    problem: &Problem,
-    sensor: Sensor,
-    covariance: &SMatrix<f64, PER_TRIAD, PER_TRIAD>,
-) -> bool {
+fn knows_more(problem: &Problem, sensor: Sensor, covariance: &DMatrix<f64>) -> bool {
     (0..PER_TRIAD).all(|k| {
         let prior = problem.model.prior_sigma[parameter(sensor, k)];
         prior == 0.0 || covariance[(k, k)].sqrt() < prior
     })
 }
 
-/// One triad from positions and its prior, with the covariance of its parameters.
+/// One triad from positions and its prior.
 fn with_prior(
     problem: &Problem,
     sensor: Sensor,
-    positions: &[Position],
-) -> Result<(Triad, SMatrix<f64, PER_TRIAD, PER_TRIAD>), CalibrationError> {
+    observed: &Observed,
+) -> Result<Fit, CalibrationError> {
     // Inputs are along the axes of table or labels, so that no angle is a choice of the body frame.
     let mut model = problem.model.clone();
     model.aiding = Aiding::Table;
     let model = model.in_form(problem.run(), model.form);
-    let equations = |triads: &PerSensor<Triad>| {
-        let triad = triads.get(sensor);
-        let response = triad.response();
-        let mut equations = Equations::new(&model, triads, &[sensor]);
-        for position in positions {
-            let error = position.output - triad.output(&position.input);
-            for axis in 0..3 {
-                let input = position.input.push(1.0);
-                let row = TriadVector::from_fn(|k, _| (response[k] * input)[axis]);
-                equations.add(&[(sensor, row)], error[axis], position.variance[axis]);
-            }
-        }
-        Ok(equations)
-    };
     let prior = from_vector(model.form, &model.prior_mean);
-    let triads = gauss_newton(prior, equations)?;
-    let covariance = equations(&triads)?.covariance();
-    let first = parameter(sensor, 0);
-    let covariance = covariance.ok_or_else(|| singular(&triads))?;
-    let of_triad = covariance.fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
-    Ok((*triads.get(sensor), of_triad.into_owned()))
+    let mean = prior.get(sensor).to_vector();
+    let sigma = TriadVector::from_fn(|k, _| model.prior_sigma[parameter(sensor, k)]);
+    let rows = 3 * observed.positions.len();
+    let mut triad = *prior.get(sensor);
+    let step_to = |triad: &Triad| -> Option<(TriadVector, Fit)> {
+        let response = triad.response();
+        let mut design = DMatrix::zeros(rows, PER_TRIAD);
+        let mut errors = DVector::zeros(rows);
+        for (i, position) in observed.positions.iter().enumerate() {
+            let input = position.input.push(1.0);
+            for (k, response) in response.iter().enumerate() {
+                let column = (response * input) * sigma[k];
+                design.fixed_view_mut::<3, 1>(3 * i, k).copy_from(&column);
+            }
+            let error = position.output - triad.output(&position.input);
+            errors.fixed_rows_mut::<3>(3 * i).copy_from(&error);
+        }
+        // In units of the prior's σ.
+        let sensitivity = triad.sensitivity();
+        let weighted = observed.weights(&sensitivity).cholesky()?.solve(&design);
+        let information = DMatrix::identity(PER_TRIAD, PER_TRIAD) + weighted.tr_mul(&design);
+        let inverse = information.cholesky()?.inverse();
+        let gain = &inverse * weighted.transpose();
+        let off = DVector::from_fn(PER_TRIAD, |k, _| match sigma[k] > 0.0 {
+            true => (mean[k] - triad.to_vector()[k]) / sigma[k],
+            false => 0.0,
+        });
+        let step = &gain * errors + &inverse * off;
+        let covariance = &gain * observed.covariance(&sensitivity) * gain.transpose()
+            + &inverse * inverse.transpose();
+        let unscale = DMatrix::from_diagonal(&DVector::from_column_slice(sigma.as_slice()));
+        let fit = Fit {
+            triad: *triad,
+            gain: &unscale * gain,
+            covariance: &unscale * covariance * &unscale,
+        };
+        Some((TriadVector::from_fn(|k, _| step[k]), fit))
+    };
+    for _ in 0..STEPS {
+        let (step, _) = step_to(&triad).ok_or_else(|| singular(&prior))?;
+        if !step.iter().all(|v| v.is_finite()) {
+            return Err(singular(&prior));
+        }
+        triad = Triad::from_vector(
+            model.form,
+            &(triad.to_vector() + step.component_mul(&sigma)),
+        );
+        if step.amax() < SMALL {
+            break;
+        }
+    }
+    let (_, fit) = step_to(&triad).ok_or_else(|| singular(&prior))?;
+    Ok(fit)
 }
 
 /// One triad from positions: least squares for `A = K C` and `D` row by row, then the form's split.
@@ -109,71 +235,104 @@ pub fn six_position_triad(
     positions: &[Position],
     form: InstallationForm,
 ) -> Option<(Triad, SMatrix<f64, PER_TRIAD, PER_TRIAD>)> {
-    let size = positions.iter().map(|p| p.input.norm()).fold(0.0, f64::max);
-    if positions.len() < 4 || size <= 0.0 {
+    let fit = determined(&Observed::independent(positions), form)?;
+    let covariance = SMatrix::from_fn(|i, j| fit.covariance[(i, j)]);
+    Some((fit.triad, covariance))
+}
+
+/// The same with all that the positions have in common.
+pub(super) fn determined(observed: &Observed, form: InstallationForm) -> Option<Fit> {
+    let positions = &observed.positions;
+    let size = observed.size();
+    if positions.len() < 4 || size <= 0.0 || in_a_plane(positions, size) {
         return None;
     }
-    let mut a = Matrix3::zeros();
-    let mut bias = Vector3::zeros();
-    // Of the rows of A and of D, four numbers a row.
-    let mut covariance = [Matrix4::zeros(); 3];
-    // One scale for the inputs, so that columns are alike.
-    let unscale = Matrix4::from_diagonal(&Vector4::new(1.0 / size, 1.0 / size, 1.0 / size, 1.0));
-    for axis in 0..3 {
-        let sigma = |p: &Position| p.weighted[axis].sqrt().max(NOISELESS * size);
-        let design = Mat::from_fn(positions.len(), 4, |i, j| {
-            let p = &positions[i];
-            (if j < 3 { p.input[j] / size } else { 1.0 }) / sigma(p)
-        });
-        let outputs = Mat::from_fn(positions.len(), 1, |i, _| {
-            positions[i].output[axis] / sigma(&positions[i])
-        });
-        let information = Matrix4::from_fn(|i, j| {
-            (0..positions.len())
-                .map(|k| design[(k, i)] * design[(k, j)])
-                .sum()
-        });
-        // Positions in a plane leave an eigenvalue of nothing but rounding and table error, whatever the
-        // weights.
+    let inputs: Vec<Vector3<f64>> = positions.iter().map(|p| p.input).collect();
+    let design = linear_design(&inputs, size);
+    let outputs = positions.iter().flat_map(|p| <[f64; 3]>::from(p.output));
+    let outputs = DVector::from_iterator(design.nrows(), outputs);
+    let mut sensitivity = Matrix3::identity();
+    let mut found = None;
+    // What an error of the inputs does to the outputs takes the triad itself.
+    let rounds = if observed.errors.ncols() == 0 { 1 } else { 2 };
+    for _ in 0..rounds {
+        let factor = observed.weights(&sensitivity).cholesky()?.l();
+        let qr = factor.solve_lower_triangular(&design)?.qr();
+        // x = R⁻¹ Qᵀ L⁻¹ y: not by way of the squares of its equations.
+        let gain = qr.r().solve_upper_triangular(&qr.q().transpose())?;
+        let gain = factor
+            .tr_solve_lower_triangular(&gain.transpose())?
+            .transpose();
+        let unknowns = &gain * &outputs;
+        sensitivity = Matrix3::from_fn(|i, j| unknowns[4 * i + j] / size);
+        let bias = Vector3::from_fn(|i, _| unknowns[4 * i + 3]);
+        found = Some((gain, bias));
+    }
+    let (gain, bias) = found?;
+    let triad = Triad::from_sensitivity(form, &sensitivity, bias);
+    triad.correction()?;
+    let gain = split_jacobian(form, &sensitivity, &bias, size) * gain;
+    let covariance = &gain * observed.covariance(&sensitivity) * gain.transpose();
+    Some(Fit {
+        triad,
+        gain,
+        covariance,
+    })
+}
+
+/// Whether positions leave a row undetermined: in a plane they leave an eigenvalue of nothing but rounding
+/// and table error, whatever the weights.
+fn in_a_plane(positions: &[Position], size: f64) -> bool {
+    (0..3).any(|axis| {
+        let mut information = Matrix4::zeros();
+        for position in positions {
+            let row: Vector4<f64> = (position.input / size).push(1.0);
+            let variance = position.weighted[axis].max((NOISELESS * size).powi(2));
+            information += row * row.transpose() / variance;
+        }
         let diagonal = information.diagonal();
         if diagonal.min() <= 0.0 {
-            return None;
+            return true;
         }
         let weight = Matrix4::from_diagonal(&diagonal.map(|v: f64| v.sqrt().recip()));
         let correlations = weight * information * weight;
-        if correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE {
-            return None;
-        }
-        let solution = design.qr().solve_lstsq(&outputs);
-        for column in 0..3 {
-            a[(axis, column)] = solution[(column, 0)] / size;
-        }
-        bias[axis] = solution[(3, 0)];
-        // By weights that need not be the inverse variances.
-        let inverse = unscale * information.try_inverse()?;
-        for (k, position) in positions.iter().enumerate() {
-            let of_output = inverse * Vector4::from_fn(|j, _| design[(k, j)]) / sigma(position);
-            let variance = position.variance[axis].max((NOISELESS * size).powi(2));
-            covariance[axis] += of_output * variance * of_output.transpose();
-        }
-    }
-    let triad = Triad::from_sensitivity(form, &a, bias);
-    triad.correction()?;
-    Some((triad, split_covariance(form, &a, &bias, &covariance)))
+        correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE
+    })
 }
 
-/// The covariance of `A` and `D` carried through the form's split.
-fn split_covariance(
+/// Equations of a triad's outputs by `A` and `D`: three a position, twelve unknowns.
+pub(in crate::calibration) fn linear_design(inputs: &[Vector3<f64>], size: f64) -> DMatrix<f64> {
+    let mut design = DMatrix::zeros(3 * inputs.len(), 12);
+    for (k, input) in inputs.iter().enumerate() {
+        let row = (input / size).push(1.0).transpose();
+        for axis in 0..3 {
+            design
+                .fixed_view_mut::<1, 4>(3 * k + axis, 4 * axis)
+                .copy_from(&row);
+        }
+    }
+    design
+}
+
+/// The equations of each position.
+pub(in crate::calibration) fn by_position(positions: usize) -> Vec<Vec<usize>> {
+    (0..positions)
+        .map(|k| (3 * k..3 * k + 3).collect())
+        .collect()
+}
+
+/// How the parameters follow `A`, its inputs over their size, and `D`, row by row, through the form's split.
+fn split_jacobian(
     form: InstallationForm,
     a: &Matrix3<f64>,
     bias: &Vector3<f64>,
-    covariance: &[Matrix4<f64>; 3],
-) -> SMatrix<f64, PER_TRIAD, PER_TRIAD> {
+    size: f64,
+) -> DMatrix<f64> {
     /// The split is smooth at unit scale; central differences leave 1e-10 of relative error.
     const STEP: f64 = 1e-5;
-    let mut result = SMatrix::zeros();
-    for (axis, of_row) in covariance.iter().enumerate() {
-        let jacobian = SMatrix::<f64, PER_TRIAD, 4>::from_columns(&[0, 1, 2, 3].map(|k| {
+    let mut jacobian = DMatrix::zeros(PER_TRIAD, 12);
+    for axis in 0..3 {
+        for k in 0..4 {
             let shifted = |by: f64| -> TriadVector {
                 let (mut a, mut bias) = (*a, *bias);
                 if k < 3 {
@@ -183,11 +342,12 @@ fn split_covariance(
                 }
                 Triad::from_sensitivity(form, &a, bias).to_vector()
             };
-            (shifted(STEP) - shifted(-STEP)) / (2.0 * STEP)
-        }));
-        result += jacobian * of_row * jacobian.transpose();
+            let slope = (shifted(STEP) - shifted(-STEP)) / (2.0 * STEP);
+            let slope = if k < 3 { slope / size } else { slope };
+            jacobian.set_column(4 * axis + k, &slope);
+        }
     }
-    result
+    jacobian
 }
 
 /// How much of a small turn about any axis each component of an input sees, squared: the magnitude of the

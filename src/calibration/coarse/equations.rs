@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::super::error::CalibrationError;
 use super::super::linearisation::singular;
@@ -10,6 +10,7 @@ use super::super::model::Model;
 use super::super::parameters::{
     ParameterMatrix, ParameterVector, from_vector, parameter, to_vector,
 };
+use super::super::residuals::Residuals;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::navigation::Block;
 
@@ -22,23 +23,34 @@ const STEPS: usize = 6;
 const SMALL: f64 = 1e-6;
 
 /// Linear equations for the step δθ of the estimated parameters, each row divided by its σ.
-pub(in crate::calibration) struct Equations {
+pub(super) struct Equations {
     /// Indices of the parameters to be estimated.
     unknown: Vec<usize>,
     rows: Vec<(ParameterVector, f64)>,
+    /// Rows of the prior; they come first.
+    of_prior: usize,
+    /// Of each other row: its σ, and what its error is made of.
+    noise: Vec<(f64, ErrorOf)>,
+}
+
+/// What the error of an equation is made of.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ErrorOf {
+    /// Variance of what is its own.
+    pub own: f64,
+    /// By number, what it shares with other equations, and how much of that.
+    pub shared: Vec<(usize, f64)>,
 }
 
 impl Equations {
     /// The prior's equations, for these triads.
-    pub(in crate::calibration) fn new(
-        model: &Model,
-        at: &PerSensor<Triad>,
-        sensors: &[Sensor],
-    ) -> Self {
+    pub(super) fn new(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
         let at = to_vector(at);
         let mut equations = Self {
             unknown: Vec::new(),
             rows: Vec::new(),
+            of_prior: 0,
+            noise: Vec::new(),
         };
         for &sensor in sensors {
             for of_triad in 0..PER_TRIAD {
@@ -54,15 +66,18 @@ impl Equations {
                 }
             }
         }
+        equations.of_prior = equations.rows.len();
         equations
     }
 
-    /// An equation `error = Σ row δθ` of triads' parameters, its error of this variance.
-    pub(in crate::calibration) fn add(
+    /// An equation `error = Σ row δθ` of triads' parameters, weighted by a variance, and what its error is
+    /// made of.
+    pub(super) fn add(
         &mut self,
         rows: &[(Sensor, TriadVector)],
         error: f64,
-        variance: f64,
+        weighted: f64,
+        made_of: ErrorOf,
     ) {
         let mut whole = ParameterVector::zeros();
         for (sensor, row) in rows {
@@ -70,11 +85,11 @@ impl Equations {
                 .fixed_rows_mut::<PER_TRIAD>(parameter(*sensor, 0))
                 .copy_from(row);
         }
-        self.add_row(whole, error, variance);
+        self.add_row(whole, error, weighted, made_of);
     }
 
     /// Three equations `error = Φ δθ` with rows of a block from `first` on.
-    pub(in crate::calibration) fn add_block(
+    pub(super) fn add_block(
         &mut self,
         block: &Block,
         first: usize,
@@ -87,41 +102,89 @@ impl Equations {
                 row.fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
                     .copy_from(&block.parameters.get(sensor).row(first + axis).transpose());
             }
-            self.add_row(row, error[axis], variance);
+            let own = ErrorOf {
+                own: variance,
+                shared: Vec::new(),
+            };
+            self.add_row(row, error[axis], variance, own);
         }
     }
 
-    fn add_row(&mut self, row: ParameterVector, error: f64, variance: f64) {
-        let weight = 1.0 / (variance + ROUNDING.powi(2)).sqrt();
-        self.rows.push((row * weight, error * weight));
+    fn add_row(&mut self, row: ParameterVector, error: f64, variance: f64, made_of: ErrorOf) {
+        let sigma = (variance + ROUNDING.powi(2)).sqrt();
+        self.rows.push((row / sigma, error / sigma));
+        self.noise.push((sigma, made_of));
     }
 
-    /// Covariance of the unknown parameters; zero for all others. `None` if they are not determined.
-    pub(in crate::calibration) fn covariance(&self) -> Option<ParameterMatrix> {
-        let n = self.unknown.len();
-        let information = DMatrix::from_fn(n, n, |i, j| {
-            let (i, j) = (self.unknown[i], self.unknown[j]);
-            self.rows.iter().map(|(row, _)| row[i] * row[j]).sum()
-        });
-        let inverse = information.cholesky()?.inverse();
-        let mut covariance = ParameterMatrix::zeros();
-        for (i, &row) in self.unknown.iter().enumerate() {
-            for (j, &column) in self.unknown.iter().enumerate() {
-                covariance[(row, column)] = inverse[(i, j)];
+    /// Covariance of the errors of all rows but the prior's, each over its σ, by that of what they share.
+    fn errors(&self, shared: &DMatrix<f64>) -> DMatrix<f64> {
+        let count = self.noise.len();
+        let mut parts = DMatrix::zeros(count, shared.ncols());
+        for (row, (sigma, made_of)) in self.noise.iter().enumerate() {
+            for &(number, part) in &made_of.shared {
+                parts[(row, number)] += part / sigma;
             }
         }
-        Some(covariance)
+        let mut covariance = &parts * shared * parts.transpose();
+        for (row, (sigma, made_of)) in self.noise.iter().enumerate() {
+            covariance[(row, row)] += (made_of.own + ROUNDING.powi(2)) / sigma.powi(2);
+        }
+        covariance
     }
 
-    /// Mean square of the errors, each over its σ and the prior's included; one if nothing but noise is
-    /// left.
-    pub(in crate::calibration) fn misfit(&self) -> f64 {
-        let sum: f64 = self.rows.iter().map(|(_, error)| error.powi(2)).sum();
-        sum / (self.rows.len() - self.unknown.len()) as f64
+    /// The rows but the prior's, one column for each unknown, and their errors.
+    fn of_data(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let rows = &self.rows[self.of_prior..];
+        (
+            DMatrix::from_fn(rows.len(), self.unknown.len(), |i, j| {
+                rows[i].0[self.unknown[j]]
+            }),
+            DVector::from_fn(rows.len(), |i, _| rows[i].1),
+        )
+    }
+
+    /// What all rows but the prior's leave, by the covariance of what their errors share.
+    pub(super) fn residuals(&self, shared: &DMatrix<f64>) -> Option<Residuals> {
+        let (design, errors) = self.of_data();
+        Residuals::new(&design, &errors, &self.errors(shared))
+    }
+
+    /// Covariance of the unknown parameters as these weights find them, by the covariance of what errors
+    /// share, all σ but the prior's so many times as large; zero for all others. `None` if they are not
+    /// determined.
+    pub(super) fn covariance_by(
+        &self,
+        shared: &DMatrix<f64>,
+        growth: f64,
+    ) -> Option<ParameterMatrix> {
+        let (design, _) = self.of_data();
+        let n = self.unknown.len();
+        let of_prior = DMatrix::from_fn(n, n, |i, j| {
+            let (i, j) = (self.unknown[i], self.unknown[j]);
+            let rows = self.rows[..self.of_prior].iter();
+            rows.map(|(row, _)| row[i] * row[j]).sum()
+        });
+        let square = growth.powi(2);
+        let inverse = (&of_prior + design.tr_mul(&design) / square)
+            .cholesky()?
+            .inverse();
+        let of_errors = design.tr_mul(&(self.errors(shared) * &design)) / square;
+        Some(self.whole(&(&inverse * (of_prior + of_errors) * &inverse)))
+    }
+
+    /// A matrix of the unknown among all parameters.
+    fn whole(&self, of_unknown: &DMatrix<f64>) -> ParameterMatrix {
+        let mut whole = ParameterMatrix::zeros();
+        for (i, &row) in self.unknown.iter().enumerate() {
+            for (j, &column) in self.unknown.iter().enumerate() {
+                whole[(row, column)] = of_unknown[(i, j)];
+            }
+        }
+        whole
     }
 
     /// The step δθ of least squares.
-    pub(in crate::calibration) fn solve(&self) -> ParameterVector {
+    pub(super) fn solve(&self) -> ParameterVector {
         let a = Mat::from_fn(self.rows.len(), self.unknown.len(), |i, j| {
             self.rows[i].0[self.unknown[j]]
         });
@@ -136,7 +199,7 @@ impl Equations {
 }
 
 /// Steps from a first point on, each by equations made there, until they are small.
-pub(in crate::calibration) fn gauss_newton(
+pub(super) fn gauss_newton(
     from: PerSensor<Triad>,
     equations: impl Fn(&PerSensor<Triad>) -> Result<Equations, CalibrationError>,
 ) -> Result<PerSensor<Triad>, CalibrationError> {

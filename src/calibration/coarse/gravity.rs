@@ -6,7 +6,8 @@ use super::super::error::CalibrationError;
 use super::super::linearisation::singular;
 use super::super::parameters::from_vector;
 use super::super::problem::Problem;
-use super::equations::{Equations, gauss_newton};
+use super::equations::{Equations, ErrorOf, gauss_newton};
+use super::shared_noise::{SharedNoise, along, of_biases};
 use crate::imu::{PARAMETERS, PerSensor, Sensor, Triad};
 
 /// The accelerometers that sense `|f| = g` in every dwell, whichever way up; the prior ties down what
@@ -32,13 +33,20 @@ pub(super) fn add_magnitude(
 ) -> Result<(), CalibrationError> {
     let triad = &triads.accel;
     let correction = triad.correction().ok_or_else(|| singular(triads))?;
+    let shared = SharedNoise::of(problem);
+    let mut number = 0;
     for stretch in problem.stretches() {
         for dwell in &stretch.dwells {
             let rest = dwell.mean(Sensor::Accel, stretch.run);
             let force = correction * (rest.output - triad.bias);
             let row = input_errors(triad, &correction, &force).tr_mul(&force.normalize());
             let error = force.norm() - stretch.run.site.gravity;
-            equations.add(&[(Sensor::Accel, row)], error, rest.variance);
+            let made_of = ErrorOf {
+                own: 0.0,
+                shared: along(shared.at_rest(Sensor::Accel, number), &of_biases(&row)),
+            };
+            equations.add(&[(Sensor::Accel, row)], error, rest.variance, made_of);
+            number += 1;
         }
     }
     Ok(())

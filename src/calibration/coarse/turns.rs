@@ -1,15 +1,16 @@
 //! Gyros and attitudes from gravity's direction and the rates at rest.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
 use super::super::error::CalibrationError;
 use super::super::linearisation::{Linearisation, singular};
 use super::super::model::Model;
 use super::super::parameters::{from_vector, to_vector};
 use super::super::problem::{Problem, Stretch};
-use super::equations::Equations;
+use super::equations::{Equations, ErrorOf};
 use super::gravity::{add_magnitude, input_errors};
 use super::heading::{Heading, Rest, gyrocompass};
+use super::shared_noise::{SharedNoise, along, of_biases};
 use crate::attitude::{exp, level, skew, tilt};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PARAMETERS, PerSensor, Sensor, TermVector, Triad};
@@ -30,6 +31,8 @@ pub(super) struct Turned {
     pub heading_sigma: Vec<f64>,
     /// What they are found from, made at them.
     pub equations: Equations,
+    /// Covariance of what their errors share.
+    pub shared: DMatrix<f64>,
 }
 
 /// The gyros and the attitudes, and with them the accelerometers, whose installation the magnitude of
@@ -99,14 +102,24 @@ pub(super) fn triads_and_attitudes(
         if sensors.contains(&Sensor::Accel) {
             add_magnitude(&mut equations, problem, &at.triads)?;
         }
+        let mut place = Place {
+            shared: SharedNoise::of(problem),
+            first: 0,
+            stretch: 0,
+        };
         let parts = chains.iter().zip(stretches).zip(&rests);
         for (((chain, stretch), rests), heading) in parts.zip(&compass.headings) {
-            chain.add(&mut equations, stretch, &at.triads, rests, heading)?;
+            chain.add(&mut equations, stretch, &at.triads, rests, heading, &place)?;
+            place.first += rests.len();
+            place.stretch += 1;
         }
         if round == ROUNDS {
+            let heading_sigma: Vec<f64> = compass.headings.iter().map(|h| h.sigma).collect();
+            let known: Vec<f64> = heading_sigma.iter().copied().map(known_heading).collect();
             return Ok(Turned {
                 at,
-                heading_sigma: compass.headings.iter().map(|h| h.sigma).collect(),
+                heading_sigma,
+                shared: place.shared.covariance(problem, &known),
                 equations,
             });
         }
@@ -154,9 +167,13 @@ struct Turn {
     block: Block,
     /// The tilt that the gyros are wrong by after it, `C_computed = (I − [φ×]) C_true`.
     tilt: Vector3<f64>,
-    /// The tilt by the error of each accelerometer parameter, which tells Up before and after it.
-    of_accel: SMatrix<f64, 3, PARAMETERS>,
-    /// Variance of each of its two components.
+    /// The tilt by the error of each accelerometer parameter, which tells Up before …
+    of_before: SMatrix<f64, 3, PARAMETERS>,
+    /// … and after it.
+    of_after: SMatrix<f64, 3, PARAMETERS>,
+    /// Variance of each of its two components, by the random walk of the gyros …
+    walk: f64,
+    /// … and with that of Up.
     variance: f64,
 }
 
@@ -182,14 +199,15 @@ impl Chain {
                 .advance(before.samples.end..after.samples.start);
             let tilt = tilt(&(block.state.attitude * up.1.direction));
             let attitude = exp(tilt) * block.state.attitude;
-            let observed = attitude * up.1.error - start.attitude * up.0.error;
+            let level = -skew(Vector3::z());
+            let walk = walk.gyro.powi(2) * block.duration;
             attitudes.push(attitude);
             turns.push(Turn {
                 tilt,
-                of_accel: -skew(Vector3::z()) * observed,
-                variance: walk.gyro.powi(2) * block.duration
-                    + of_gravity(before)
-                    + of_gravity(after),
+                of_before: -level * start.attitude * up.0.error,
+                of_after: level * attitude * up.1.error,
+                walk,
+                variance: walk + of_gravity(before) + of_gravity(after),
                 block,
             });
         }
@@ -203,12 +221,14 @@ impl Chain {
         for Turn {
             block,
             tilt,
-            of_accel,
+            of_before,
+            of_after,
             ..
         } in &mut self.turns
         {
             *tilt = turn * *tilt;
-            *of_accel = turn * *of_accel;
+            *of_before = turn * *of_before;
+            *of_after = turn * *of_after;
             for mut column in block.parameters.gyro.column_iter_mut() {
                 let turned = turn * column.fixed_rows::<3>(0);
                 column.fixed_rows_mut::<3>(0).copy_from(&turned);
@@ -232,7 +252,7 @@ impl Chain {
         pairs.map(rest).collect()
     }
 
-    /// Adds what moves and rates at rest say.
+    /// Adds what moves and rates at rest say; `place` numbers what their errors share.
     fn add(
         &self,
         equations: &mut Equations,
@@ -240,30 +260,100 @@ impl Chain {
         triads: &PerSensor<Triad>,
         rests: &[MeanOutput],
         heading: &Heading,
+        place: &Place,
     ) -> Result<(), CalibrationError> {
         let triad = &triads.gyro;
         let correction = triad.correction().ok_or_else(|| singular(triads))?;
+        let earth_rate = stretch.run.site.earth_rate_n();
+        // What a heading that is wrong by an angle of one makes of Earth rate.
+        let turned = Vector3::z().cross(&earth_rate);
+        let Place {
+            shared,
+            first,
+            stretch: number,
+        } = *place;
         // As much of Earth rate as heading may be wrong by, all of it at most.
-        let of_heading = (ROTATION_RATE * heading.sigma.clamp(1e-3, 1.0)).powi(2);
-        for turn in &self.turns {
+        let of_heading = (ROTATION_RATE * known_heading(heading.sigma)).powi(2);
+        for (before, turn) in self.turns.iter().enumerate() {
             let variance = turn.variance + of_heading * turn.block.duration.powi(2);
+            let (before, after) = (first + before, first + before + 1);
             for axis in 0..2 {
+                let row = |of: &SMatrix<f64, 3, PARAMETERS>| of.row(axis).transpose();
                 let of_gyro = turn.block.parameters.gyro.row(axis).transpose();
-                let of_accel = turn.of_accel.row(axis).transpose();
-                let rows = [(Sensor::Gyro, of_gyro), (Sensor::Accel, of_accel)];
-                equations.add(&rows, turn.tilt[axis], variance);
+                let (of_before, of_after) = (row(&turn.of_before), row(&turn.of_after));
+                let at_rest = |dwell| shared.at_rest(Sensor::Accel, dwell);
+                let mut parts = along(at_rest(before), &of_biases(&of_before));
+                parts.extend(along(at_rest(after), &of_biases(&of_after)));
+                parts.extend(along(shared.before(after), &of_biases(&of_gyro)));
+                let by_heading = -turned[axis] * turn.block.duration;
+                parts.push((shared.heading(number), by_heading));
+                let made_of = ErrorOf {
+                    own: turn.walk,
+                    shared: parts,
+                };
+                let rows = [
+                    (Sensor::Gyro, of_gyro),
+                    (Sensor::Accel, of_before + of_after),
+                ];
+                equations.add(&rows, turn.tilt[axis], variance, made_of);
             }
         }
-        for (attitude, rest) in self.attitudes.iter().zip(rests) {
+        for (dwell, (attitude, rest)) in self.attitudes.iter().zip(rests).enumerate() {
             let rate = correction * (rest.output - triad.bias);
-            let error = rate - attitude.tr_mul(&stretch.run.site.earth_rate_n());
+            let error = rate - attitude.tr_mul(&earth_rate);
+            let by_heading = attitude.tr_mul(&turned);
             let errors = input_errors(triad, &correction, &rate);
             for axis in 0..3 {
                 let row = errors.row(axis).transpose();
+                let at_rest = shared.at_rest(Sensor::Gyro, first + dwell);
+                let mut parts = along(at_rest, &of_biases(&row));
+                parts.push((shared.heading(number), by_heading[axis]));
+                let made_of = ErrorOf {
+                    own: 0.0,
+                    shared: parts,
+                };
                 let variance = rest.variance + of_heading;
-                equations.add(&[(Sensor::Gyro, row)], error[axis], variance);
+                equations.add(&[(Sensor::Gyro, row)], error[axis], variance, made_of);
             }
         }
         Ok(())
     }
+}
+
+/// Where a stretch has its share of what errors have in common.
+struct Place {
+    shared: SharedNoise,
+    /// Place of its first dwell among those of all stretches.
+    first: usize,
+    /// Its own place.
+    stretch: usize,
+}
+
+/// σ of a heading as it is used, rad: beyond a radian nothing is known of it.
+fn known_heading(sigma: f64) -> f64 {
+    sigma.clamp(1e-3, 1.0)
+}
+
+/// The equations of each dwell and of each move, in the order in which they are added, with begin and end
+/// of each in s.
+pub(super) fn dwells_and_moves(problem: &Problem) -> (Vec<Vec<usize>>, Vec<[f64; 2]>) {
+    let (mut groups, mut times) = (Vec::new(), Vec::new());
+    // First the magnitude of gravity in every dwell.
+    let mut next = problem.dwells().count();
+    let mut number = 0;
+    for stretch in problem.stretches() {
+        for pair in stretch.dwells.windows(2) {
+            let [before, after] = [&pair[0], &pair[1]].map(|dwell| dwell.times(stretch.run));
+            groups.push((next..next + 2).collect());
+            times.push([before[1], after[0]]);
+            next += 2;
+        }
+        for dwell in &stretch.dwells {
+            groups.push(std::iter::once(number).chain(next..next + 3).collect());
+            times.push(dwell.times(stretch.run));
+            next += 3;
+            number += 1;
+        }
+    }
+    (groups, times)
 }

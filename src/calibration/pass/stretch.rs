@@ -20,6 +20,9 @@ use crate::navigation::{Navigator, State, TermValues};
 
 /// After this many rejections in a row the gate doubts itself rather than the data.
 const REOPEN: usize = 5;
+/// So many right behind the only one that was let in speak against that one: it alone had a wide
+/// innovation covariance, and two outliers in a row are rarer than one.
+const BEHIND_THE_FIRST: usize = 2;
 /// At most this many observations of a dwell are left out for having closed the gate.
 const MOST_CLOSING: usize = 3;
 /// Spacing of the history, s.
@@ -168,17 +171,24 @@ impl<'a> OneStretch<'a> {
         if matches!(self.mode, Mode::Held(Gate::As(_))) {
             return None;
         }
-        let closed = self.row.iter().any(|&row| row >= REOPEN);
-        if !closed || self.closing.len() >= MOST_CLOSING {
+        if self.closing.len() >= MOST_CLOSING {
             return None;
         }
-        let of_dwell = self.sums.innovations.iter().enumerate();
-        let of_dwell = of_dwell.skip(begin.innovations);
-        let row = |i: &Innovation| self.row[i.observation as usize];
-        of_dwell
-            .filter(|(_, i)| i.accepted && row(i) >= REOPEN)
-            .map(|(index, _)| index)
-            .next()
+        let row = |kind: Observation| self.row[kind as usize];
+        let mut closed = Observation::ALL
+            .into_iter()
+            .filter(|&kind| row(kind) >= BEHIND_THE_FIRST);
+        closed.find_map(|kind| {
+            let of_dwell = self.sums.innovations.iter().enumerate();
+            let of_kind = of_dwell.skip(begin.innovations);
+            let mut let_in = of_kind.filter(|(_, i)| i.accepted && i.observation == kind);
+            let (first, _) = let_in.next()?;
+            let most = match let_in.next() {
+                Some(_) => REOPEN,
+                None => BEHIND_THE_FIRST,
+            };
+            (row(kind) >= most).then_some(first)
+        })
     }
 
     fn go_back(&mut self, begin: &Begin<'a>, closing: usize) {

@@ -9,7 +9,8 @@ use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::recording::{Fault, LabelledMotion};
 use crate::run::Run;
-use crate::survey::{LabelCheck, MethodOutlook, Rest, Survey, Turn, Verdict};
+use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
+use crate::survey::{MethodOutlook, Survey};
 use crate::units::DEGREE;
 
 pub(super) fn data(run: &Run, survey: &Survey) -> Value {
@@ -146,7 +147,7 @@ fn turn(run: &Run, survey: &Survey, turn: &Turn) -> Value {
 fn section(check: &LabelCheck) -> Value {
     let (off, moving, found) = match check.verdict {
         Verdict::Unknown => (None, None, None),
-        Verdict::Position { off, moving } => (Some(off), Some(moving), None),
+        Verdict::Position { off, moving, .. } => (Some(off), Some(moving), None),
         Verdict::Turn { angle, off, .. } => (Some(off), None, Some(angle)),
     };
     let labelled = match check.segment.motion {

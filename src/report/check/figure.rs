@@ -4,7 +4,8 @@ use super::super::plot::{Axis, Color, Mark, Panel, Plot, Series};
 use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::run::Run;
-use crate::survey::{Rest, Survey, Turn};
+use crate::run::motion::{Rest, Turn};
+use crate::survey::Survey;
 use crate::units::DEGREE;
 
 pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {

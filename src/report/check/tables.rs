@@ -7,7 +7,8 @@ use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
 use crate::recording::{Fault, LabelledMotion};
 use crate::run::Run;
-use crate::survey::{LabelCheck, Rest, Survey, Turn, Verdict};
+use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
+use crate::survey::Survey;
 use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 
 /// Faults beyond so many are not listed one by one.
@@ -151,7 +152,7 @@ fn moved(turn: &Turn, survey: &Survey) -> [String; 4] {
 pub(super) fn labels(survey: &Survey) -> Table {
     let row = |check: &LabelCheck| {
         let found = match (&check.verdict, check.segment.motion) {
-            (Verdict::Position { off, moving }, _) if *moving > 0.0 => {
+            (Verdict::Position { off, moving, .. }, _) if *moving > 0.0 => {
                 format!(
                     "{}° off, moves for {} s",
                     degrees(*off),

@@ -3,9 +3,9 @@
 use super::super::number::{count, three_digits, value};
 use crate::calibration::Mounting;
 use crate::imu::AXES;
-use crate::recording::LabelledMotion;
 use crate::run::Run;
-use crate::survey::{APART, LabelCheck, Survey, Turn, Verdict};
+use crate::run::motion::{LabelCheck, Turn};
+use crate::survey::{APART, Survey};
 use crate::units::DEGREE;
 
 /// Specific force at rest further from gravity than this part of it has a wrong unit or scale.
@@ -187,35 +187,12 @@ fn dwells(places: &[usize]) -> String {
 
 /// What a label and the record disagree in.
 pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
-    if check.agrees() {
-        return None;
-    }
-    let label = &check.segment.label;
-    let at = format!("{} s", value(check.segment.start, 1.0));
-    let said = match (&check.verdict, check.segment.motion) {
-        (Verdict::Unknown, _) => {
-            "is no position (x_up … z_down) and no turn (rot_x+360): it has no effect".to_owned()
-        }
-        (Verdict::Position { off, .. }, _) if *off > 30.0 * DEGREE => format!(
-            "is {}° off the plumb line: another axis is up; correct the label or body_axes",
-            degrees(*off)
-        ),
-        (Verdict::Position { moving, .. }, _) => format!(
-            "moves for {} s of its time: draw its borders closer",
-            value(*moving, 1.0)
-        ),
-        (Verdict::Turn { cut: true, .. }, _) => {
-            "begins or ends within the turn: draw its borders wider, to where it is stationary"
-                .to_owned()
-        }
-        (Verdict::Turn { angle, .. }, Some(LabelledMotion::Turns { angle: said, .. })) => format!(
-            "turns by {}° about its axis, not {}°: correct axis, sign or angle of the label, or the gyros' scale",
-            signed(*angle),
-            signed(said)
-        ),
-        (Verdict::Turn { .. }, _) => "is no turn".to_owned(),
-    };
-    Some(format!("Section `{label}` at {at} {said}."))
+    let said = check.disagreement()?;
+    let at = value(check.segment.start, 1.0);
+    Some(format!(
+        "Section `{}` at {at} s {said}.",
+        check.segment.label
+    ))
 }
 
 /// What positions and turns lack.

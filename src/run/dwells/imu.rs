@@ -75,7 +75,7 @@ impl Windows {
 
 impl Run {
     /// Stretches during which the gyros say what they say at rest and the accelerometers do not change.
-    pub(super) fn standstills_of_imu(&self) -> Vec<Dwell> {
+    pub(in crate::run) fn standstills_of_imu(&self) -> Vec<Dwell> {
         let length = ((WINDOW / self.recording.imu.period).round() as usize).max(1);
         let gyro = self.windows(Sensor::Gyro, length);
         let accel = self.windows(Sensor::Accel, length);

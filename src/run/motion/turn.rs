@@ -112,7 +112,7 @@ pub(super) fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
 }
 
 /// What turns from rest to rest, or in sections labelled as turns.
-pub(super) fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
+pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
     let between = rests.windows(2).enumerate().map(|(from, pair)| {
         let samples = pair[0].dwell.samples.end..pair[1].dwell.samples.start;
         (Some(from), samples)

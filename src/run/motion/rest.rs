@@ -83,8 +83,8 @@ pub(super) fn mean(run: &Run, dwell: &Dwell, sensor: Sensor) -> Vector3<f64> {
     dwell.mean(sensor, run).output
 }
 
-/// Where it stands.
-pub(super) fn rests(run: &Run) -> Vec<Rest> {
+/// Where it stands, in order.
+pub fn rests(run: &Run) -> Vec<Rest> {
     let rests = run.dwells(run.aiding()).into_iter();
     rests.map(|dwell| Rest::of(run, dwell)).collect()
 }
