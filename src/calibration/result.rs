@@ -96,7 +96,7 @@ pub struct Calibration {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// The same as values: kind, words, figures.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub findings: Vec<FindingRecord>,
     /// Names of parameters that were not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

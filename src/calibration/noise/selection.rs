@@ -70,43 +70,34 @@ impl Likelihood<'_> {
         Ok(called_for.map(|i| present[i]).collect())
     }
 
-    /// Sets those sources back to what is stated, one after the other, that the others make needless.
+    /// Sets those sources back to what is stated, one after the other, that the others make needless; the
+    /// least of them first.
     fn without_the_needless(
         &self,
         mut selection: Selection,
     ) -> Result<Selection, CalibrationError> {
-        let mut needed: Vec<usize> = Vec::new();
-        loop {
+        let as_stated = |k: &usize, fit: &Fit| fit.factors.0[*k] == self.scale.needless(*k);
+        selection.sources.retain(|k| !as_stated(k, &selection.fit));
+        let wald = self.wald(&selection.fit, &selection.sources)?;
+        let each = selection.sources.iter().copied().zip(wald);
+        // Near zero a variance's own interval is too wide: beyond the limit it is needed for sure.
+        let doubtful = each.filter(|&(k, wald)| wald < self.limit_of_one(k));
+        let mut doubtful: Vec<(usize, f64)> = doubtful.collect();
+        doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for (source, _) in doubtful {
             let Selection { fit, sources } = &selection;
-            let wald = self.wald(fit, sources)?;
-            let likeliest = sources
-                .iter()
-                .zip(wald)
-                .filter(|(k, _)| !needed.contains(k))
-                .min_by(|a, b| a.1.total_cmp(&b.1));
-            // Near zero a variance's own interval is too wide: beyond the limit it is needed for sure.
-            let Some((&source, _)) = likeliest.filter(|&(&k, wald)| wald < self.limit_of_one(k))
-            else {
-                return Ok(selection);
-            };
-            let others = sources.iter().copied().filter(|&k| k != source);
-            let others: Vec<usize> = others.collect();
+            let others: Vec<usize> = sources.iter().copied().filter(|&k| k != source).collect();
             let mut start = fit.factors;
             start.0[source] = self.scale.needless(source);
-            let without = if start.0[source] == fit.factors.0[source] {
-                fit.clone()
-            } else {
-                self.fit(&start, &others)?
-            };
+            let without = self.fit(&start, &others)?;
             if without.deviance - fit.deviance < self.limit_of_one(source) {
                 selection = Selection {
                     fit: without,
                     sources: others,
                 };
-            } else {
-                needed.push(source);
             }
         }
+        Ok(selection)
     }
 
     /// How far each of these sources is from what is stated, squared and over its variance (Wald).
@@ -115,9 +106,6 @@ impl Likelihood<'_> {
         let of = |(&k, sigma): (&usize, Option<f64>)| {
             let (factor, stated) = (fit.factors.0[k], self.scale.needless(k));
             let Some(sigma) = sigma else { return 0.0 };
-            if factor == stated {
-                return 0.0;
-            }
             // 1σ is of ln σ, that of the variance twice as much of it.
             let distance = if stated > 0.0 {
                 0.5 * (factor / stated).ln()
