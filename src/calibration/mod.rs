@@ -73,7 +73,7 @@ pub use innovation::{
     Consistency, Inconsistency, Innovation, Look, Nis, Observation, mean_square_interval,
 };
 pub use linearisation::{AttitudePrior, Linearisation};
-pub use model::{Model, MotionNoise};
+pub use model::Model;
 pub use mounting::Mounting;
 pub use nees::{Nees, nees};
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};

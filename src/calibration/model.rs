@@ -7,8 +7,8 @@ use super::options::Options;
 use super::parameters::{ParameterVector, parameter, to_vector};
 use super::standstill::FLOOR;
 use crate::imu::{
-    GaussMarkov, InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, TermVector,
-    Triad,
+    GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
+    TermVector, Triad,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
@@ -61,15 +61,6 @@ pub struct Model {
     table_axes: usize,
 }
 
-/// White noise that a triad has in moves beside that at rest, 1σ densities as in [`ProcessNoise`].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MotionNoise {
-    /// By how fast a move is, √s.
-    pub by_motion: f64,
-    /// By how long it takes, rad/√s or (m/s)/√s.
-    pub by_duration: f64,
-}
-
 impl Model {
     /// The model of a run: what the run states, and what the options ask for beside it.
     pub fn new(run: &Run, options: &Options) -> Self {
@@ -83,9 +74,9 @@ impl Model {
             prior_mean: ParameterVector::zeros(),
             prior_sigma: ParameterVector::zeros(),
             noise: run.instrument.noise,
-            motion_noise: PerSensor::default(),
+            motion_noise: run.instrument.motion_noise,
             stillness: PerSensor::default(),
-            turning_at_rest: 0.0,
+            turning_at_rest: run.standstill.turning,
             term_sigma: run.instrument.term_sigma,
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,

@@ -12,7 +12,8 @@ use super::imu_log::{ImuLog, TimeStamp};
 use super::quantity::{OUTPUTS, units};
 use crate::imu::NoiseKeys;
 use crate::imu::{
-    GaussMarkov, Instrument, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term, TermVector,
+    GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
+    TermVector,
 };
 use crate::units::{ARCSEC, PPM};
 
@@ -95,6 +96,7 @@ impl<'a> InstrumentFields<'a> {
         )?;
         let gyro = triad(&fields, &priors, Sensor::Gyro, output, axes)?;
         let accel = triad(&fields, &priors, Sensor::Accel, output, axes)?;
+        let (noise, motion_noise) = noise(&fields, notes)?;
         Ok(Self {
             log: ImuLog {
                 file: directory.join(fields.need("file", "a file name")?.text()?),
@@ -139,7 +141,8 @@ impl<'a> InstrumentFields<'a> {
                     gyro: gyro.prior,
                     accel: accel.prior,
                 },
-                noise: noise(&fields, notes)?,
+                noise,
+                motion_noise,
                 term_sigma: term_sigma(&fields)?,
             },
         })
@@ -167,12 +170,12 @@ fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
     Ok(sigma)
 }
 
-fn noise(imu: &Fields, notes: &mut Vec<String>) -> Result<PerSensor<Noise>, FileError> {
+fn noise(
+    imu: &Fields,
+    notes: &mut Vec<String>,
+) -> Result<(PerSensor<Noise>, PerSensor<MotionNoise>), FileError> {
     let keys = Sensor::ALL.map(NoiseKeys::of);
-    let known = keys.map(|keys| {
-        let (walk, sigma) = (keys.random_walk.0, keys.gauss_markov.0);
-        [walk, sigma, keys.correlation_time, keys.former]
-    });
+    let known = keys.map(NoiseKeys::names);
     let fields = imu.need_table("noise", known.as_flattened(), "the noise of the instrument")?;
     let mut triad = |keys: NoiseKeys| {
         let ((walk, walk_unit), (sigma, sigma_unit)) = (keys.random_walk, keys.gauss_markov);
@@ -198,16 +201,30 @@ fn noise(imu: &Fields, notes: &mut Vec<String>) -> Result<PerSensor<Noise>, File
                 return Err(fields.missing(sigma, "the 1σ of the Gauss–Markov bias"));
             }
         };
-        Ok(Noise {
-            random_walk: fields.need(walk, "a random walk")?.not_negative()? * walk_unit,
-            gauss_markov,
-        })
+        let of_moves = |name: &str| match fields.get(name) {
+            Some(field) => field.not_negative(),
+            None => Ok(0.0),
+        };
+        let (by_duration, unit) = keys.by_duration;
+        Ok((
+            Noise {
+                random_walk: fields.need(walk, "a random walk")?.not_negative()? * walk_unit,
+                gauss_markov,
+            },
+            MotionNoise {
+                by_motion: of_moves(keys.by_motion)?,
+                by_duration: of_moves(by_duration)? * unit,
+            },
+        ))
     };
-    let [gyro, accel] = keys;
-    Ok(PerSensor {
-        gyro: triad(gyro)?,
-        accel: triad(accel)?,
-    })
+    let [of_gyro, of_accel] = keys;
+    let (gyro, gyro_in_moves) = triad(of_gyro)?;
+    let (accel, accel_in_moves) = triad(of_accel)?;
+    let in_moves = PerSensor {
+        gyro: gyro_in_moves,
+        accel: accel_in_moves,
+    };
+    Ok((PerSensor { gyro, accel }, in_moves))
 }
 
 /// Unit, nominal scale and prior of a triad, along right-front-up.

@@ -222,6 +222,7 @@ fn standstill(top: &Fields) -> Result<Standstill, FileError> {
         &[
             "velocity_sigma_m_s",
             "attitude_sigma_arcsec",
+            "turning_deg_per_sqrt_s",
             "position_sigma_m",
         ],
     )? {
@@ -230,6 +231,9 @@ fn standstill(top: &Fields) -> Result<Standstill, FileError> {
         }
         if let Some(field) = fields.get("attitude_sigma_arcsec") {
             standstill.sigma.gyro = Some(field.positive()? * ARCSEC);
+        }
+        if let Some(field) = fields.get("turning_deg_per_sqrt_s") {
+            standstill.turning = field.not_negative()? * DEGREE;
         }
         if let Some(field) = fields.get("position_sigma_m") {
             standstill.position_sigma = field.positive()?;

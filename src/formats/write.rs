@@ -12,7 +12,7 @@ use super::error::{FileError, Place, list, suggestion};
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
 use crate::calibration::Calibration;
-use crate::imu::NoiseKeys;
+use crate::imu::{MotionNoise, NoiseKeys};
 use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
@@ -230,6 +230,19 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
             ));
         }
     }
+    for sensor in Sensor::ALL {
+        let keys = NoiseKeys::of(sensor);
+        let MotionNoise {
+            by_motion,
+            by_duration,
+        } = *run.instrument.motion_noise.get(sensor);
+        let (name, unit) = keys.by_duration;
+        for (name, value) in [(keys.by_motion, by_motion), (name, by_duration / unit)] {
+            if value > 0.0 {
+                sections.push(format!("{name} = {:?}\n", short(value)));
+            }
+        }
+    }
     sections.push(
         "\n# known before calibration: N = scale * installation * u + bias, N the file's quantity \
          per second\n"
@@ -247,6 +260,10 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
     }
     if let Some(sigma) = run.standstill.sigma.accel {
         sections.push(format!("velocity_sigma_m_s = {sigma:?}\n"));
+    }
+    if run.standstill.turning > 0.0 {
+        let turning = short(run.standstill.turning / DEGREE);
+        sections.push(format!("turning_deg_per_sqrt_s = {turning:?}\n"));
     }
     if run.recording.table.is_some() {
         sections.push(format!(

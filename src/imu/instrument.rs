@@ -1,6 +1,6 @@
 //! What is known of an instrument before it is calibrated.
 
-use super::{InstallationForm, Noise, Nominal, PerSensor, Prior, TermVector, Triad};
+use super::{InstallationForm, MotionNoise, Noise, Nominal, PerSensor, Prior, TermVector, Triad};
 
 /// An instrument as data sheet and experience describe it.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub struct Instrument {
     pub prior: PerSensor<Prior>,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
+    /// What moves add to it.
+    pub motion_noise: PerSensor<MotionNoise>,
     /// 1σ of each parameter of the error terms before calibration, around zero; zero where a term is
     /// off.
     pub term_sigma: TermVector,
@@ -29,6 +31,7 @@ impl Instrument {
             },
             prior,
             noise,
+            motion_noise: PerSensor::default(),
             term_sigma: TermVector::zeros(),
         }
     }

@@ -22,7 +22,7 @@ pub use body_frame::BodyFrame;
 pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;
 pub use noise_keys::NoiseKeys;
-pub use signal::{GaussMarkov, Noise, NoiseSource, Output, Pulses};
+pub use signal::{GaussMarkov, MotionNoise, Noise, NoiseSource, Output, Pulses};
 pub use terms::{REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 

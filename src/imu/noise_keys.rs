@@ -2,7 +2,7 @@
 //! Allan command.
 
 use super::Sensor;
-use crate::units::{DEG_PER_H, DEG_PER_SQRT_H, MICRO_G, MICRO_G_PER_SQRT_HZ};
+use crate::units::{DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};
 
 /// Names and units of a triad's noise figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,10 @@ pub struct NoiseKeys {
     pub gauss_markov: (&'static str, f64),
     /// Its correlation time in s.
     pub correlation_time: &'static str,
+    /// Noise of moves by their rate or acceleration, in √s.
+    pub by_motion: &'static str,
+    /// Noise of moves by their duration, and its unit in rad/√s or (m/s)/√s.
+    pub by_duration: (&'static str, f64),
     /// What its 1σ was called when data sheets' floor of the Allan deviation goes by that name.
     pub former: &'static str,
 }
@@ -25,14 +29,29 @@ impl NoiseKeys {
                 random_walk: ("angle_random_walk_deg_per_sqrt_h", DEG_PER_SQRT_H),
                 gauss_markov: ("gyro_gauss_markov_sigma_deg_per_h", DEG_PER_H),
                 correlation_time: "gyro_correlation_time_s",
+                by_motion: "attitude_noise_of_moves_by_rate_sqrt_s",
+                by_duration: ("attitude_noise_of_moves_deg_per_sqrt_s", DEGREE),
                 former: "gyro_instability_deg_per_h",
             },
             Sensor::Accel => Self {
                 random_walk: ("velocity_random_walk_ug_per_sqrt_hz", MICRO_G_PER_SQRT_HZ),
                 gauss_markov: ("accel_gauss_markov_sigma_ug", MICRO_G),
                 correlation_time: "accel_correlation_time_s",
+                by_motion: "velocity_noise_of_moves_by_acceleration_sqrt_s",
+                by_duration: ("velocity_noise_of_moves_m_s_per_sqrt_s", 1.0),
                 former: "accel_instability_ug",
             },
         }
+    }
+    /// All names.
+    pub const fn names(self) -> [&'static str; 6] {
+        [
+            self.random_walk.0,
+            self.gauss_markov.0,
+            self.correlation_time,
+            self.by_motion,
+            self.by_duration.0,
+            self.former,
+        ]
     }
 }

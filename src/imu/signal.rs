@@ -33,6 +33,16 @@ pub struct GaussMarkov {
     pub correlation_time: f64,
 }
 
+/// White noise that a triad has in moves beside that at rest: 1σ densities of the angle or velocity that it
+/// adds up to. Simulations do not make it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotionNoise {
+    /// By how fast a move is, √s: over the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
+    pub by_motion: f64,
+    /// By how long it takes, rad/√s or (m/s)/√s.
+    pub by_duration: f64,
+}
+
 impl Noise {
     /// Covariance on one axis of the mean outputs over two spans of time, each from begin to end in s:
     /// (rad/s)² or (m/s²)². Of a span with itself it is the variance of its mean.

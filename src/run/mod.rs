@@ -93,6 +93,9 @@ pub struct Standstill {
     /// White 1σ of what each triad's output adds up to at standstill: attitude in rad, velocity in m/s;
     /// found from the dwells if not given.
     pub sigma: PerSensor<Option<f64>>,
+    /// How the body turns where it should not, where no table is observed: 1σ density of a random walk,
+    /// rad/√s.
+    pub turning: f64,
     /// 1σ of the IMU's position while the table is at rest, m. Never below the IMU's distance from the
     /// table's centre, for that is how far it moves between positions.
     pub position_sigma: f64,
@@ -102,6 +105,7 @@ impl Default for Standstill {
     fn default() -> Self {
         Self {
             sigma: PerSensor::default(),
+            turning: 0.0,
             position_sigma: 1.0,
         }
     }

@@ -149,15 +149,16 @@ impl Scenario {
                     self.instrument.prior(sensor, &self.installation)
                 }),
                 noise: self.instrument.noise,
+                motion_noise: PerSensor::default(),
                 term_sigma: self.instrument.term_sigma,
             },
             site: self.site,
             table: self.table_accuracy(),
             standstill: Standstill {
-                sigma: PerSensor::default(),
                 position_sigma: Standstill::default()
                     .position_sigma
                     .max(self.integrator.lever_arm.norm()),
+                ..Standstill::default()
             },
             segment_sigma: SET_BY_HAND,
         };

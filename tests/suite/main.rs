@@ -19,6 +19,7 @@ mod help;
 mod init;
 #[cfg(unix)]
 mod interrupted;
+mod learnt_noise;
 mod modules;
 mod mounting;
 mod navigate;

@@ -54,14 +54,14 @@ impl Scale {
         let reference = |source: Source| {
             let sigma = source.sigma(problem);
             match source {
+                // Beside a table's readings it says nothing.
+                Source::Attitude | Source::Turning if problem.model.aiding == Aiding::Table => 0.0,
+                _ if source.stated(problem) => sigma.powi(2),
                 Source::GyroMotion => of_moves(Sensor::Gyro, moves.motion.gyro),
                 Source::AccelMotion => of_moves(Sensor::Accel, moves.motion.accel),
                 Source::GyroMoving => of_moves(Sensor::Gyro, moves.duration),
                 Source::AccelMoving => of_moves(Sensor::Accel, moves.duration),
-                _ if source.stated(problem) => sigma.powi(2),
                 Source::Velocity => walk(Sensor::Accel) * step,
-                // Beside a table's readings it says nothing.
-                Source::Attitude | Source::Turning if problem.model.aiding == Aiding::Table => 0.0,
                 Source::Attitude => walk(Sensor::Gyro) * step,
                 Source::Turning => walk(Sensor::Gyro),
                 Source::GyroGaussMarkov => over_step(walk(Sensor::Gyro)),

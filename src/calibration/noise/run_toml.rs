@@ -1,62 +1,75 @@
 //! Learnt noise as `run.toml` states it.
 
-use std::fmt::Write;
-
 use super::report::NoiseReport;
 use super::source::Source;
 use crate::imu::{NoiseKeys, PerSensor, Sensor};
+use crate::units::{ARCSEC, DEGREE};
+
+/// Tables of `run.toml` that state noise.
+const TABLES: [&str; 3] = ["imu.noise", "standstill", "turntable"];
 
 impl NoiseReport {
-    /// `[imu.noise]` of learnt noise, ready to be pasted into `run.toml`, with those sources in comments
-    /// that it cannot state there; none where nothing was learnt. `correlation_time` is that of each
-    /// triad's Gauss–Markov bias in s.
+    /// The lines of `run.toml` that state learnt noise, each below the table it belongs to; none where
+    /// nothing was learnt. `correlation_time` is that of each triad's Gauss–Markov bias in s.
     pub fn run_toml(&self, correlation_time: PerSensor<Option<f64>>) -> Option<String> {
         if !self.learnt {
             return None;
         }
-        let mut text = "[imu.noise]\n".to_owned();
-        for figures in self.sources.iter().filter(|figures| figures.used > 0.0) {
-            let value = rounded(figures.used);
-            // Writing to a string cannot fail.
-            let _ = match figures.source {
-                Source::AngleRandomWalk => {
-                    writeln!(
-                        text,
-                        "{} = {value}",
-                        NoiseKeys::of(Sensor::Gyro).random_walk.0
-                    )
-                }
-                Source::VelocityRandomWalk => {
-                    writeln!(
-                        text,
-                        "{} = {value}",
-                        NoiseKeys::of(Sensor::Accel).random_walk.0
-                    )
-                }
-                Source::GyroGaussMarkov => {
-                    gauss_markov(&mut text, Sensor::Gyro, &value, correlation_time.gyro)
-                }
-                Source::AccelGaussMarkov => {
-                    gauss_markov(&mut text, Sensor::Accel, &value, correlation_time.accel)
-                }
-                _ => writeln!(text, "# {}: {value} {}", figures.name, figures.unit),
-            };
-        }
-        Some(text)
+        let used = self.sources.iter().filter(|figures| figures.used > 0.0);
+        let lines: Vec<(&str, String)> = used
+            .flat_map(|figures| {
+                let sigma = figures.used * figures.source.unit().1;
+                figures.source.lines(sigma, correlation_time)
+            })
+            .collect();
+        let of_table = |table: &str| -> Option<String> {
+            let of_table = lines.iter().filter(|(of, _)| *of == table);
+            let lines: String = of_table.map(|(_, line)| format!("{line}\n")).collect();
+            (!lines.is_empty()).then(|| format!("[{table}]\n{lines}"))
+        };
+        let tables: Vec<String> = TABLES.into_iter().filter_map(of_table).collect();
+        Some(tables.join("\n"))
     }
 }
 
-fn gauss_markov(
-    text: &mut String,
-    sensor: Sensor,
-    value: &str,
-    correlation_time: Option<f64>,
-) -> std::fmt::Result {
-    let keys = NoiseKeys::of(sensor);
-    writeln!(text, "{} = {value}", keys.gauss_markov.0)?;
-    match correlation_time {
-        Some(time) => writeln!(text, "{} = {}", keys.correlation_time, rounded(time)),
-        None => Ok(()),
+impl Source {
+    /// Table and line for each figure that states this σ, in SI and radians.
+    fn lines(
+        self,
+        sigma: f64,
+        correlation_time: PerSensor<Option<f64>>,
+    ) -> Vec<(&'static str, String)> {
+        let [imu, standstill, turntable] = TABLES;
+        let keys = |sensor| NoiseKeys::of(sensor);
+        let line = |table, (name, unit): (&str, f64)| {
+            (table, format!("{name} = {}", rounded(sigma / unit)))
+        };
+        match self {
+            Self::AngleRandomWalk => vec![line(imu, keys(Sensor::Gyro).random_walk)],
+            Self::VelocityRandomWalk => vec![line(imu, keys(Sensor::Accel).random_walk)],
+            Self::GyroMotion => vec![line(imu, (keys(Sensor::Gyro).by_motion, 1.0))],
+            Self::AccelMotion => vec![line(imu, (keys(Sensor::Accel).by_motion, 1.0))],
+            Self::GyroMoving => vec![line(imu, keys(Sensor::Gyro).by_duration)],
+            Self::AccelMoving => vec![line(imu, keys(Sensor::Accel).by_duration)],
+            Self::Velocity => vec![line(standstill, ("velocity_sigma_m_s", 1.0))],
+            Self::Attitude => vec![line(standstill, ("attitude_sigma_arcsec", ARCSEC))],
+            Self::Turning => vec![line(standstill, ("turning_deg_per_sqrt_s", DEGREE))],
+            Self::TablePosition => vec![line(turntable, ("position_sigma_arcsec", ARCSEC))],
+            Self::TableReading => vec![line(turntable, ("reading_sigma_arcsec", ARCSEC))],
+            Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
+                let sensor = match self {
+                    Self::GyroGaussMarkov => Sensor::Gyro,
+                    _ => Sensor::Accel,
+                };
+                let keys = keys(sensor);
+                let time = correlation_time.get(sensor);
+                let time =
+                    time.map(|t| (imu, format!("{} = {}", keys.correlation_time, rounded(t))));
+                let mut lines = vec![line(imu, keys.gauss_markov)];
+                lines.extend(time);
+                lines
+            }
+        }
     }
 }
 

@@ -103,7 +103,6 @@ impl Source {
                 let stated = problem.run().standstill.sigma.get(sensor);
                 stated.is_some_and(|_| self.sigma(problem) > 0.0)
             }
-            Self::GyroMotion | Self::AccelMotion | Self::GyroMoving | Self::AccelMoving => false,
             _ => self.sigma(problem) > 0.0,
         }
     }

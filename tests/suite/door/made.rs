@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use turncal::attitude;
 use turncal::earth::Site;
-use turncal::imu::{GaussMarkov, Instrument, Noise, PerSensor, Prior, Sensor};
+use turncal::imu::{GaussMarkov, Instrument, MotionNoise, Noise, PerSensor, Prior, Sensor};
 use turncal::recording::{LabelledMotion, Recording, Segment, TableLog};
 use turncal::run::{Run, Standstill};
 use turncal::turntable::TableAccuracy;
@@ -59,6 +59,16 @@ pub fn made_run(name: &str) -> Run {
         },
     };
     let instrument = Instrument {
+        motion_noise: PerSensor {
+            gyro: MotionNoise {
+                by_motion: 1e-3,
+                by_duration: 0.5 * DEGREE,
+            },
+            accel: MotionNoise {
+                by_motion: 0.25,
+                by_duration: 2.0,
+            },
+        },
         unit: PerSensor {
             gyro: "rad".to_owned(),
             accel: "m/s".to_owned(),
@@ -82,6 +92,7 @@ pub fn made_run(name: &str) -> Run {
                 gyro: Some(3e-8),
                 accel: Some(2e-6),
             },
+            turning: 0.25 * DEGREE,
             position_sigma: 0.4,
         },
         segment_sigma: 2.0 * DEGREE,
@@ -103,6 +114,7 @@ pub fn assert_same(a: &Run, b: &Run) {
             &a.recording.meta,
             &a.instrument.unit,
             &a.instrument.nominal,
+            &a.instrument.motion_noise,
             &a.recording.segments,
             &a.standstill
         ),
@@ -111,6 +123,7 @@ pub fn assert_same(a: &Run, b: &Run) {
             &b.recording.meta,
             &b.instrument.unit,
             &b.instrument.nominal,
+            &b.instrument.motion_noise,
             &b.recording.segments,
             &b.standstill
         )
