@@ -256,7 +256,8 @@ impl fmt::Display for Finding {
                     f,
                     "The data contradict the stated noise: −2 ln of its likelihood is {ratio:.1} above \
                      that of the noise learnt from them, where right figures stay below {limit:.1} or \
-                     within the limit of each factor alone. Used and in all σ: {}.",
+                     within the limit of each factor alone. Used and in all σ: {}. The lines of run.toml \
+                     that state it are `noise.run_toml` in calibration.json.",
                     sources.join("; ")
                 )
             }
