@@ -30,6 +30,8 @@ impl TimeUnit {
 pub(super) struct Clock<'a> {
     /// None where rows just follow one another.
     pub column: Option<&'a str>,
+    /// A column of nanoseconds beside one of whole seconds.
+    pub nanoseconds: Option<&'a str>,
     pub unit: TimeUnit,
     /// s
     pub period: Option<f64>,
@@ -46,8 +48,19 @@ impl<'a> Clock<'a> {
         if unit == TimeUnit::Count && period.is_none() {
             return Err(fields.missing("sample_period_s", "what a count lasts"));
         }
+        let (column, nanoseconds) = match columns.get("time") {
+            None => (None, None),
+            Some(field) => match field.texts().as_deref() {
+                Ok(&[seconds, nanoseconds]) => (Some(seconds), Some(nanoseconds)),
+                _ => (Some(field.text()?), None),
+            },
+        };
+        if let (Some(_), Some(field)) = (nanoseconds, fields.get("time_unit")) {
+            field.choice(&[("s", ())])?;
+        }
         Ok(Self {
-            column: columns.get("time").map(|field| field.text()).transpose()?,
+            column,
+            nanoseconds,
             unit,
             period: period.map(|field| field.positive()).transpose()?,
         })
@@ -57,6 +70,7 @@ impl<'a> Clock<'a> {
     pub fn start(&self, csv: &mut CsvFile) -> Result<Stamps, FileError> {
         Ok(Stamps {
             column: self.column.map(|name| csv.column(name)).transpose()?,
+            nanoseconds: self.nanoseconds.map(|name| csv.column(name)).transpose()?,
             unit: self.unit,
             period: self.period.unwrap_or(1.0),
             number: None,
@@ -77,6 +91,7 @@ pub(super) enum Stamp {
 /// The stamps of a file so far.
 pub(super) struct Stamps {
     column: Option<usize>,
+    nanoseconds: Option<usize>,
     unit: TimeUnit,
     /// s a count
     period: f64,
@@ -99,7 +114,10 @@ impl Stamps {
             self.of_rows.push((time, csv.line()));
             return Ok(Stamp::Later);
         };
-        let number = csv.number(column)?;
+        let mut number = csv.number(column)?;
+        if let Some(column) = self.nanoseconds {
+            number += 1e-9 * csv.number(column)?;
+        }
         if self.unit == TimeUnit::Count && number.fract() != 0.0 {
             return Err(csv.not(column, "a whole number of samples"));
         }

@@ -131,6 +131,11 @@ impl CsvFile {
         &self.header
     }
 
+    /// What comments say of the rate of rows, Hz.
+    pub fn rate(&self) -> Option<f64> {
+        self.lines.rate()
+    }
+
     /// The row of units below the names, if there is one.
     pub fn units(&self) -> Option<&[String]> {
         self.units.as_deref()
@@ -276,6 +281,11 @@ impl CsvFile {
             .ok()
             .filter(|text| !text.is_empty())
             .ok_or_else(|| self.not(column, "a text"))
+    }
+
+    /// Whether nothing stands in a column of the row.
+    pub fn is_blank(&self, column: usize) -> bool {
+        self.bytes(column).is_empty()
     }
 
     fn bytes(&self, column: usize) -> &[u8] {

@@ -47,6 +47,8 @@ impl TimeStamp {
 pub(super) struct ImuLog<'a> {
     pub file: PathBuf,
     pub clock: Clock<'a>,
+    /// Of rows of several instruments those that have this number in this column.
+    pub instance: Option<(&'a str, f64)>,
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<&'a str>,
     pub output: Output,
@@ -185,11 +187,26 @@ impl ImuLog<'_> {
         let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
         let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
 
+        let instance = match self.instance {
+            Some((name, number)) => Some((csv.column(name)?, number)),
+            None => None,
+        };
+        let mut blank = 0;
         let mut columns = [const { Vec::new() }; 6];
         let mut duplicates = Vec::new();
         let mut temperatures = Vec::new();
         let mut before = [f64::NAN; 6];
         while csv.advance()? && !csv.may_be_cut() {
+            if let Some((place, number)) = instance
+                && csv.number(place)? != number
+            {
+                continue;
+            }
+            // Rows that another sensor wrote; without a time they would be missing.
+            if self.clock.column.is_some() && places.iter().all(|&place| csv.is_blank(place)) {
+                blank += 1;
+                continue;
+            }
             let mut row = [0.0; 6];
             for (value, &place) in row.iter_mut().zip(&places) {
                 *value = self.value(&csv, place)?;
@@ -210,6 +227,12 @@ impl ImuLog<'_> {
             }
         }
         notes.extend(csv.cut_off("It is left out"));
+        if blank > 0 {
+            notes.push(format!(
+                "{blank} row(s) of {} have nothing in the columns of both triads and are passed over.",
+                self.file.display()
+            ));
+        }
         if stamps.of_rows.len() < FEWEST_SAMPLES {
             return Err(csv.error(
                 format_args!("{} samples", stamps.of_rows.len()),

@@ -50,6 +50,7 @@ impl<'a> InstrumentFields<'a> {
                 "sample_period_s",
                 "time_stamp",
                 "continuous",
+                "instance",
                 "body_axes",
                 "columns",
                 "noise",
@@ -78,6 +79,15 @@ impl<'a> InstrumentFields<'a> {
             None => None,
         };
 
+        let instance = match fields.table("instance", &["column", "number"])? {
+            Some(of) => Some((
+                of.need("column", "the column that tells instruments apart")?
+                    .text()?,
+                of.need("number", "what it says of the one that is meant")?
+                    .number()?,
+            )),
+            None => None,
+        };
         let clock = Clock::of_fields(&fields, &columns)?;
         let follow = clock.period.is_some() && top.get("turntable").is_none();
         if clock.column.is_none() && !follow {
@@ -101,6 +111,7 @@ impl<'a> InstrumentFields<'a> {
             log: ImuLog {
                 file: directory.join(fields.need("file", "a file name")?.text()?),
                 clock,
+                instance,
                 triads: PerSensor {
                     gyro: columns
                         .need("gyro", "the names of three columns")?

@@ -11,6 +11,8 @@ pub(crate) struct Sheet {
     pub names: Vec<String>,
     /// What the row below the names says of each, empty without such a row.
     pub units: Vec<String>,
+    /// What comments say of the rate of rows, Hz.
+    pub rate: Option<f64>,
     /// NaN where there is no number.
     pub columns: Vec<Vec<f64>>,
 }
@@ -41,7 +43,18 @@ impl Sheet {
         Ok(Self {
             names,
             units,
+            rate: csv.rate(),
             columns,
         })
+    }
+
+    /// Leaves the rows of which this is true.
+    pub fn retain(&mut self, keep: impl Fn(&[Vec<f64>], usize) -> bool) {
+        let rows = 0..self.columns.first().map_or(0, Vec::len);
+        let kept: Vec<bool> = rows.map(|row| keep(&self.columns, row)).collect();
+        for column in &mut self.columns {
+            let mut kept = kept.iter();
+            column.retain(|_| kept.next() == Some(&true));
+        }
     }
 }

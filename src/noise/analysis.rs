@@ -34,7 +34,7 @@ pub struct TriadNoise {
     /// x, y, z.
     pub axes: [AxisNoise; 3],
     /// The mean of the Allan variances of all axes that vary, and what it shows: where they are alike it
-    /// sees more than each alone.
+    /// sees more than each alone. What all axes show lies within what they show.
     pub mean: AxisNoise,
 }
 
@@ -88,7 +88,52 @@ impl NoiseAnalysis {
 
     /// What a run should state of a triad; none if nothing was found.
     pub fn figures(&self, sensor: Sensor) -> Option<NoiseFigures> {
-        let mean = &self.triads.get(sensor).mean;
+        self.triads.get(sensor).figures()
+    }
+}
+
+impl TriadNoise {
+    /// Of integrals over samples of `period` s, at rest.
+    pub(crate) fn new(samples: &[Vector3<f64>], period: f64, clusters: &Clusters) -> Self {
+        let axes = [0, 1, 2].map(|axis| {
+            let values = || samples.iter().map(|sample| sample[axis]);
+            let curve = overlapping(values(), period, clusters.sizes());
+            let is_constant = is_constant(values(), &curve);
+            AxisNoise {
+                identified: if is_constant {
+                    None
+                } else {
+                    clusters.identify(&[&curve])
+                },
+                knocks: knocks(values()),
+                curve,
+                is_constant,
+            }
+        });
+        let varying: Vec<&AxisNoise> = axes.iter().filter(|axis| !axis.is_constant).collect();
+        let identified: Option<Vec<&Identified>> = varying
+            .iter()
+            .map(|axis| axis.identified.as_ref())
+            .collect();
+        let varying: Vec<&Curve> = varying.iter().map(|axis| &axis.curve).collect();
+        let mean = AxisNoise {
+            identified: clusters
+                .identify(&varying)
+                .map(|of| of.within(&identified.unwrap_or_default())),
+            knocks: axes.iter().map(|axis| axis.knocks).sum(),
+            is_constant: varying.is_empty(),
+            curve: if varying.is_empty() {
+                axes[0].curve.clone()
+            } else {
+                mean(&varying)
+            },
+        };
+        Self { axes, mean }
+    }
+
+    /// What a run should state of it; none if nothing was found.
+    pub fn figures(&self) -> Option<NoiseFigures> {
+        let mean = &self.mean;
         let identified = mean.identified.as_ref()?;
         let white = of_kind(&identified.for_filter, Process::RandomWalk);
         let limit = || {
@@ -119,42 +164,6 @@ impl NoiseAnalysis {
             correlation_is_open: gauss_markov
                 .is_some_and(|gauss_markov| 1.89 * gauss_markov.correlation_time > longest),
         })
-    }
-}
-
-impl TriadNoise {
-    fn new(samples: &[Vector3<f64>], period: f64, clusters: &Clusters) -> Self {
-        let axes = [0, 1, 2].map(|axis| {
-            let values = || samples.iter().map(|sample| sample[axis]);
-            let curve = overlapping(values(), period, clusters.sizes());
-            let is_constant = is_constant(values(), &curve);
-            AxisNoise {
-                identified: if is_constant {
-                    None
-                } else {
-                    clusters.identify(&[&curve])
-                },
-                knocks: knocks(values()),
-                curve,
-                is_constant,
-            }
-        });
-        let varying: Vec<&Curve> = axes
-            .iter()
-            .filter(|axis| !axis.is_constant)
-            .map(|axis| &axis.curve)
-            .collect();
-        let mean = AxisNoise {
-            identified: clusters.identify(&varying),
-            knocks: axes.iter().map(|axis| axis.knocks).sum(),
-            is_constant: varying.is_empty(),
-            curve: if varying.is_empty() {
-                axes[0].curve.clone()
-            } else {
-                mean(&varying)
-            },
-        };
-        Self { axes, mean }
     }
 }
 

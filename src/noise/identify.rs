@@ -15,6 +15,7 @@ mod clusters;
 mod search;
 #[cfg(test)]
 mod tests;
+mod triad;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -77,7 +78,11 @@ pub struct Identified {
     /// By how much the curve departs from every mixture of processes beyond chance, as a part of the
     /// Allan variance (1σ); zero if it does not.
     pub misfit: f64,
-    /// Equivalent degrees of freedom of each point.
+    /// Points at the begin of the curve, the shortest cluster times, that the processes do not describe:
+    /// there the sensor's bandwidth or its pulses show.
+    pub first: usize,
+    /// Equivalent degrees of freedom of each point, from the scatter of the points where no process describes
+    /// them.
     pub freedom: Vec<f64>,
     /// What a filter that knows white noise and one Gauss–Markov process should use: the same as what was
     /// found, but for the nearest Gauss–Markov process in the place of whatever else varies.

@@ -38,12 +38,6 @@ pub enum StretchError {
          stand undisturbed, or name a section of it with --segment"
     )]
     NoStandstill,
-    /// Sections laid end to end without labels.
-    #[error(
-        "the record is not continuous and has no [segments] that say where its sections are: add them, \
-         or record without a break"
-    )]
-    NoSections,
     /// Too few samples.
     #[error(
         "{name} has {found} samples, expected at least {FEWEST}, and for bias instability some minutes to \
@@ -76,7 +70,9 @@ impl Stretch {
     pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {
         let stretch = match label {
             Some(label) => Self::labelled(run, label)?,
-            None if !run.recording.imu.continuous => Self::section(run)?,
+            None if !run.recording.imu.continuous && !run.recording.segments.is_empty() => {
+                Self::section(run)?
+            }
             None => Self::standstill(run)?,
         };
         if stretch.samples.len() < FEWEST {
@@ -110,11 +106,7 @@ impl Stretch {
             .map(|segment| Self::of_segment(run, segment, "the longest static segment,"))
             .filter(|stretch| stretch.stands)
             .max_by_key(|stretch| stretch.samples.len());
-        match stretch {
-            Some(stretch) => Ok(stretch),
-            None if run.recording.segments.is_empty() => Err(StretchError::NoSections),
-            None => Err(StretchError::NoStandstill),
-        }
+        stretch.ok_or(StretchError::NoStandstill)
     }
 
     fn standstill(run: &Run) -> Result<Self, StretchError> {

@@ -169,6 +169,21 @@ fn a_label_that_is_not_there_is_answered_with_those_that_are() {
 }
 
 #[test]
+fn sections_laid_end_to_end_without_labels_are_told_by_the_instrument() {
+    let root = tempfile::tempdir().unwrap();
+    let run = simulated(root.path());
+    let text = fs::read_to_string(&run).unwrap();
+    assert!(text.contains("continuous = true"), "{text}");
+    fs::write(
+        &run,
+        text.replace("continuous = true", "continuous = false"),
+    )
+    .unwrap();
+    let document = json(&turncal(&["allan", &run, "--json"]).success());
+    assert_eq!(document["stands"], true);
+}
+
+#[test]
 fn a_noise_figure_is_converted_and_a_wrong_unit_is_answered_with_the_known_ones() {
     let document =
         json(&turncal(&["noise", "0.3", "deg/sqrt(h)", "--rate", "100", "--json"]).success());

@@ -218,3 +218,158 @@ fn an_existing_file_is_kept_unless_forced_and_the_log_always() {
     init(&[&at("none.csv")]).code(1);
     init(&[]).code(2);
 }
+
+/// Quarter turns about each axis with rests between, at 100 Hz: gyros in rad/s, accelerometers in m/s².
+fn motion() -> Vec<[f64; 6]> {
+    let (mut up, mut rows) = (
+        nalgebra::Vector3::new(0.1, 0.2, 1.0).normalize(),
+        Vec::new(),
+    );
+    for turn in 0..9 {
+        for step in 0..300 {
+            let rate = if step < 200 {
+                0.0
+            } else {
+                std::f64::consts::FRAC_PI_2
+            };
+            let rate = nalgebra::Vector3::ith(turn % 3, rate);
+            up = nalgebra::Rotation3::new(-rate * 0.01) * up;
+            // Noise enough to tell rests from a register that is stuck.
+            let noise =
+                |k: usize| (((step * 7919 + k * 104_729) % 1009) as f64 / 1009.0 - 0.5) * 1e-2;
+            let (gyro, accel) = (rate, up * 9.8);
+            let row = [gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z];
+            rows.push(std::array::from_fn(|k| row[k] + noise(k)));
+        }
+    }
+    rows
+}
+
+/// One record as programs write it: name, file, header and a row.
+type Shape = (&'static str, String, fn(usize, &str, &str) -> String);
+
+fn shapes() -> Vec<Shape> {
+    const ZEROS: &str = "0,0,0,0,0,0,0,0,0";
+    let covariance = |of: &str| {
+        (0..9)
+            .map(|k| format!(",field.{of}_covariance{k}"))
+            .collect::<String>()
+    };
+    let ros1 = format!(
+        "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.orientation.x,field.orientation.y,\
+         field.orientation.z,field.orientation.w{}{}{}{}{}\n",
+        covariance("orientation"),
+        ",field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z",
+        covariance("angular_velocity"),
+        ",field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z",
+        covariance("linear_acceleration"),
+    );
+    vec![
+        ("plain", "t,gx,gy,gz,ax,ay,az\n".into(), |k, gyro, accel| {
+            format!("{:.2},{gyro},{accel}", k as f64 * 0.01)
+        }),
+        ("names in a comment", "% t gx gy gz ax ay az\n".into(), |k, gyro, accel| {
+            format!("{:.2},{gyro},{accel}", k as f64 * 0.01).replace(',', " ")
+        }),
+        ("ROS 1", ros1, |k, gyro, accel| {
+            let stamp = 1_520_530_308_000_000_000u64 + 10_000_000 * k as u64;
+            let received = stamp + 977;
+            format!("{received},{k},{stamp},imu,0,0,0,1,{ZEROS},{gyro},{ZEROS},{accel},{ZEROS}")
+        }),
+        ("ROS 2", String::new(), |k, gyro, accel| {
+            let (seconds, rest) = (1_520_530_308 + k / 100, 10_000_000 * (k % 100));
+            format!("{seconds},{rest},imu,0,0,0,1,{ZEROS},{gyro},{ZEROS},{accel},{ZEROS}")
+        }),
+        (
+            "EuRoC",
+            "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],\
+             a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n"
+                .into(),
+            |k, gyro, accel| {
+                format!("{},{gyro},{accel}", 1_403_636_579_758_555_392u64 + 10_000_000 * k as u64)
+            },
+        ),
+        (
+            "PX4",
+            "timestamp,gyro_rad[0],gyro_rad[1],gyro_rad[2],gyro_integral_dt,accelerometer_timestamp_relative,\
+             accelerometer_m_s2[0],accelerometer_m_s2[1],accelerometer_m_s2[2],accelerometer_integral_dt,\
+             accelerometer_clipping\n"
+                .into(),
+            |k, gyro, accel| format!("{},{gyro},10000,0,{accel},10000,0", 112_345_678 + 10_000 * k),
+        ),
+        (
+            "Xsens",
+            "// Start Time: Unknown\n// Update Rate: 100.0Hz\n\
+             PacketCounter\tSampleTimeFine\tGyr_X\tGyr_Y\tGyr_Z\tAcc_X\tAcc_Y\tAcc_Z\tRoll\n"
+                .into(),
+            |k, gyro, accel| {
+                let (packet, ticks) = ((65_000 + k) % 65_536, 48_211 + 100 * k);
+                format!("{packet},{ticks},{gyro},{accel},").replace(',', "\t")
+            },
+        ),
+        (
+            "ArduPilot",
+            "timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz\n".into(),
+            |k, gyro, accel| {
+                let time = 112_345_678 + 10_000 * k;
+                let row = |instance, gyro: &str| {
+                    let seconds = time as f64 * 1e-6;
+                    format!("{seconds:.6},{time},{instance},{gyro},{accel},0,0,45,1,1,1000,1000")
+                };
+                format!("{}\n{}", row(0, gyro), row(1, "0.5,0.25,0.125"))
+            },
+        ),
+        (
+            "blank cells",
+            "time_s,type,gx,gy,gz,ax,ay,az,pressure\n".into(),
+            |k, gyro, accel| {
+                let time = k as f64 * 0.01;
+                let row = format!("{time:.3},imu,{gyro},{accel},");
+                match k % 10 {
+                    3 => format!("{row}\n{:.3},baro,,,,,,,1013", time + 0.005),
+                    _ => row,
+                }
+            },
+        ),
+    ]
+}
+
+#[test]
+fn nine_shapes_of_one_record_are_one_run_once_the_place_is_filled_in() {
+    let place = tempfile::tempdir().unwrap();
+    let known = BTreeMap::from([
+        ("site.latitude_deg", "49.6".to_owned()),
+        ("site.height_m", "280.0".to_owned()),
+    ]);
+    let mut runs = Vec::new();
+    for (name, header, row) in shapes() {
+        let text = |of: &[f64]| of.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let rows = motion().into_iter().enumerate();
+        let rows = rows.map(|(k, v)| row(k, &text(&v[..3]), &text(&v[3..])) + "\n");
+        let (log, path) = (place.path().join("imu.csv"), place.path().join("run.toml"));
+        fs::write(&log, header + &rows.collect::<String>()).unwrap();
+        let draft = init(&[log.to_str().unwrap()]).success();
+        let draft = String::from_utf8(draft.get_output().stdout.clone()).unwrap();
+        fs::write(&path, completed(&draft, &known)).unwrap();
+        let run = Run::read(&path).unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
+        runs.push((name, run));
+    }
+    let (_, plain) = &runs[0];
+    assert_eq!(plain.recording.imu.gyro.len(), 2700);
+    for (name, run) in &runs {
+        let (found, expected) = (&run.recording.imu, &plain.recording.imu);
+        assert!(
+            (found.period / expected.period - 1.0).abs() < 1e-7,
+            "{name}"
+        );
+        assert!(found.faults.is_empty(), "{name}: {:?}", found.faults);
+        for sensor in Sensor::ALL {
+            assert_eq!(found.of(sensor).len(), expected.of(sensor).len(), "{name}");
+            for (a, b) in found.of(sensor).iter().zip(expected.of(sensor)) {
+                assert!((a - b).norm() < 1e-7 * (b.norm() + 1e-3), "{name}: {a} {b}");
+            }
+            let scale = |run: &Run| run.instrument.nominal.get(sensor).0;
+            assert_eq!(scale(run), scale(plain), "{name}");
+        }
+    }
+}

@@ -86,6 +86,19 @@ fn is_number(field: &str) -> bool {
     !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
+/// The rate in Hz that a comment such as `Update Rate: 100.0Hz` states.
+fn rate(remark: &str) -> Option<f64> {
+    let remark = remark.to_lowercase();
+    let (_, rest) = remark.split_once("rate").or(remark.split_once("freq"))?;
+    let begin = rest.find(|c: char| c.is_ascii_digit())?;
+    let number = &rest[begin..];
+    let end = number.find(|c: char| !c.is_ascii_digit() && c != '.');
+    let (number, unit) = number.split_at(end.unwrap_or(number.len()));
+    let in_hertz = unit.trim_start().starts_with("hz") || rest[..begin].contains("hz");
+    let rate = number.parse().ok().filter(|rate| *rate > 0.0);
+    rate.filter(|_| in_hertz)
+}
+
 /// Runs of blanks outside quotes become one space, those at the ends nothing.
 fn collapse_blanks(line: &mut Vec<u8>) {
     let (mut quoted, mut kept, mut pending) = (false, 0, false);
@@ -150,6 +163,10 @@ pub(super) struct Lines {
     pending: bool,
     /// The last comment before it.
     remark: Option<String>,
+    /// What comments say of the rate of rows, Hz.
+    rate: Option<f64>,
+    /// A row that was looked at before its turn, with its number and whether it is ended.
+    ahead: Option<(Vec<u8>, u64, bool)>,
 }
 
 impl Lines {
@@ -163,6 +180,8 @@ impl Lines {
             ended: false,
             pending: false,
             remark: None,
+            rate: None,
+            ahead: None,
         };
         let heading = lines.heading()?;
         if let Some(heading) = &heading {
@@ -207,12 +226,18 @@ impl Lines {
         let row = String::from_utf8_lossy(&self.line).into_owned();
         let delimiter = Delimiter::of_row(&row);
         let mut names = delimiter.fields(&row).map_err(malformed)?;
-        if names.iter().all(|name| is_number(name)) {
-            // Some programs write the names as a comment.
-            let remark = self.remark.take().unwrap_or_default();
-            let remarked = Delimiter::of_row(&remark).fields(&remark);
-            let remarked = remarked.unwrap_or_default();
-            names = match remarked.len() == names.len() && remarked.len() > 1 {
+        // Some programs write the names as a comment.
+        let remark = self.remark.take().unwrap_or_default();
+        let remarked = Delimiter::of_row(&remark).fields(&remark);
+        let remarked = remarked.unwrap_or_default();
+        let numbers = names.iter().filter(|name| is_number(name)).count();
+        let is_named = remarked.len() == names.len()
+            && remarked.len() > 1
+            && (numbers == names.len() || !remarked.iter().any(|name| is_number(name)));
+        let is_row = numbers == names.len()
+            || (numbers > 0 && (is_named || self.is_like_the_next(&names, delimiter)?));
+        if is_row {
+            names = match is_named {
                 true => remarked,
                 false => (1..=names.len()).map(|n| n.to_string()).collect(),
             };
@@ -240,8 +265,31 @@ impl Lines {
         }))
     }
 
+    /// Whether the next row has numbers and texts in the same places, as rows have and names have not.
+    fn is_like_the_next(&mut self, row: &[String], delimiter: Delimiter) -> Result<bool, Stop> {
+        let first = (std::mem::take(&mut self.line), self.number, self.ended);
+        let more = self.take()?;
+        let next = delimiter.fields(&String::from_utf8_lossy(&self.line));
+        let kinds = |row: &[String]| row.iter().map(|field| is_number(field)).collect::<Vec<_>>();
+        let is_like = more && next.is_ok_and(|next| kinds(&next) == kinds(row));
+        if more {
+            self.ahead = Some((std::mem::take(&mut self.line), self.number, self.ended));
+        }
+        (self.line, self.number, self.ended) = first;
+        Ok(is_like)
+    }
+
+    /// What comments say of the rate of rows, Hz.
+    pub fn rate(&self) -> Option<f64> {
+        self.rate
+    }
+
     /// Takes the next row; false at the end of the file.
     fn take(&mut self) -> Result<bool, Stop> {
+        if let Some(ahead) = self.ahead.take() {
+            (self.line, self.number, self.ended) = ahead;
+            return Ok(true);
+        }
         let first = self.number + 1;
         let mut left = LONGEST;
         loop {
@@ -268,7 +316,9 @@ impl Lines {
                 return Ok(true);
             }
             if let Some(text) = self.comment() {
-                self.remark = Some(String::from_utf8_lossy(text).into_owned());
+                let remark = String::from_utf8_lossy(text).into_owned();
+                self.rate = self.rate.or_else(|| rate(&remark));
+                self.remark = Some(remark);
             }
         }
     }

@@ -13,6 +13,10 @@ use crate::statistics::median;
 pub(super) struct Columns {
     pub names: Vec<String>,
     pub time: Option<usize>,
+    /// Nanoseconds beside a time in whole seconds.
+    pub nanoseconds: Option<usize>,
+    /// A column that counts rows.
+    pub counter: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
     /// Others that might be meant.
     pub others: PerSensor<Vec<[usize; 3]>>,
@@ -24,35 +28,55 @@ pub(super) struct Columns {
 }
 
 /// Part of the rows that must be numbers.
-const NUMBERS: f64 = 0.9;
+const NUMBERS: f64 = 0.5;
+/// So many instruments may share a log.
+const MOST_INSTANCES: usize = 8;
 /// Part of the steps of a time that go forward.
 const FORWARD: f64 = 0.9;
 
 impl Columns {
     pub fn find(sheet: &Sheet) -> Self {
         let names: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
-        let time = time(sheet, &names);
+        let split = split_time(sheet, &names);
+        let time = split.map(|pair| pair[0]).or_else(|| time(sheet, &names));
         let temperature =
             (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
         let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
         let by_size = Sensor::ALL
             .iter()
             .all(|&sensor| found.get(sensor).is_empty());
-        if by_size {
+        let is_echo = by_size && is_echo(sheet);
+        if is_echo {
+            found = PerSensor {
+                gyro: vec![ECHO_GYRO],
+                accel: vec![ECHO_ACCEL],
+            };
+        } else if by_size {
             found = by_numbers(sheet, time, temperature);
         }
         let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
         Self {
             names: sheet.names.clone(),
             time,
+            nanoseconds: split.map(|pair| pair[1]),
+            counter: (0..names.len()).find(|&k| names[k].is_counter() && goes_forward(sheet, k)),
             triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
             others: PerSensor::from_fn(|sensor| {
                 found.get(sensor).iter().skip(1).copied().collect()
             }),
-            by_size,
+            by_size: by_size && !is_echo,
             temperature,
             quaternion: quaternion(sheet, time),
         }
+    }
+
+    /// The times of all rows, in the column's unit.
+    pub fn stamps(&self, sheet: &Sheet) -> Option<Vec<f64>> {
+        let times = &sheet.columns[self.time?];
+        Some(match self.nanoseconds {
+            Some(column) => both(times, &sheet.columns[column]),
+            None => times.clone(),
+        })
     }
 
     /// The rows in which both triads and the time are numbers.
@@ -86,8 +110,56 @@ fn is_numeric(sheet: &Sheet, column: usize) -> bool {
     numbers as f64 >= NUMBERS * values.len() as f64
 }
 
+/// The columns of `sensor_msgs/Imu` as `ros2 topic echo --csv` writes them, without names: seconds,
+/// nanoseconds, frame, orientation, angular velocity and linear acceleration, each with its covariance.
+const ECHO: usize = 40;
+const ECHO_GYRO: [usize; 3] = [16, 17, 18];
+const ECHO_ACCEL: [usize; 3] = [28, 29, 30];
+
+fn is_echo(sheet: &Sheet) -> bool {
+    let is_numbered = sheet.names.first().is_some_and(|name| name == "1");
+    is_numbered && sheet.names.len() == ECHO && (0..ECHO).all(|k| is_numeric(sheet, k) != (k == 2))
+}
+
+fn both(seconds: &[f64], nanoseconds: &[f64]) -> Vec<f64> {
+    let rows = seconds.iter().zip(nanoseconds);
+    rows.map(|(seconds, nanoseconds)| seconds + 1e-9 * nanoseconds)
+        .collect()
+}
+
+/// Whole seconds with the nanoseconds beside them.
+fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
+    let is_pair = |k: &usize| match is_echo(sheet) {
+        true => *k == 0,
+        false => names[*k].is_seconds() && names[k + 1].is_nanoseconds(),
+    };
+    let pair = (0..names.len().saturating_sub(1)).find(is_pair)?;
+    let times = both(&sheet.columns[pair], &sheet.columns[pair + 1]);
+    are_forward(&times).then_some([pair, pair + 1])
+}
+
+/// The column that tells rows of several instruments apart, with what it says of the first.
+pub(super) fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
+    let column = (0..sheet.names.len()).find(|&k| {
+        let values = &sheet.columns[k];
+        let mut known: Vec<f64> = Vec::new();
+        Name::of(&sheet.names[k]).is_instance()
+            && values.iter().all(|value| {
+                if !known.contains(value) {
+                    known.push(*value);
+                }
+                value.fract() == 0.0 && known.len() <= MOST_INSTANCES
+            })
+            && known.len() > 1
+    })?;
+    Some((column, *sheet.columns[column].first()?))
+}
+
 fn goes_forward(sheet: &Sheet, column: usize) -> bool {
-    let values = &sheet.columns[column];
+    are_forward(&sheet.columns[column])
+}
+
+fn are_forward(values: &[f64]) -> bool {
     let forward = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
     forward as f64 >= FORWARD * (values.len() as f64 - 1.0)
 }

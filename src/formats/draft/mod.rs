@@ -12,8 +12,11 @@ mod units;
 
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use crate::formats::{FileError, Sheet};
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::PerSensor;
+use crate::noise::NoiseFigures;
 use columns::Columns;
 use motion::Motion;
 use time::Clock;
@@ -27,13 +30,15 @@ const USUAL_PERIOD: f64 = 0.01;
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
+    /// The column that tells several instruments apart, with the number of the one that is taken.
+    instance: Option<(usize, f64)>,
     columns: Columns,
     clock: Clock,
     quantities: Quantities,
     /// What a register says at zero, a row.
     offset: PerSensor<f64>,
-    /// White noise in the file's quantity per second and √Hz, where something stands.
-    noise: PerSensor<Option<f64>>,
+    /// In the file's quantity per second, where something is at rest.
+    noise: PerSensor<Option<NoiseFigures>>,
     /// Output of the gyros at rest, the file's quantity a row.
     rest: Option<f64>,
     /// Sections laid end to end, as far as gravity shows.
@@ -46,24 +51,42 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if it cannot be read or has hardly any rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
-        let sheet = Sheet::read(path, FEWEST_ROWS)?;
-        let columns = Columns::find(&sheet);
-        let clock = Clock::find(&sheet, columns.time);
+        let mut sheet = Sheet::read(path, FEWEST_ROWS)?;
+        let instance = columns::instance(&sheet);
+        if let Some((column, number)) = instance {
+            sheet.retain(|columns, row| columns[column][row] == number);
+        }
+        let mut columns = Columns::find(&sheet);
+        // Rows of another sensor have nothing in them.
+        let of_triads: Vec<usize> = [columns.triads.gyro, columns.triads.accel]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .collect();
+        if columns.time.is_some() && !of_triads.is_empty() {
+            sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
+        }
+        let clock = Clock::find(&sheet, &mut columns);
         let mut triads = columns.samples(&sheet);
         let offset = triads.as_mut().map(units::centre).unwrap_or_default();
         let period = clock.period.unwrap_or(USUAL_PERIOD);
         let motion = triads.as_ref().map(|triads| Motion::find(triads, period));
         let quantities =
             Quantities::find(&sheet, &columns, &clock, triads.as_ref(), motion.as_ref());
-        let noise = PerSensor::from_fn(|sensor: Sensor| {
-            clock.period?;
-            let samples = triads.as_ref()?.get(sensor);
-            let rest = motion.as_ref()?.longest_rest.clone();
-            noise::white_level(&samples[rest], period, quantities.per_second(period))
-        });
+        let noise = |triads: &PerSensor<Vec<Vector3<f64>>>| {
+            let (period, rest) = (clock.period?, motion.as_ref()?.longest_rest.clone());
+            let at_rest = PerSensor::from_fn(|sensor| &triads.get(sensor)[rest.clone()]);
+            Some(noise::figures(
+                &at_rest,
+                period,
+                quantities.per_second(period),
+            ))
+        };
+        let noise = triads.as_ref().and_then(noise).unwrap_or_default();
         Ok(Self {
             rest: motion.as_ref().map(|motion| motion.rest.amax()),
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
+            instance,
             columns,
             clock,
             quantities,

@@ -129,7 +129,10 @@ impl Name {
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
         let is = |all: &[&str]| all.contains(&whole.as_str());
-        if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
+        // The instrument's own time before that of whoever received it.
+        if whole.ends_with("headerstamp") {
+            4
+        } else if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
             3
         } else if whole.contains("time") || is(&["sec", "seconds", "secs", "ms", "us", "ns"]) {
             2
@@ -144,6 +147,36 @@ impl Name {
         let whole = self.whole();
         let parts = ["count", "sample", "index", "packet", "seq"];
         parts.iter().any(|part| whole.contains(part)) || ["n", "i", "k", "id"].contains(&&*whole)
+    }
+
+    /// Whole seconds of a time that goes on in another column.
+    pub fn is_seconds(&self) -> bool {
+        let whole = self.whole();
+        ["sec", "secs", "seconds"]
+            .iter()
+            .any(|end| whole.ends_with(end))
+    }
+
+    /// What goes on there.
+    pub fn is_nanoseconds(&self) -> bool {
+        let whole = self.whole();
+        let ends = ["nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds"];
+        ends.iter().any(|end| whole.ends_with(end))
+    }
+
+    /// Whether it tells several instruments apart.
+    pub fn is_instance(&self) -> bool {
+        let whole = self.whole();
+        [
+            "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",
+        ]
+        .contains(&whole.as_str())
+    }
+
+    /// Ticks in s, where a maker's name for a time says what they are.
+    pub fn tick(&self) -> Option<f64> {
+        // Xsens, MT Low-Level Communication Protocol: 10 kHz.
+        (self.whole() == "sampletimefine").then_some(1e-4)
     }
 
     pub fn is_temperature(&self) -> bool {

@@ -1,27 +1,28 @@
-//! White noise of a standing instrument.
+//! The noise of an instrument at rest.
 
 use nalgebra::Vector3;
 
-use crate::noise::allan::overlapping;
+use crate::imu::PerSensor;
+use crate::noise::allan::cluster_sizes;
+use crate::noise::{Clusters, NoiseFigures, TriadNoise};
 
-/// Cluster time at which white noise is most of what is seen, s.
-const CLUSTER: f64 = 1.0;
-/// Clusters below which nothing is said.
-const FEWEST_CLUSTERS: usize = 8;
+/// Fewer samples show no noise.
+const FEWEST: usize = 64;
 
-/// Random walk by the Allan deviation at one cluster time, RMS of the axes, in the samples' unit a second and
-/// √Hz; `per_second` turns a row into a rate.
-pub(super) fn white_level(samples: &[Vector3<f64>], period: f64, per_second: f64) -> Option<f64> {
-    let longest = samples.len() / FEWEST_CLUSTERS;
-    let size = ((CLUSTER / period).round() as usize).clamp(1, longest.max(1));
-    let axes = (0..3).map(|axis| {
-        let increments = samples
-            .iter()
-            .map(|sample| sample[axis] * per_second * period);
-        let curve = overlapping(increments, period, &[size]);
-        Some(curve.variance.first()? * curve.tau.first()?)
-    });
-    let squares: Vec<f64> = axes.collect::<Option<_>>()?;
-    let mean = squares.iter().sum::<f64>() / 3.0;
-    (longest > 0 && mean > 0.0).then(|| mean.sqrt())
+/// What `turncal allan` makes of the same samples, in their unit a second; `per_second` turns a row into a
+/// rate.
+pub(super) fn figures(
+    samples: &PerSensor<&[Vector3<f64>]>,
+    period: f64,
+    per_second: f64,
+) -> PerSensor<Option<NoiseFigures>> {
+    let count = samples.gyro.len();
+    let clusters = Clusters::new(count, period, cluster_sizes(count));
+    PerSensor::from_fn(|sensor| {
+        let rows = samples.get(sensor).iter();
+        let increments: Vec<Vector3<f64>> = rows.map(|row| row * per_second * period).collect();
+        (count >= FEWEST)
+            .then(|| TriadNoise::new(&increments, period, &clusters).figures())
+            .flatten()
+    })
 }

@@ -189,3 +189,152 @@ fn registers_without_names_and_time_are_told_by_their_numbers() {
         ],
     );
 }
+
+fn joined(row: &[f64], separator: &str) -> String {
+    let row: Vec<String> = row.iter().map(f64::to_string).collect();
+    row.join(separator)
+}
+
+/// Orientation, angular velocity and linear acceleration as `sensor_msgs/Imu` has them.
+fn message([gx, gy, gz, ax, ay, az]: [f64; 6]) -> String {
+    let mut row = Vec::new();
+    for of in [&[0.0, 0.0, 0.0, 1.0][..], &[gx, gy, gz], &[ax, ay, az]] {
+        row.extend(of);
+        row.extend([0.0; 9]);
+    }
+    joined(&row, ",")
+}
+
+#[test]
+fn names_in_a_comment_above_rows_with_a_text_are_those_of_the_columns() {
+    let covariance = |of: &str| {
+        (0..9)
+            .map(|k| format!(",field.{of}_covariance{k}"))
+            .collect()
+    };
+    let triad = |of: &str, axes: &str| {
+        let axes: String = axes
+            .chars()
+            .map(|axis| format!(",field.{of}.{axis}"))
+            .collect();
+        let covariance: String = covariance(of);
+        axes + &covariance
+    };
+    let header = format!(
+        "%time,field.header.seq,field.header.stamp,field.header.frame_id{}{}{}\n",
+        triad("orientation", "xyzw"),
+        triad("angular_velocity", "xyz"),
+        triad("linear_acceleration", "xyz")
+    );
+    let text = draft(&header, |k, v| {
+        let stamp = 1_520_530_308_140_000_000u64 + 10_000_000 * k as u64;
+        format!("{},{k},{stamp},imu_link,{}", stamp + 977, message(v))
+    });
+    has(
+        &text,
+        &[
+            "time_unit = \"ns\"",
+            "gyro_unit = \"rad/s\"",
+            "accel_unit = \"m/s^2\"",
+            "columns = { time = \"field.header.stamp\", gyro = [\"field.angular_velocity.x\", ",
+        ],
+    );
+}
+
+#[test]
+fn seconds_and_nanoseconds_are_one_time_with_and_without_names() {
+    let time = |k: usize| format!("{},{}", 1_520_530_308 + k / 100, 10_000_000 * (k % 100));
+    let text = draft("", |k, v| format!("{},imu_link,{}", time(k), message(v)));
+    has(
+        &text,
+        &[
+            "columns = { time = [\"1\", \"2\"], gyro = [\"17\", \"18\", \"19\"], accel = [\"29\", \"30\", \"31\"] }",
+            "gyro_unit = \"rad/s\"",
+            "# sample_period_s = 0.01 ",
+        ],
+    );
+    let text = draft(
+        "stamp.sec,stamp.nanosec,frame_id,wx,wy,wz,fx,fy,fz\n",
+        |k, v| format!("{},imu_link,{}", time(k), joined(&v, ",")),
+    );
+    has(
+        &text,
+        &["columns = { time = [\"stamp.sec\", \"stamp.nanosec\"], gyro = [\"wx\", "],
+    );
+}
+
+#[test]
+fn a_rate_in_a_comment_decides_what_a_time_without_a_unit_is() {
+    let comments = "// Start Time: Unknown\n// Update Rate: 100.0Hz\n";
+    let names = "Acc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tRoll\n";
+    let row = |[gx, gy, gz, ax, ay, az]: [f64; 6]| joined(&[ax, ay, az, gx, gy, gz], "\t");
+    let text = draft(
+        &format!("{comments}PacketCounter\tSampleTimeFine\t{names}"),
+        |k, v| {
+            format!(
+                "{}\t{}\t{}\t",
+                (65_000 + k) % 65_536,
+                48_211 + 100 * k,
+                row(v)
+            )
+        },
+    );
+    has(
+        &text,
+        &[
+            "time_unit = \"count\"",
+            "sample_period_s = 0.01  # 100 Hz, as the file says",
+            "gyro_unit = \"rad/s\"",
+            "columns = { time = \"PacketCounter\", ",
+        ],
+    );
+    // Without a counter and without the comment.
+    let text = draft(&format!("SampleTimeFine\t{names}"), |k, v| {
+        format!("{}\t{}\t", 48_211 + 100 * k, row(v))
+    });
+    has(&text, &["sample_period_s = 0.01 ", "columns = { gyro = "]);
+    // Steps of ten are milliseconds at 100 Hz and microseconds at 100 kHz.
+    let text = draft(
+        "# sampling rate 100 Hz\nclock,wx,wy,wz,fx,fy,fz\n",
+        |k, v| format!("{},{}", 10 * k, joined(&v, ",")),
+    );
+    has(&text, &["time_unit = \"ms\"  # steps of 10 at 100 Hz"]);
+}
+
+#[test]
+fn rows_of_a_second_instrument_and_rows_without_samples_are_passed_over() {
+    let header = "timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,T\n";
+    let text = draft(header, |k, v| {
+        let time = 112_345_678 + 10_000 * k;
+        let seconds = time as f64 * 1e-6;
+        let other = v.map(|value| 0.9 * value + 0.1);
+        format!(
+            "{seconds:.6},{time},0,{},40\n{seconds:.6},{time},1,{},41",
+            joined(&v, ","),
+            joined(&other, ",")
+        )
+    });
+    has(
+        &text,
+        &[
+            "instance = { column = \"I\", number = 0 }",
+            "# sample_period_s = 0.01 ",
+            "continuous = true  # no gap in time",
+        ],
+    );
+    let text = draft("time_s,type,wx,wy,wz,fx,fy,fz,pressure\n", |k, v| {
+        let time = k as f64 * 0.01;
+        let row = format!("{time:.3},imu,{},", joined(&v, ","));
+        match k % 10 {
+            3 => format!("{row}\n{:.3},baro,,,,,,,1013.2", time + 0.005),
+            _ => row,
+        }
+    });
+    has(
+        &text,
+        &[
+            "# sample_period_s = 0.01 ",
+            "continuous = true  # no gap in time",
+        ],
+    );
+}

@@ -4,14 +4,17 @@ use std::fmt::Write;
 
 use super::Draft;
 use super::units::short;
-use crate::imu::{Output, Sensor};
+use crate::imu::{NoiseKeys, Output, Sensor};
+use crate::noise::NoiseFigures;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ};
 
 /// Knowledge before calibration that is usual in a class of instruments, 1σ.
 struct Class {
     name: &'static str,
     /// White noise of the gyros below which an instrument is of this class, rad/√s.
-    random_walk: f64,
+    angle_random_walk: f64,
+    /// The same of the accelerometers, (m/s)/√s.
+    velocity_random_walk: f64,
     scale_ppm: f64,
     installation: f64,
     /// rad/s.
@@ -23,7 +26,8 @@ struct Class {
 const CLASSES: [Class; 3] = [
     Class {
         name: "a navigation-grade",
-        random_walk: 0.01 * DEG_PER_SQRT_H,
+        angle_random_walk: 0.01 * DEG_PER_SQRT_H,
+        velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
         scale_ppm: 7_000.0,
         installation: 600.0 * ARCSEC,
         gyro_bias: 0.03 * DEGREE,
@@ -31,7 +35,8 @@ const CLASSES: [Class; 3] = [
     },
     Class {
         name: "a tactical-grade",
-        random_walk: 0.1 * DEG_PER_SQRT_H,
+        angle_random_walk: 0.1 * DEG_PER_SQRT_H,
+        velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
         scale_ppm: 10_000.0,
         installation: 3_600.0 * ARCSEC,
         gyro_bias: 0.2 * DEGREE,
@@ -39,7 +44,8 @@ const CLASSES: [Class; 3] = [
     },
     Class {
         name: "a MEMS",
-        random_walk: f64::INFINITY,
+        angle_random_walk: f64::INFINITY,
+        velocity_random_walk: f64::INFINITY,
         scale_ppm: 50_000.0,
         installation: 7_200.0 * ARCSEC,
         gyro_bias: 2.0 * DEGREE,
@@ -101,6 +107,11 @@ impl Draft {
             line(text, "time_unit", &quoted(clock.unit), &clock.why);
         }
         match clock.period {
+            Some(period) if clock.is_stated => {
+                let rate = short(period.recip());
+                let why = format!("{rate} Hz, as the file says");
+                line(text, "sample_period_s", &seven(period).to_string(), &why);
+            }
             Some(period) => {
                 let rate = short(period.recip());
                 let _ = writeln!(
@@ -136,6 +147,18 @@ impl Draft {
             "\"rfu\"",
             "guessed: x right, y front, z up; else \"frd\" or \"flu\"",
         );
+        if let Some((column, number)) = self.instance {
+            let of = format!(
+                "{{ column = {}, number = {number} }}",
+                quoted(&self.columns.names[column])
+            );
+            line(
+                text,
+                "instance",
+                &of,
+                "rows of several instruments: those of the first",
+            );
+        }
         self.columns(text);
     }
 
@@ -165,9 +188,16 @@ impl Draft {
             text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
         }
         let mut fields = Vec::new();
-        match columns.time {
-            Some(time) => fields.push(format!("time = {}", quoted(&columns.names[time]))),
-            None => text.push_str(
+        let name = |k: usize| quoted(&columns.names[k]);
+        match (columns.time, columns.nanoseconds) {
+            (Some(time), Some(further)) => {
+                fields.push(format!("time = [{}, {}]", name(time), name(further)));
+            }
+            (Some(time), None) => fields.push(format!("time = {}", quoted(&columns.names[time]))),
+            (None, _) if self.clock.is_stated => {
+                let _ = writeln!(text, "# {}: rows follow one another.", self.clock.why);
+            }
+            (None, _) => text.push_str(
                 "# TODO: no column goes forward like a time: name it, or give sample_period_s.\n",
             ),
         }
@@ -199,37 +229,48 @@ impl Draft {
         text.push_str(
             "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
         );
-        let random_walk =
-            |sensor| Some(self.noise.get(sensor).as_ref()? / self.quantities.scale(sensor)?.abs());
-        for (sensor, key, unit) in [
-            (
-                Sensor::Gyro,
-                "angle_random_walk_deg_per_sqrt_h",
-                DEG_PER_SQRT_H,
-            ),
-            (
-                Sensor::Accel,
-                "velocity_random_walk_ug_per_sqrt_hz",
-                MICRO_G_PER_SQRT_HZ,
-            ),
-        ] {
-            match random_walk(sensor) {
-                Some(walk) => {
-                    let _ = writeln!(text, "{key} = {}", short(walk / unit));
+        for sensor in Sensor::ALL {
+            let keys = NoiseKeys::of(sensor);
+            let (key, unit) = keys.random_walk;
+            let Some((figures, scale)) = self.figures(sensor) else {
+                todo(text, key, "the data sheet's figure");
+                continue;
+            };
+            let walk = format!("{:?}", short(figures.noise.random_walk / scale / unit));
+            match figures.random_walk_is_limit {
+                true => line(text, key, &walk, "a limit: its slope was not found"),
+                false => {
+                    let _ = writeln!(text, "{key} = {walk}");
                 }
-                None => todo(text, key, "the data sheet's figure"),
+            }
+            if let Some(of) = figures.noise.gauss_markov {
+                let (key, unit) = keys.gauss_markov;
+                let _ = writeln!(text, "{key} = {:?}", short(of.sigma / scale / unit));
+                let time = short(of.correlation_time);
+                let _ = writeln!(text, "{} = {time:?}", keys.correlation_time);
             }
         }
     }
 
+    /// The noise of a triad, with the file's quantity per second for one rad/s or m/s².
+    fn figures(&self, sensor: Sensor) -> Option<(&NoiseFigures, f64)> {
+        let figures = self.noise.get(sensor).as_ref()?;
+        Some((figures, self.quantities.scale(sensor)?.abs()))
+    }
+
+    /// By the noise of the gyros, else that of the accelerometers.
     fn class(&self) -> &'static Class {
-        let walk = || Some(self.noise.gyro? / self.quantities.scale(Sensor::Gyro)?.abs());
-        let [navigation, tactical, mems] = &CLASSES;
-        match walk() {
-            Some(walk) if walk < navigation.random_walk => navigation,
-            Some(walk) if walk < tactical.random_walk => tactical,
-            _ => mems,
-        }
+        let walk = |sensor| {
+            let (figures, scale) = self.figures(sensor)?;
+            Some(figures.noise.random_walk / scale)
+        };
+        let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
+            (Some(walk), _) => walk < class.angle_random_walk,
+            (None, Some(walk)) => walk < class.velocity_random_walk,
+            (None, None) => class.angle_random_walk.is_infinite(),
+        };
+        let [.., widest] = &CLASSES;
+        CLASSES.iter().find(is_of).unwrap_or(widest)
     }
 
     fn prior(&self, text: &mut String, sensor: Sensor) {

@@ -12,8 +12,16 @@ use super::search::Search;
 
 /// Correlation times tried in an octave.
 const PER_OCTAVE: f64 = 2.0;
-/// The shortest correlation time tried, in samples.
-const SHORTEST: f64 = 2.0;
+/// The shortest correlation time tried, in samples. What is correlated over less than an order of magnitude
+/// more than a sample is the bandwidth of white noise, and white to whoever integrates it.
+const SHORTEST: f64 = 10.0;
+/// The shortest one, in cluster times that are explained: shorter ones are not told from white noise.
+const TOLD: f64 = 2.0;
+/// Where something has to be left out, a start less probable than this is taken only if no later one is more
+/// so: one too late costs little, one too early is wrong.
+const DOUBTFUL: f64 = 0.05;
+/// Cluster times left out in a step: an octave.
+const STEP: usize = 2;
 
 /// A record's cluster times, with what the covariance of its Allan variances needs.
 pub struct Clusters {
@@ -45,14 +53,38 @@ impl Clusters {
 
     /// What the mean of some curves over these clusters shows; `None` if they are of others, too short or
     /// zero somewhere. Axes that are averaged count as independent.
+    ///
+    /// Pulses coarser than the noise and the bandwidth of a sensor make the deviations at short cluster
+    /// times, and no process describes them: where none does, the shortest ones are left out, up to half of
+    /// all, and one octave more, for what is left of them just below notice. What no start helps is taken as
+    /// it is, with a misfit.
     pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
-        if curves
-            .iter()
-            .any(|curve| curve.variance.len() != self.sizes.len())
+        let varies = |v: &f64| v.is_finite() && *v > 0.0;
+        let curve = mean(curves);
+        if curves.iter().any(|c| c.variance.len() != self.sizes.len())
+            || curve.tau.len() < 2
+            || !curve.variance.iter().all(varies)
         {
             return None;
         }
-        Search::new(self, shares(curves), &mean(curves)).run()
+        let shares = shares(curves);
+        let from = |first: usize| Search::new(self, first, &shares, &curve);
+        let mut sound = None;
+        for first in (0..=curve.tau.len() / 2).step_by(STEP) {
+            match from(first).probable() {
+                Some((found, probability)) if first == 0 || probability > DOUBTFUL => {
+                    sound = Some(found);
+                    break;
+                }
+                Some((found, _)) => sound = sound.or(Some(found)),
+                None => {}
+            }
+        }
+        let Some(sound) = sound else {
+            return from(0).with_misfit();
+        };
+        let further = (sound.first > 0).then(|| from(sound.first + STEP).probable());
+        Some(further.flatten().map_or(sound, |(found, _)| found))
     }
 
     /// How the points of one curve vary together under a mixture.
@@ -74,9 +106,15 @@ impl Clusters {
             .under(mixture)
     }
 
-    /// Correlation times to be tried, in s.
-    pub(super) fn correlation_times(&self) -> impl Iterator<Item = f64> {
-        self.markov().iter().map(|(time, _)| *time)
+    /// The shortest correlation time where cluster times from this one on are explained, both in s.
+    pub(super) fn shortest_time(&self, shortest: f64) -> f64 {
+        (SHORTEST * self.period).max(TOLD * shortest)
+    }
+
+    /// Correlation times to be tried there.
+    pub(super) fn correlation_times(&self, shortest: f64) -> impl Iterator<Item = f64> {
+        let times = self.markov().iter().map(|(time, _)| *time);
+        times.filter(move |&time| time >= self.shortest_time(shortest))
     }
 
     fn markov(&self) -> &[(f64, Covariance)] {

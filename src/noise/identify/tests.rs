@@ -246,6 +246,7 @@ fn an_interval_is_there_where_a_ramp_leaves_nothing_random() {
         found: Vec::new(),
         hidden: Vec::new(),
         misfit: 0.0,
+        first: 0,
         freedom: vec![f64::INFINITY],
         for_filter: Vec::new(),
     };
@@ -259,4 +260,180 @@ fn an_interval_is_there_where_a_ramp_leaves_nothing_random() {
     let exact = width(&identified);
     identified.freedom = vec![1.001 * MANY];
     assert!((width(&identified) / exact - 1.0).abs() < 0.01);
+}
+
+/// Whole pulses of a rate with white noise.
+fn pulses(random_walk: f64, pulse: f64, rate: f64, samples: usize, seed: u64) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let (mut angle, mut before) = (0.37 * seed as f64, 0.0);
+    let mut one = || {
+        angle += (rate * PERIOD + random_walk * PERIOD.sqrt() * normal()) / pulse;
+        let counts = angle.floor() - before;
+        before = angle.floor();
+        counts * pulse
+    };
+    one();
+    (0..samples).map(|_| one()).collect()
+}
+
+/// In how many of 100 records white noise is found and is within its 95 % interval, and by how much of itself
+/// it is off at most.
+fn within(samples: usize, random_walk: f64, record: impl Fn(u64) -> Vec<f64>) -> (u64, f64) {
+    let clusters = clusters(samples);
+    let (mut times, mut most) = (0, 0.0);
+    for seed in 0..100 {
+        let curve = overlapping(record(seed).into_iter(), PERIOD, clusters.sizes());
+        let identified = clusters.identify(&[&curve]).unwrap();
+        let found = of_kind(&identified.found, Process::RandomWalk).expect("white noise");
+        let off = (found.strength - random_walk).abs();
+        times += u64::from(off < 1.96 * found.sigma);
+        most = f64::max(most, off / random_walk);
+    }
+    (times, most)
+}
+
+/// 0.001 °/√h under pulses of 0.1″, at rest, and turning with and much slower than the Earth.
+#[test]
+#[ignore = "300 records of 20 minutes"]
+fn white_noise_under_pulses_coarser_than_it_is_found_within_its_interval_in_95_of_100_records() {
+    let (random_walk, pulse) = (2.909e-7, 4.848e-7);
+    for rate in [0.0, 5.3e-5, 7.3e-7] {
+        let record = |seed| pulses(random_walk, pulse, rate, 120_000, seed);
+        let (times, most) = within(120_000, random_walk, record);
+        assert!(times >= 95, "{times} at {rate} rad/s");
+        assert!(most < 0.2, "{most} at {rate} rad/s");
+    }
+}
+
+#[test]
+fn white_noise_under_pulses_coarser_than_it_is_found_and_no_gauss_markov_process_in_its_place() {
+    let (random_walk, samples) = (2.909e-7, 120_000);
+    let clusters = clusters(samples);
+    for seed in 0..4 {
+        let record = pulses(random_walk, 4.848e-7, 5.3e-5, samples, seed);
+        let curve = overlapping(record.into_iter(), PERIOD, clusters.sizes());
+        let identified = clusters.identify(&[&curve]).unwrap();
+        let found = of_kind(&identified.found, Process::RandomWalk).expect("white noise");
+        assert!(
+            (found.strength / random_walk - 1.0).abs() < 0.1,
+            "{found:?}"
+        );
+        assert!(identified.first > 0);
+        let others = [Process::RandomWalk, Process::Quantisation];
+        for found in identified.found.iter().chain(&identified.for_filter) {
+            assert!(others.contains(&found.process), "{found:?}");
+        }
+    }
+}
+
+/// White noise of strength one through two poles of this bandwidth in Hz at 0.707 of critical damping.
+fn filtered(bandwidth: f64, samples: usize, seed: u64) -> Vec<f64> {
+    const FINE: usize = 32;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let step = PERIOD / FINE as f64;
+    let omega = 2.0 * std::f64::consts::PI * bandwidth;
+    let (mut rate, mut slope) = (0.0, 0.0);
+    let mut one = || {
+        let mut angle = 0.0;
+        for _ in 0..FINE {
+            let white = normal() / step.sqrt();
+            slope += step * (omega * omega * (white - rate) - 2f64.sqrt() * omega * slope);
+            rate += step * slope;
+            angle += step * rate;
+        }
+        angle
+    };
+    (0..samples).map(|_| one()).collect()
+}
+
+#[test]
+#[ignore = "200 records of 20 minutes"]
+fn a_bandwidth_of_two_poles_leaves_the_white_noise_within_its_interval() {
+    for (bandwidth, largest) in [(40.0, 0.03), (10.0, 0.1)] {
+        let record = |seed| filtered(bandwidth, 120_000, seed);
+        let (times, most) = within(120_000, 1.0, record);
+        assert!(
+            times >= 93 && most < largest,
+            "{times} {most} at {bandwidth} Hz"
+        );
+    }
+}
+
+#[test]
+fn a_bandwidth_of_two_poles_is_no_bias() {
+    let samples = 120_000;
+    let clusters = clusters(samples);
+    for seed in 0..4 {
+        let record = filtered(40.0, samples, seed);
+        let curve = overlapping(record.into_iter(), PERIOD, clusters.sizes());
+        let identified = clusters.identify(&[&curve]).unwrap();
+        for found in identified.found.iter().chain(&identified.for_filter) {
+            assert_eq!(found.process, Process::RandomWalk);
+            assert!((found.strength - 1.0).abs() < 0.03, "{found:?}");
+        }
+    }
+}
+
+#[test]
+fn where_no_process_describes_the_curve_its_own_scatter_makes_the_intervals() {
+    let samples = 20_000;
+    let clusters = clusters(samples);
+    let mut curve = overlapping(
+        Made {
+            random_walk: 1.0,
+            ..Made::default()
+        }
+        .increments(samples, 1)
+        .into_iter(),
+        PERIOD,
+        clusters.sizes(),
+    );
+    // Deviations that differ threefold from one point to the next, as dither makes them.
+    for (k, variance) in curve.variance.iter_mut().enumerate() {
+        *variance *= if k % 2 == 0 { 1.0 } else { 9.0 };
+    }
+    let identified = clusters.identify(&[&curve]).unwrap();
+    assert!(identified.misfit > 0.5, "{}", identified.misfit);
+    for point in 0..curve.tau.len() {
+        let (low, high) = identified.interval(&curve, point, 0.95).unwrap();
+        let factor = (high / low).sqrt();
+        assert!(factor > 3.0, "{point}: {factor}");
+    }
+}
+
+#[test]
+fn a_triads_figure_lies_within_those_of_its_axes() {
+    let shows = |strength: Option<f64>| Identified {
+        found: Vec::from_iter(strength.map(|strength| Found {
+            process: Process::RandomWalk,
+            strength,
+            sigma: 0.03,
+            sigma_log_time: None,
+        })),
+        hidden: Vec::from_iter(strength.is_none().then_some(Hidden {
+            process: Process::RandomWalk,
+            limit: 0.5,
+        })),
+        misfit: 0.0,
+        first: 0,
+        freedom: Vec::new(),
+        for_filter: Vec::new(),
+    };
+    let axes = [1.0, 1.2, 1.4].map(|strength| shows(Some(strength)));
+    let mean_square = ((1.0 + 1.44 + 1.96f64) / 3.0).sqrt();
+    for (own, expected) in [
+        (Some(1.1), 1.1),
+        (Some(0.8), mean_square),
+        (Some(1.5), mean_square),
+        (None, mean_square),
+    ] {
+        let held = shows(own).within(&axes.each_ref());
+        assert!((held.found[0].strength - expected).abs() < 1e-12, "{own:?}");
+        assert!(held.found.len() == 1 && held.hidden.is_empty());
+    }
+    // One axis that does not show it says nothing of the others.
+    let held = shows(Some(0.8)).within(&[&axes[0], &axes[1], &shows(None)]);
+    assert_eq!(held.found[0].strength, 0.8);
 }

@@ -83,6 +83,7 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
         "coefficients": coefficients.collect::<Map<_, _>>(),
         "limits": limits.collect::<Map<String, Value>>(),
         "lowest": lowest,
+        "described_from_s": identified.and_then(|of| curve.tau.get(of.first).copied()),
         "misfit": identified.map(|of| 0.5 * of.misfit),
         "jumps": axis.knocks,
     })

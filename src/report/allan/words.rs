@@ -3,7 +3,7 @@
 use super::super::number::{count, sigma, three_digits};
 use super::quantity::quantity;
 use crate::imu::{AXES, Sensor};
-use crate::noise::{Hidden, NoiseAnalysis, Process, TriadNoise, of_kind};
+use crate::noise::{Hidden, Identified, NoiseAnalysis, Process, TriadNoise, of_kind};
 
 /// Random walks of the axes of a triad that differ by more than this factor are not alike.
 const UNLIKE: f64 = 1.5;
@@ -13,13 +13,25 @@ const SMALL: f64 = 0.02;
 pub(super) const INTERVALS: &str = "A deviation s with ν degrees of freedom lies with 95 % probability \
     between s √(ν/χ²₀.₉₇₅) and s √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
 
+/// What is left out at the short end, in a sentence.
+fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
+    let from = taus.get(of.first).filter(|_| of.first > 0)?;
+    Some(format!(
+        "no process describes its deviations below {}: pulses coarser than the noise, or the bandwidth of the \
+         sensor. Coefficients are of the longer cluster times.",
+        duration(*from)
+    ))
+}
+
 pub(super) const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two \
     cluster times in an octave. Coefficients: generalised least squares of the variances as a sum of \
     processes (IEEE Std 952, annex C; El-Sheimy, Hou, Niu 2008), none of them negative, weighted by the \
     covariance that the points have under those very processes, from their generalised \
     autocovariances (Greenhall, Riley 2003), which also gives the equivalent degrees of freedom. Of all \
     combinations the most likely one is taken, where each process must raise twice the logarithm of the \
-    likelihood by 9 (3σ), and a correlation time by 4 more. Bias instability B is the coefficient of flicker noise, whose floor is 0.664 B.";
+    likelihood by 9 (3σ), and a correlation time by 4 more. Short cluster \
+    times at which no combination describes the deviations, where pulses coarser than the noise or the bandwidth of \
+    the sensor show, are left out. Bias instability B is the coefficient of flicker noise, whose floor is 0.664 B.";
 
 /// What forbids to trust the figures, or to use them without thought.
 pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
@@ -50,7 +62,10 @@ pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
                     // Of a deviation, half as much as of a variance.
                     sigma(50.0 * of.misfit)
                 )),
-                Some(_) => {}
+                Some(of) => {
+                let left_out = left_out(of, &axis.curve.tau);
+                warnings.extend(left_out.map(|text| format!("{name} {letter}: {text}")));
+            }
             }
             if axis.knocks > 0 {
                 warnings.push(format!(
