@@ -343,7 +343,7 @@ impl fmt::Display for Finding {
                 write!(
                     f,
                     "Residuals of {of} are larger than stated: χ² {chi_square:.4e} with {degrees} degrees of \
-                     freedom, where true σ stay below {limit:.1}. σ were widened by it, up to {growth:.2} times. What \
+                     freedom, where true σ stay below {limit:.1}. σ hold them now and are up to {growth:.2} times as large. What \
                      fits the others least is at {}; without it χ² is {without:.4e}. If that is little, look \
                      there: a bump, a wrong label or attitude; if not, at what all have in common: stated \
                      noise, level and north, gravity's direction, a hand that is not still.",

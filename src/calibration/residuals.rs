@@ -72,9 +72,13 @@ impl Residuals {
 
     /// What χ² stays below if model and σ are right, but for one run in two thousand.
     pub fn limit(&self) -> f64 {
-        // Without a degree of freedom nothing can ring.
-        ChiSquared::new(self.degrees() as f64)
-            .map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - FALSE_ALARM))
+        limit(self.degrees())
+    }
+
+    /// Whether this χ² is within its limit where so many equations are left out.
+    pub fn would_hold(&self, chi_square: f64, left_out: usize) -> bool {
+        let degrees = self.degrees().saturating_sub(left_out);
+        degrees > 0 && chi_square <= limit(degrees)
     }
 
     /// By how much all σ are to grow, the Birge ratio; none where χ² is within its limit.
@@ -114,6 +118,12 @@ impl Residuals {
             .map(|(along, value)| along.powi(2) / value)
             .sum()
     }
+}
+
+fn limit(degrees: usize) -> f64 {
+    // Without a degree of freedom nothing can ring.
+    ChiSquared::new(degrees as f64)
+        .map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - FALSE_ALARM))
 }
 
 #[cfg(test)]

@@ -336,3 +336,40 @@ fn the_closed_form_is_as_wrong_as_its_sigma_say_or_says_what_is_wrong() {
         assert_eq!(tried.contradicted, RUNS as usize, "{what}");
     }
 }
+
+#[test]
+fn one_position_that_is_off_costs_no_more_than_that_position() {
+    let solved = |run: &Run| {
+        let problem = Problem::new(run, &Options::default());
+        match problem.solve(Method::SixPosition, &|_| {}).unwrap() {
+            Solution::ClosedForm(closed_form) => *closed_form,
+            Solution::Filter(_) => unreachable!("the closed form was asked for"),
+        }
+    };
+    let mut made = Scenario::load("demo").unwrap().simulate(4, 0).unwrap();
+    let clean = solved(&made.run);
+    let dwells = made.run.dwells(Aiding::Table);
+    let period = made.run.recording.imu.period;
+    // Something turns the IMU by 4″ a second on its face, too slowly for a standstill to end by it.
+    for k in dwells[9].samples.clone() {
+        made.run.recording.imu.gyro[k].x += 4.0 * ARCSEC * period;
+    }
+    let spoilt = solved(&made.run);
+    let named = spoilt.findings.iter().find_map(|finding| match finding {
+        Finding::ResidualsLarge { worst, .. } => Some(worst.clone()),
+        _ => None,
+    });
+    let time = |sample| made.run.recording.imu.time(sample);
+    let [[begin, end]] = named.unwrap()[..] else {
+        panic!("{spoilt:?}")
+    };
+    assert!(time(dwells[9].samples.start) <= begin && end <= time(dwells[9].samples.end));
+    let growth = spoilt
+        .estimate
+        .sigma()
+        .component_div(&clean.estimate.sigma());
+    assert!(growth.max() < 1.5, "{}", growth.max());
+    let (nees, count, sigmas) = squares(&spoilt, &made);
+    let mean = nees / count as f64;
+    assert!(mean < 2.0 && sigmas < 4.0, "{mean} {sigmas}");
+}

@@ -52,9 +52,16 @@ pub(super) fn both_triads(
         let fit = match rings {
             None => fit,
             Some(residuals) => {
-                let wider = stated.widened(unexplained(stated, &fit.triad));
-                let wider = fitted(&wider, problem, sensor)?;
-                let worst = residuals.worst(&by_position(stated.positions.len()));
+                let all: Vec<usize> = (0..stated.positions.len()).collect();
+                let worst = residuals.worst(&by_position(all.len()));
+                // Where one position explains it, the others are as good as stated.
+                let places = if residuals.would_hold(worst.without, 3) {
+                    &worst.groups
+                } else {
+                    &all
+                };
+                let variance = unexplained(stated, &fit.triad, places);
+                let wider = fitted(&stated.widened(variance, places), problem, sensor)?;
                 let times = worst.groups.iter().map(|&k| stated.times[k]);
                 findings.push(Finding::ResidualsLarge {
                     of: sensor.name(),
@@ -103,19 +110,19 @@ fn left_by(observed: &Observed, triad: &Triad) -> Option<Residuals> {
     Residuals::new(&design, &errors, &covariance)
 }
 
-/// The variance that every axis of every position must have more for χ² of the residuals to be what is
+/// The variance that every axis of these positions must have more for χ² of the residuals to be what is
 /// expected of it.
 ///
 /// It is added, not multiplied: residuals may all be of axes across the input, where a table's attitude
 /// makes stated σ large, and say nothing of how far those along it, which tell scale factors, are off.
-fn unexplained(observed: &Observed, triad: &Triad) -> f64 {
+fn unexplained(observed: &Observed, triad: &Triad, places: &[usize]) -> f64 {
     /// A factor of two a step, down to rounding.
     const HALVINGS: i32 = 60;
     let errors = observed.positions.iter();
     let errors = errors.map(|p| (p.output - triad.output(&p.input)).norm_squared());
     let most: f64 = errors.sum();
     let is_enough = |variance: f64| {
-        let residuals = left_by(&observed.widened(variance), triad);
+        let residuals = left_by(&observed.widened(variance, places), triad);
         residuals.is_none_or(|left| left.chi_square() <= left.degrees() as f64)
     };
     let halved = |times: i32| most * 0.5f64.powi(times);

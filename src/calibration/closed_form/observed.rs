@@ -65,17 +65,15 @@ impl Observed {
         sizes.fold(0.0, f64::max)
     }
 
-    /// The same with this variance more on every axis of every position, as of a bias that is new at each.
-    pub fn widened(&self, variance: f64) -> Self {
-        let wider = |position: &Position| Position {
-            variance: position.variance.add_scalar(variance),
-            weighted: position.weighted.add_scalar(variance),
-            ..*position
-        };
-        Self {
-            positions: self.positions.iter().map(wider).collect(),
-            ..self.clone()
+    /// The same with this variance more on every axis of these positions, as of a bias that is new at each.
+    pub fn widened(&self, variance: f64, places: &[usize]) -> Self {
+        let mut wider = self.clone();
+        for &place in places {
+            let position = &mut wider.positions[place];
+            position.variance = position.variance.add_scalar(variance);
+            position.weighted = position.weighted.add_scalar(variance);
         }
+        wider
     }
 
     /// How all outputs change with the errors of what the inputs are known from, by a triad of this
