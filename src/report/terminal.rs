@@ -4,7 +4,6 @@ use comfy_table::{CellAlignment, ContentArrangement, presets};
 use textwrap::Options;
 
 use super::document::{Block, Document, Facts, List, Medium, Table};
-pub use crate::shown::printable;
 
 /// A heading of a column is broken into lines of at least so many letters.
 const HEADING: usize = 9;
@@ -203,6 +202,26 @@ pub(super) fn layout(document: &Document, width: usize) -> String {
     text(document, Some(width)).replace(|letter: char| letter.is_ascii_digit(), "0")
 }
 
+/// Text without what a terminal would obey instead of show: controls other than line ends, and marks that turn
+/// the direction of writing, are escaped.
+pub fn printable(text: &str) -> String {
+    let obeyed = |c: char| {
+        let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        (c.is_control() && c != '\n') || turns
+    };
+    if !text.contains(obeyed) {
+        return text.to_owned();
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match obeyed(c) {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
+    shown
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::document::cells;
@@ -244,5 +263,12 @@ mod tests {
             assert!(longest <= Some(width), "{width}:\n{text}");
         }
         assert!(!text(&document(), Some(24)).contains("22.0"));
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown_escaped() {
+        assert_eq!(printable("a\u{1b}[31mb\nc"), "a\\u{1b}[31mb\nc");
+        assert_eq!(printable("\u{9b}2J\u{202e}\r"), "\\u{9b}2J\\u{202e}\\r");
+        assert_eq!(printable("µg °/√h ″"), "µg °/√h ″");
     }
 }

@@ -66,6 +66,7 @@ fn by_hand() -> [Vec<ParameterVector>; 4] {
 }
 
 #[test]
+#[ignore = "slow: the same study on one thread, on two and by hand"]
 fn a_study_is_its_runs_made_one_by_one_whatever_the_number_of_threads() {
     let one = study("1");
     assert_eq!(one, study("2"));

@@ -23,6 +23,7 @@ fn turncal(stack: Option<&str>, arguments: &[&str], here: &Path) -> Output {
 }
 
 #[test]
+#[ignore = "slow: the same job with and without threads"]
 fn without_further_threads_the_same_is_done_on_one() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
