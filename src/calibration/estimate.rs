@@ -34,3 +34,13 @@ impl Estimate {
         (0..self.covariance.nrows()).filter(|&i| self.covariance[(i, i)] > 0.0)
     }
 }
+
+/// By how much the σ that grew most did, of variances before and after.
+pub(super) fn largest_growth(before: &[f64], after: &[f64]) -> f64 {
+    let known = before
+        .iter()
+        .zip(after)
+        .filter(|(before, _)| **before > 0.0);
+    let ratios = known.map(|(before, after)| after / before);
+    ratios.fold(1.0, f64::max).sqrt()
+}

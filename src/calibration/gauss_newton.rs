@@ -6,7 +6,7 @@ use super::coarse::{CoarseStart, coarse_start};
 use super::curvature::curvature;
 use super::dwell_scatter::DwellScores;
 use super::error::CalibrationError;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, largest_growth};
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
 use super::innovation::{consistency, inconsistencies};
@@ -16,7 +16,7 @@ use super::linearisation::{AttitudePrior, singular};
 use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
-use super::parameters::{ParameterMatrix, parameter_name};
+use super::parameters::parameter_name;
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
@@ -90,7 +90,10 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         held.widen(&Layout::new(&problem.model), widened);
     }
     let estimate = estimated(&held);
-    let growth = by_scatter.map(|_| largest_growth(&covariance_by_noise, &estimate.covariance));
+    let growth = by_scatter.map(|_| {
+        let variances = [&covariance_by_noise, &estimate.covariance].map(|c| c.diagonal());
+        largest_growth(variances[0].as_slice(), variances[1].as_slice())
+    });
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
@@ -147,13 +150,6 @@ fn estimated(held: &PassResult) -> Estimate {
         covariance: held.covariance + curvature(&triads, &held.covariance),
         triads,
     }
-}
-
-/// The largest σ over what it was.
-fn largest_growth(before: &ParameterMatrix, after: &ParameterMatrix) -> f64 {
-    let variances = before.diagonal().component_div(&after.diagonal());
-    let smallest = variances.iter().copied().filter(|ratio| *ratio > 0.0);
-    smallest.fold(1.0, f64::min).sqrt().recip()
 }
 
 /// A calibration from one start.

@@ -1,7 +1,6 @@
 //! Parameters that the prior does not allow, and what most likely made them so.
 
 use nalgebra::Vector3;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::estimate::Estimate;
 use super::finding::Finding;
@@ -9,6 +8,7 @@ use super::model::Model;
 use super::parameters::{parameter, parameter_name, sensor_and_parameter};
 use super::prior_cause::PriorCause;
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
+use crate::statistics::chi_square_limit;
 use crate::units::{DEGREE, PPM};
 
 /// Parameters further from their prior than this many of its σ contradict it.
@@ -44,8 +44,8 @@ pub(super) fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
         .collect();
     let distance = |&i: &usize| (off[i] / model.prior_sigma[i]).powi(2);
     let squared: f64 = known.iter().map(distance).sum();
-    let chi2 = ChiSquared::new(known.len() as f64).ok()?;
-    let contradicted = chi2.sf(squared) < FALSE_ALARM || !far(model, estimate).is_empty();
+    let limit = chi_square_limit(known.len() as f64, FALSE_ALARM);
+    let contradicted = squared > limit || !far(model, estimate).is_empty();
     let mut widened = model.clone();
     for &i in &known {
         widened.prior_sigma[i] = widened.prior_sigma[i].max(off[i].abs());

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::innovation::Observation;
 use super::linearisation::{AttitudePrior, Start};
@@ -15,6 +14,7 @@ use crate::attitude::to_tilt_and_heading;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Dwell, Run};
+use crate::statistics::chi_square_limit;
 
 /// 1σ of the initial velocity: a body at rest, m/s.
 const INITIAL_VELOCITY: f64 = 1e-3;
@@ -185,10 +185,7 @@ impl<'a> Problem<'a> {
 
     /// Squared whitened innovation of three components beyond which an observation is an outlier.
     pub(super) fn gate(&self) -> f64 {
-        // Three degrees of freedom are always valid.
-        ChiSquared::new(3.0).map_or(f64::INFINITY, |chi2| {
-            chi2.inverse_cdf(1.0 - self.options.false_rejection)
-        })
+        chi_square_limit(3.0, self.options.false_rejection)
     }
 }
 

@@ -1,7 +1,8 @@
 //! What a triad's outputs leave of any linear triad, whatever its parameters.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::statistics::chi_square_limit;
 
 /// Chance that residuals of a right model ring, of each of the two triads.
 const FALSE_ALARM: f64 = 1e-3 / 2.0;
@@ -121,9 +122,7 @@ impl Residuals {
 }
 
 fn limit(degrees: usize) -> f64 {
-    // Without a degree of freedom nothing can ring.
-    ChiSquared::new(degrees as f64)
-        .map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - FALSE_ALARM))
+    chi_square_limit(degrees as f64, FALSE_ALARM)
 }
 
 #[cfg(test)]

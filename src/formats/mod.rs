@@ -7,7 +7,6 @@ mod axes;
 mod calibration_file;
 mod clock;
 mod csv_file;
-mod doubts;
 pub mod draft;
 pub(crate) mod error;
 pub mod export;

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::doubts;
 use super::error::FileError;
 use super::fields::{Document, Fields};
 use super::instrument::InstrumentFields;
@@ -105,7 +104,7 @@ impl Run {
             standstill,
             segment_sigma: segment_sigma.unwrap_or(SET_BY_HAND),
         };
-        let doubts = doubts::of(&run);
+        let doubts = run.doubts();
         Ok(run.with_notes(doubts))
     }
 

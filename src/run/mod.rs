@@ -4,6 +4,7 @@
 //! All is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
 //! the files' units and axes end in [`crate::formats`].
 
+mod doubts;
 mod dwells;
 pub mod motion;
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 use super::super::error::CalibrationError;
-use super::super::estimate::Estimate;
+use super::super::estimate::{Estimate, largest_growth};
 use super::super::finding::Finding;
 use super::super::linearisation::singular;
 use super::super::parameters::{ParameterMatrix, from_vector, parameter};
@@ -63,12 +63,13 @@ pub(super) fn both_triads(
                 let variance = unexplained(stated, &fit.triad, places);
                 let wider = fitted(&stated.widened(variance, places), problem, sensor)?;
                 let times = worst.groups.iter().map(|&k| stated.times[k]);
+                let variances = [&fit, &wider].map(|fit| fit.covariance.diagonal());
                 findings.push(Finding::ResidualsLarge {
                     of: sensor.name(),
                     chi_square: residuals.chi_square(),
                     degrees: residuals.degrees(),
                     limit: residuals.limit(),
-                    growth: largest_growth(&fit, &wider),
+                    growth: largest_growth(variances[0].as_slice(), variances[1].as_slice()),
                     worst: times.collect(),
                     without: worst.without,
                 });
@@ -141,17 +142,6 @@ fn unexplained(observed: &Observed, triad: &Triad, places: &[usize]) -> f64 {
         } = middle;
     }
     high
-}
-
-/// By how much the σ that grew most did.
-fn largest_growth(from: &Fit, to: &Fit) -> f64 {
-    let variances = from.covariance.diagonal();
-    let grown = to.covariance.diagonal();
-    let pairs = variances.iter().zip(&grown);
-    let ratios = pairs
-        .filter(|(before, _)| **before > 0.0)
-        .map(|(before, after)| after / before);
-    ratios.fold(1.0, f64::max).sqrt()
 }
 
 fn fitted(observed: &Observed, problem: &Problem, sensor: Sensor) -> Result<Fit, CalibrationError> {

@@ -4,6 +4,8 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use statrs::function::gamma::ln_gamma;
 
+use crate::statistics::chi_square_limit;
+
 /// What parameters explain of the data, against what they explain by chance.
 ///
 /// By chance the cost falls by `Σ w_k χ²₁`, w_k the share of the prior variance that the data take in the
@@ -48,9 +50,7 @@ impl Evidence {
 
     /// What the gain stays below but for this chance.
     pub fn limit(&self, chance: f64) -> f64 {
-        ChiSquared::new(self.states).map_or(f64::INFINITY, |chi2| {
-            self.share * chi2.inverse_cdf(1.0 - chance)
-        })
+        self.share * chi_square_limit(self.states, chance)
     }
 }
 

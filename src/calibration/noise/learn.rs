@@ -214,7 +214,7 @@ fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) -> bo
 }
 
 impl Likelihood<'_> {
-    /// The test of what is stated, and what the data call for where that was worked out.
+    /// The test of what is stated, and the fit of all factors where one was made.
     fn test(&self, policy: NoisePolicy) -> Result<(NoiseTest, Option<Fit>), CalibrationError> {
         let sources = self.scale.present();
         let stated = self.scale.initial();

@@ -1,17 +1,19 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+mod propagation;
+mod update;
 
-use super::measurement::{Measurement, ScalarInnovation};
+use nalgebra::{DMatrix, DVector, Vector3};
+
 use super::sensitivity::Sensitivity;
 use crate::attitude::{skew, to_tilt_and_heading};
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
-use crate::imu::{PerSensor, Sensor, TermVector};
-use crate::navigation::{Block, ProcessNoise, State};
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
+use crate::imu::{PerSensor, TermVector};
+use crate::navigation::{ProcessNoise, State};
 
 /// Mean and covariance of the errors.
 #[derive(Debug, Clone)]
@@ -130,238 +132,6 @@ impl Filter {
         if let Some(turn) = self.layout.turn_at_rest() {
             (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));
         }
-    }
-
-    /// Carries mean and covariance over a block.
-    pub fn propagate(&mut self, block: &Block) {
-        match self.layout.turn_at_rest() {
-            Some(_) => self.carry::<{ NAVIGATION + 3 }>(block),
-            None => self.carry::<NAVIGATION>(block),
-        }
-        self.vary(block.duration);
-    }
-
-    /// Only the rows of Φ of `MOVING` states differ from identity: navigation errors and, where there is
-    /// one, the turn at rest. Of `Φ P Φᵀ + Q` only their rows and columns change.
-    fn carry<const MOVING: usize>(&mut self, block: &Block) {
-        let phi = self.moving_rows::<MOVING>(block);
-        let n = self.x.len();
-        let mut x = [0.0; MOVING];
-        let mut rows = vec![[0.0; MOVING]; n];
-        let mut corner = [[0.0; MOVING]; MOVING];
-        let p = self.p.as_slice();
-        for (k, column) in phi.iter().enumerate() {
-            add_scaled(&mut x, column, self.x[k]);
-        }
-        for (j, row) in rows.iter_mut().enumerate() {
-            let p = &p[n * j..n * j + phi.len()];
-            let mut sum = [0.0; MOVING];
-            for (column, p) in phi.iter().zip(p) {
-                add_scaled(&mut sum, column, *p);
-            }
-            *row = sum;
-        }
-        for (k, row_of_corner) in corner.iter_mut().enumerate() {
-            let mut sum = [0.0; MOVING];
-            for (column, row) in phi.iter().zip(&rows) {
-                add_scaled(&mut sum, row, column[k]);
-            }
-            *row_of_corner = sum;
-        }
-        let turn = self.layout.turn_at_rest().unwrap_or(n);
-        // Where a moving state is, and which navigation error's noise it has.
-        let place = |moving: usize| match moving.checked_sub(NAVIGATION) {
-            Some(axis) => (turn + axis, ATTITUDE + axis),
-            None => (moving, moving),
-        };
-        let constants = NAVIGATION..turn;
-        for constant in constants.chain((turn + 3).min(n)..n) {
-            for (moving, &covariance) in rows[constant].iter().enumerate() {
-                let (moving, _) = place(moving);
-                self.p[(moving, constant)] = covariance;
-                self.p[(constant, moving)] = covariance;
-            }
-        }
-        let noise = block.noise.covariance(&self.noise);
-        for (column, sum) in corner.iter().enumerate() {
-            let (at_column, of_column) = place(column);
-            self.x[at_column] = x[column];
-            for (row, sum) in sum.iter().enumerate() {
-                let (at_row, of_row) = place(row);
-                self.p[(at_row, at_column)] = sum + noise[(of_row, of_column)];
-            }
-            if at_column >= NAVIGATION {
-                self.p[(at_column, at_column)] += self.turning.powi(2) * block.duration;
-            }
-        }
-        if let Some(sensitivity) = &mut self.sensitivity {
-            let on = self.layout.terms().count();
-            let tried = self.layout.tried_terms().zip(&block.terms[on..]);
-            let tried = tried.map(|((k, _), term)| {
-                (
-                    k,
-                    std::array::from_fn(|moving| term.column[place(moving).1]),
-                )
-            });
-            sensitivity.propagate(&phi, |moving| place(moving).0, tried);
-        }
-    }
-
-    /// The rows of Φ of the states that move, column by column: navigation errors, the states that drive
-    /// them, the turn at rest.
-    fn moving_rows<const MOVING: usize>(&self, block: &Block) -> Vec<[f64; MOVING]> {
-        let PerSensor { gyro, accel } = &block.parameters;
-        let navigation = block.navigation.column_iter();
-        let of_triad = |sensor: Sensor, parameter: usize| match sensor {
-            Sensor::Gyro => gyro.column(parameter),
-            Sensor::Accel => accel.column(parameter),
-        };
-        let parameters = self.layout.parameters().map(|(_, index)| {
-            let (sensor, parameter) = sensor_and_parameter(index);
-            of_triad(sensor, parameter)
-        });
-        let on = self.layout.terms().count();
-        let terms = block.terms.iter().take(on);
-        let terms = terms.map(|term| term.column.column(0));
-        // Stated gravity that is too small pulls the computed velocity down too little.
-        let t = block.duration;
-        let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
-        let gravity = self.layout.gravity().map(|_| pull);
-        // A bias does the same whether it varies or stays.
-        let varying = self.layout.varying_biases();
-        let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        let known = navigation.chain(parameters).chain(terms);
-        let known = known.map(|column| std::array::from_fn(|row| column[row]));
-        let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
-        let driving = known.chain(gravity).chain(varying);
-        let driving = driving
-            .enumerate()
-            .map(|(state, column): (usize, [f64; NAVIGATION])| {
-                std::array::from_fn(|moving| match moving.checked_sub(NAVIGATION) {
-                    // By as much as the attitude error has changed.
-                    Some(axis) if state == ATTITUDE + axis => column[state] - 1.0,
-                    Some(axis) => column[ATTITUDE + axis],
-                    None => column[moving],
-                })
-            });
-        let turn = (NAVIGATION..MOVING)
-            .map(|itself| std::array::from_fn(|moving| if moving == itself { 1.0 } else { 0.0 }));
-        driving.chain(turn).collect()
-    }
-
-    /// Varying biases forget as time goes by, and are driven.
-    fn vary(&mut self, duration: f64) {
-        for &(state, sigma, correlation_time) in &self.varying {
-            let keep = (-duration / correlation_time).exp();
-            self.x[state] *= keep;
-            if let Some(sensitivity) = &mut self.sensitivity {
-                sensitivity.scale(state, keep);
-            }
-            self.p.row_mut(state).scale_mut(keep);
-            self.p.column_mut(state).scale_mut(keep);
-            self.p[(state, state)] += sigma.powi(2) * (1.0 - keep * keep);
-        }
-    }
-
-    /// The innovation in units of its own σ, its components independent: `L⁻¹ (z − H x)` with
-    /// `L Lᵀ = H P Hᵀ + R`; and the logarithm of the determinant of that. `None` if it is not positive
-    /// definite.
-    pub fn whitened(&self, measurement: &Measurement) -> Option<(Vector3<f64>, f64)> {
-        let Measurement { residual, rows, .. } = measurement;
-        let mut s = Matrix3::from_diagonal_element(measurement.variance);
-        for (column, of_column) in rows.iter().enumerate() {
-            let ph = self.times_covariance(of_column);
-            for (row, of_row) in rows.iter().enumerate() {
-                s[(row, column)] += times(of_row, &ph);
-            }
-        }
-        let predicted = Vector3::from_fn(|row, _| times(&rows[row], self.x.as_slice()));
-        let l = s.cholesky()?.l();
-        let log_determinant = 2.0 * l.diagonal().map(f64::ln).sum();
-        Some((
-            l.solve_lower_triangular(&(residual - predicted))?,
-            log_determinant,
-        ))
-    }
-
-    /// Takes in a measurement, one scalar after the other, in Joseph's form, which keeps the covariance
-    /// symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li, Kirubarajan,
-    /// *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
-    ///
-    /// The scalar innovations as they came are independent of each other.
-    pub fn update(&mut self, measurement: &Measurement) -> [ScalarInnovation; 3] {
-        let mut scalars = [ScalarInnovation::default(); 3];
-        let n = self.x.len();
-        let (mut ph, mut gain, mut rest) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        for (axis, (row, z)) in measurement
-            .rows
-            .iter()
-            .zip(&measurement.residual)
-            .enumerate()
-        {
-            self.times_upper(row, &mut ph);
-            let variance = times(row, &ph) + measurement.variance;
-            let scale = 1.0 / variance;
-            let innovation = z - times(row, self.x.as_slice());
-            scalars[axis] = ScalarInnovation {
-                innovation,
-                variance,
-            };
-            for ((x, gain), ph) in self.x.iter_mut().zip(&mut gain).zip(&ph) {
-                *gain = ph * scale;
-                *x += *gain * innovation;
-            }
-            if let Some(sensitivity) = &mut self.sensitivity {
-                let rows = [row.as_slice(), measurement.tried[axis].as_slice()];
-                sensitivity.update(rows, &gain, scalars[axis]);
-            }
-            // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
-            let columns = self.p.as_mut_slice().chunks_exact_mut(n);
-            for (j, column) in columns.enumerate() {
-                let (column, gain, factor) = (&mut column[..=j], &gain[..=j], ph[j]);
-                for k in 0..=j {
-                    column[k] -= gain[k] * factor;
-                }
-            }
-            self.times_upper(row, &mut rest);
-            for (rest, gain) in rest.iter_mut().zip(&gain) {
-                *rest = 0.5 * (gain * measurement.variance - *rest);
-            }
-            let columns = self.p.as_mut_slice().chunks_exact_mut(n);
-            for (j, column) in columns.enumerate() {
-                add_both(&mut column[..=j], (gain[j], &rest), (rest[j], &gain));
-            }
-        }
-        for column in 0..n {
-            for row in 0..column {
-                self.p[(column, row)] = self.p[(row, column)];
-            }
-        }
-        scalars
-    }
-
-    /// `P hᵀ` from the upper half of P.
-    fn times_upper(&self, h: &[(usize, f64)], product: &mut [f64]) {
-        let n = self.x.len();
-        let p = self.p.as_slice();
-        product.fill(0.0);
-        for &(state, weight) in h {
-            let (above, below) = product.split_at_mut(state);
-            for (sum, p) in above.iter_mut().zip(&p[n * state..]) {
-                *sum += weight * p;
-            }
-            let of_row = p[state..].iter().step_by(n).skip(state);
-            for (sum, p) in below.iter_mut().zip(of_row) {
-                *sum += weight * p;
-            }
-        }
-    }
-
-    /// `P hᵀ`
-    fn times_covariance(&self, h: &[(usize, f64)]) -> Vec<f64> {
-        let mut product = vec![0.0; self.x.len()];
-        self.times_upper(h, &mut product);
-        product
     }
 
     /// The body has come to rest: errors of velocity and position become those in the computed frame,
@@ -521,27 +291,6 @@ pub(in crate::calibration) struct Feedback {
     pub initial_attitude: Vector3<f64>,
     pub parameters: ParameterVector,
     pub terms: TermVector,
-}
-
-#[inline]
-fn add_scaled<const N: usize>(sum: &mut [f64; N], column: &[f64; N], factor: f64) {
-    for k in 0..N {
-        sum[k] += column[k] * factor;
-    }
-}
-
-/// `column += a x + b y`, each as long as the column at least.
-#[inline]
-fn add_both(column: &mut [f64], (a, x): (f64, &[f64]), (b, y): (f64, &[f64])) {
-    let (x, y) = (&x[..column.len()], &y[..column.len()]);
-    for k in 0..column.len() {
-        column[k] += a * x[k] + b * y[k];
-    }
-}
-
-/// `h v`
-fn times(h: &[(usize, f64)], v: &[f64]) -> f64 {
-    h.iter().map(|&(state, weight)| weight * v[state]).sum()
 }
 
 const _: () = assert!(NAVIGATION == crate::navigation::NAVIGATION);

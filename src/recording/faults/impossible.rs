@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use super::ranges;
 use super::repair::Rows;
 use crate::units::STANDARD_GRAVITY;
 
@@ -77,16 +78,4 @@ impl Impossible {
         }
         without
     }
-}
-
-/// Runs of rows that are so.
-fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
-    let mut ranges: Vec<Range<usize>> = Vec::new();
-    for row in (0..count).filter(|&row| is(row)) {
-        match ranges.last_mut() {
-            Some(last) if last.end == row => last.end += 1,
-            _ => ranges.push(row..row + 1),
-        }
-    }
-    ranges
 }

@@ -191,3 +191,15 @@ fn last_digit(values: &[f64]) -> f64 {
         None => 0.0,
     }
 }
+
+/// Runs of rows or samples that are so.
+fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for row in (0..count).filter(|&row| is(row)) {
+        match ranges.last_mut() {
+            Some(last) if last.end == row => last.end += 1,
+            _ => ranges.push(row..row + 1),
+        }
+    }
+    ranges
+}

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::impossible::Impossible;
 use super::interpolation::fill;
-use super::{Bridge, Fault, FaultKind, Found, find};
+use super::{Bridge, Fault, FaultKind, Found, find, ranges};
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
 use crate::units::DEGREE;
@@ -100,7 +100,7 @@ impl Rows<'_> {
                 sound[fault.samples.clone()].fill(false);
             }
             let longest = (LONGEST / period) as usize;
-            let mut holes = holes(&sound);
+            let mut holes = ranges(sound.len(), |k| !sound[k]);
             holes.sort_by_key(Range::len);
             let mut filled = 0;
             for (number, hole) in holes.iter().enumerate() {
@@ -203,16 +203,4 @@ fn placed(rows: Vec<f64>, numbers: &[usize]) -> Vec<f64> {
         samples[number] = value;
     }
     samples
-}
-
-/// Stretches of samples that are not sound.
-fn holes(sound: &[bool]) -> Vec<Range<usize>> {
-    let mut holes: Vec<Range<usize>> = Vec::new();
-    for k in (0..sound.len()).filter(|&k| !sound[k]) {
-        match holes.last_mut() {
-            Some(last) if last.end == k => last.end += 1,
-            _ => holes.push(k..k + 1),
-        }
-    }
-    holes
 }

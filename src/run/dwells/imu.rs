@@ -4,13 +4,12 @@ use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use nalgebra::Vector3;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{Dwell, STILL_RATE};
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 use crate::run::Run;
-use crate::statistics::{SIGMA_OF_MEDIAN, median};
+use crate::statistics::{SIGMA_OF_MEDIAN, chi_square_limit, median};
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
@@ -44,10 +43,7 @@ impl Windows {
     /// The part of a standstill at whose ends the output is what it is beside them.
     fn settled(&self, standstill: Range<usize>) -> Range<usize> {
         let Range { mut start, mut end } = standstill;
-        // Three degrees of freedom are always valid.
-        let limit = ChiSquared::new(3.0).map_or(f64::INFINITY, |chi2| {
-            chi2.inverse_cdf(1.0 - SETTLED_BUT_FOR)
-        });
+        let limit = chi_square_limit(3.0, SETTLED_BUT_FOR);
         // A median of n normal numbers has a variance of π/2n.
         let variance = self.sigma.powi(2) * (1.0 + FRAC_PI_2 / BESIDE as f64);
         let moves = |window: usize, beside: Range<usize>| {

@@ -1,10 +1,11 @@
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::*;
 use crate::calibration::parameters::PARAMETERS;
+use crate::calibration::pass::measurement::Measurement;
 use crate::calibration::{Options, parameter};
-use crate::imu::PARAMETERS as PER_TRIAD;
-use crate::navigation::{BlockMatrix, NoiseInput, ParameterBlock};
+use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
+use crate::navigation::{Block, BlockMatrix, NoiseInput, ParameterBlock};
 use crate::simulation::Scenario;
 use approx::assert_relative_eq;
 

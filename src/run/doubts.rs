@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
+use super::{Aiding, Run};
 use crate::earth::normal_gravity;
 use crate::imu::{AxisOrder, Sensor};
 use crate::recording::{TableLog, nanoseconds};
-use crate::run::{Aiding, Run};
 use crate::units::{DEGREE, MILLIGAL};
 
 /// Gravity where a laboratory stands departs from normal gravity by less, m/s²: this is more than ten
@@ -17,14 +17,16 @@ const FALSE_ALARMS: f64 = 1e-6;
 /// The attitude that a reading means, from the one that it was taken for.
 type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
 
-/// A sentence for each.
-pub(super) fn of(run: &Run) -> Vec<String> {
-    let table = run.recording.table.as_ref();
-    let of_table = table.map(|table| [coverage(run, table), order(run, table)]);
-    let all = [gravity(run)]
-        .into_iter()
-        .chain(of_table.into_iter().flatten());
-    all.flatten().collect()
+impl Run {
+    /// What is possible in it, and so out of the ordinary that it is said: a sentence for each.
+    pub(crate) fn doubts(&self) -> Vec<String> {
+        let table = self.recording.table.as_ref();
+        let of_table = table.map(|table| [coverage(self, table), order(self, table)]);
+        let all = [gravity(self)]
+            .into_iter()
+            .chain(of_table.into_iter().flatten());
+        all.flatten().collect()
+    }
 }
 
 /// Stated gravity that is not that of the place.
