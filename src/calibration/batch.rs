@@ -154,17 +154,19 @@ impl<'a> Batch<'a> {
             self.held = tied.attitude;
         }
 
+        if new_position {
+            let row = (POSITION, tied.position, variance.position);
+            self.information.observe(&[row]);
+        }
         let end = samples.end;
-        let block = self.navigator.advance_standing(samples);
+        self.navigator.stand(samples.clone());
+        let block = self.navigator.standing(&tied.attitude, samples);
         self.advance(&block, end)?;
         let state = &block.state;
         if new_position && !held {
             self.information.new_table_position(model.position_sigma);
         }
         let mut rows = Vec::new();
-        if new_position {
-            rows.push((POSITION, state.position, variance.position));
-        }
         if accepted() {
             let variance = self.stretch.velocity_variance(model);
             rows.push((VELOCITY, state.velocity, variance));

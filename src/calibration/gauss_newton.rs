@@ -12,7 +12,7 @@ use super::form::{FormTest, form_test};
 use super::innovation::{consistency, inconsistencies};
 use super::iterations::{Iterated, iterate, summary};
 use super::layout::Layout;
-use super::linearisation::{AttitudePrior, singular};
+use super::linearisation::{AttitudePrior, Linearisation, singular};
 use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
@@ -170,16 +170,33 @@ fn attempt(
     // What is fed back while heading is known to degrees only leads a pass astray; the coarse start
     // without a table is good enough for the iterations to begin from.
     let feedback = match problem.model.aiding {
-        Aiding::Table => Some(pass(problem, &priors, &start.at, Mode::Feedback)?),
+        Aiding::Table => pass(problem, &priors, &start.at, Mode::Feedback).ok(),
         Aiding::Velocity => None,
     };
     if let Some(feedback) = &feedback {
         passes.push(summary(feedback, &start.at, true));
         passes.iter().for_each(progress);
     }
-    let from = feedback.as_ref().map_or(&start.at, |pass| &pass.estimate);
-    let gate = Gate::Innovations;
-    let iterated = iterate(problem, &priors, from.clone(), gate, &mut passes, progress)?;
+    let mut from = |at: Linearisation| {
+        iterate(
+            problem,
+            &priors,
+            at,
+            Gate::Innovations,
+            &mut passes,
+            progress,
+        )
+    };
+    let live = feedback.as_ref().map(|pass| pass.estimate.clone());
+    let iterated = match live.map(&mut from) {
+        Some(Ok(iterated)) if iterated.converged => iterated,
+        // What figures that are wrong by orders of magnitude feed back may lead astray, too.
+        Some(astray) => match (astray, from(start.at)) {
+            (Ok(astray), Err(_)) => astray,
+            (_, of_start) => of_start?,
+        },
+        None => from(start.at)?,
+    };
     Ok(Attempt {
         priors,
         passes,

@@ -173,9 +173,8 @@ impl<'a> Problem<'a> {
             (Observation::Table, reading),
             (Observation::Attitude, at_rest.is_some() && still),
         ];
-        kinds
-            .into_iter()
-            .filter_map(|(kind, there)| there.then_some(kind))
+        let there = kinds.into_iter().filter(|(_, there)| *there);
+        there.map(|(kind, _)| kind)
     }
 
     /// The dwells of all runs.
@@ -211,6 +210,18 @@ impl<'a> Stretch<'a> {
             recording,
             dwells,
             stillness,
+        }
+    }
+
+    /// Variance of an observation per axis, rad² or m²/s²; of a table's attitude that of the mean of so many
+    /// readings.
+    pub fn observation_variance(&self, model: &Model, kind: Observation, readings: usize) -> f64 {
+        match kind {
+            Observation::Velocity => self.velocity_variance(model),
+            Observation::Attitude => self.attitude_variance(model),
+            Observation::Table => {
+                model.reading_sigma.powi(2) / readings as f64 + self.variance.attitude
+            }
         }
     }
 

@@ -6,12 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{self, exp, tilt};
 use crate::imu::{Sensor, Triad};
-use crate::navigation::State;
+use crate::navigation::{State, samples_of};
 use crate::recording::TableLog;
 use crate::run::{Dwell, Run};
 use crate::turntable::{AxisResponse, axis_response};
 
-/// Samples that one block of the error model covers.
+/// A move, or a part of a dwell that ends with an observation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
     pub samples: Range<usize>,
@@ -37,13 +37,8 @@ pub(super) struct AtRest {
 /// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
 const STEP: f64 = 0.1;
 
-/// Number of samples in a step.
-pub(super) fn step_length(period: f64) -> usize {
-    ((STEP / period).round() as usize).max(1)
-}
-
 /// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
-/// dwells `longer` times as long as in moves.
+/// dwells `longer` times as long as usual.
 pub(super) fn steps(
     run: &Run,
     table: Option<&TableLog>,
@@ -55,12 +50,13 @@ pub(super) fn steps(
     let mut steps = Vec::new();
     let mut at = dwells.first().map_or(0, |dwell| dwell.samples.start);
     for (number, dwell) in dwells.iter().enumerate() {
-        cut(at..dwell.samples.start, length, |samples| {
+        let samples = at..dwell.samples.start;
+        if !samples.is_empty() {
             steps.push(Step {
                 samples,
                 at_rest: None,
             });
-        });
+        }
         let position = dwell.position.as_ref();
         let mut unread = position.map(|p| p.readings.clone());
         // The first reading of all is the initial attitude.
@@ -72,7 +68,7 @@ pub(super) fn steps(
         let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
         let axes = axes.map(axis_response);
         let mut first = true;
-        cut(dwell.samples.clone(), longer * length, |samples| {
+        for samples in cut(dwell.samples.clone(), longer * length) {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
             let reading = table.zip(unread.as_mut()).and_then(|(table, unread)| {
                 let readings = take_until(unread, table, until);
@@ -90,7 +86,7 @@ pub(super) fn steps(
                 }),
             });
             first = false;
-        });
+        }
         at = dwell.samples.end;
     }
     steps
@@ -117,14 +113,16 @@ pub(super) fn first_reading(table: Option<&TableLog>, dwells: &[Dwell]) -> Optio
     table?.attitude.get(position.readings.start).copied()
 }
 
-/// Cuts a range into steps of this length; the last may be shorter.
-fn cut(range: Range<usize>, length: usize, mut each: impl FnMut(Range<usize>)) {
-    let mut start = range.start;
-    while start < range.end {
-        let end = (start + length).min(range.end);
-        each(start..end);
-        start = end;
-    }
+/// Number of samples in a step of a dwell.
+pub(super) fn step_length(period: f64) -> usize {
+    samples_of(STEP, period)
+}
+
+/// Cuts a range into parts of this length; the last may be shorter.
+pub(super) fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> {
+    let end = range.end;
+    let begins = range.step_by(length.max(1));
+    begins.map(move |begin| begin..(begin + length).min(end))
 }
 
 /// Takes the readings up to a time off the front of those not yet used.

@@ -88,7 +88,11 @@ impl Solution {
                     || outcome.quality(problem),
                 );
                 Ok(Assessment {
-                    error_terms: error_terms?,
+                    // Where the iterations ended without convergence there may be nothing to test.
+                    error_terms: match error_terms {
+                        Err(_) if !outcome.converged => Vec::new(),
+                        tests => tests?,
+                    },
                     quality: quality?,
                 })
             }

@@ -14,12 +14,16 @@
 mod block;
 pub mod error_model;
 mod increments;
+mod moments;
 mod navigation_error;
+mod passage;
 mod process_noise;
 mod site_fixed;
 mod state;
 mod strapdown;
 mod trajectory;
+mod transition;
+mod vectors;
 
 pub use block::{Block, BlockMatrix, NAVIGATION, ParameterBlock, TermColumn};
 pub use error_model::{
@@ -27,7 +31,8 @@ pub use error_model::{
 };
 pub use increments::{Increments, Motion};
 pub use navigation_error::NavigationError;
-pub use process_noise::{NoiseInput, ProcessNoise};
+pub use process_noise::{NoiseInput, NoiseInputs, ProcessNoise};
+pub(crate) use site_fixed::samples_of;
 pub use site_fixed::{Navigator, TermValues};
 pub use state::State;
 pub(crate) use strapdown::within_reach;

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::block::BlockMatrix;
+use super::block::{BlockMatrix, NAVIGATION};
+use super::transition::{Errors, Transition};
+use super::vectors::Vectors;
 use crate::attitude::skew;
 use crate::imu::PerSensor;
 
@@ -19,20 +21,63 @@ pub struct ProcessNoise {
     pub by_duration: f64,
 }
 
-/// What the sources of [`ProcessNoise`] act on over a block.
+/// What the sources of [`ProcessNoise`] act on over a block: on one short part of it after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseInputs {
+    earth_rate: Vector3<f64>,
+    parts: Vec<NoiseInput>,
+}
+
+impl NoiseInputs {
+    /// Of no time, on an Earth of this rate in `n`, rad/s.
+    pub fn new(earth_rate: Vector3<f64>) -> Self {
+        Self {
+            earth_rate,
+            parts: Vec::new(),
+        }
+    }
+
+    /// Goes on over another part.
+    pub fn push(&mut self, part: NoiseInput) {
+        self.parts.push(part);
+    }
+
+    /// One part after the other.
+    pub fn parts(&self) -> &[NoiseInput] {
+        &self.parts
+    }
+
+    /// Covariance that noise of these densities adds to the navigation errors at the end. Linear in the
+    /// squares of the densities.
+    pub fn covariance(&self, noise: &PerSensor<ProcessNoise>) -> BlockMatrix {
+        let mut parts = self.parts.iter();
+        let first = parts.next().map(|part| part.covariance(noise));
+        let mut covariance = first.unwrap_or_default();
+        for part in parts {
+            // Φ (Φ Pᵀ)ᵀ with a symmetric P.
+            for _ in 0..2 {
+                covariance = part.carried(&self.earth_rate, &covariance.transpose());
+            }
+            covariance += part.covariance(noise);
+        }
+        covariance
+    }
+}
+
+/// What the sources of [`ProcessNoise`] act on over a short part of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseInput {
     /// Length in s.
     pub duration: f64,
-    /// `[f_n×]` of the mean specific force, m/s².
-    pub(crate) force: Matrix3<f64>,
+    /// Mean specific force in `n`, m/s².
+    force: Vector3<f64>,
     /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ where the block is of a move, else zero.
     pub motion: PerSensor<f64>,
     /// Length in s where the block is of a move, else zero.
     pub moving: f64,
     /// Covariance in `n` that interpolated samples add to the integral of each triad's input, rad² and
     /// (m/s)².
-    pub(crate) bridged: PerSensor<Matrix3<f64>>,
+    bridged: PerSensor<Matrix3<f64>>,
 }
 
 impl NoiseInput {
@@ -41,11 +86,28 @@ impl NoiseInput {
     pub fn bridging(duration: f64, force: Vector3<f64>, bridged: PerSensor<Matrix3<f64>>) -> Self {
         Self {
             duration,
-            force: skew(force),
+            force,
             motion: PerSensor::default(),
             moving: 0.0,
             bridged,
         }
+    }
+
+    /// Φ of the navigation errors over this part, times a matrix.
+    fn carried(&self, earth_rate: &Vector3<f64>, matrix: &BlockMatrix) -> BlockMatrix {
+        let over = Transition {
+            earth_turn: earth_rate * self.duration,
+            force: self.force * self.duration,
+            duration: self.duration,
+        };
+        let rows = |first: usize| Vectors::from_fn(|row, column| matrix[(first + row, column)]);
+        let mut errors = Errors::<NAVIGATION> {
+            attitude: rows(0),
+            velocity: rows(3),
+            position: rows(6),
+        };
+        over.carry(&mut errors);
+        BlockMatrix::from_fn(|row, column| errors.component(row, column))
     }
 
     /// Covariance that noise of these densities adds to the navigation errors. Linear in the squares of
@@ -66,8 +128,9 @@ impl NoiseInput {
                 + noise.by_duration.powi(2) * self.moving;
             Matrix3::from_diagonal_element(variance) + self.bridged.get(sensor)
         });
-        let tilting = self.force * gyro;
-        let both = tilting * self.force.transpose();
+        let force = skew(self.force);
+        let tilting = force * gyro;
+        let both = tilting * force.transpose();
         let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
             covariance
                 .fixed_view_mut::<3, 3>(3 * row, 3 * column)

@@ -4,13 +4,24 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::block::{Block, CorrectedResponse, Moments};
+use super::block::{Block, CorrectedResponse};
 use super::increments::Increments;
+use super::moments::Moments;
+use super::passage::Passage;
 use super::state::State;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
 use crate::imu::{PerSensor, Sensed, Sensor, TermResponse, TermVector, Triad};
 use crate::recording::ImuSamples;
+
+/// Within this time, s, what happened first is taken to act on all that follows as a whole; the sensitivity of
+/// navigation to errors is of second order in it.
+const PART: f64 = 0.1;
+
+/// The whole number of samples nearest to a time, at least one.
+pub(crate) fn samples_of(time: f64, period: f64) -> usize {
+    ((time / period).round() as usize).max(1)
+}
 
 /// Navigates through a record with given triads and accumulates the error model as it goes.
 #[derive(Debug, Clone)]
@@ -147,9 +158,21 @@ impl<'a> Navigator<'a> {
     /// Navigates through these samples of the record and gives their block. Where the record has a
     /// sample before the first of them, coning and sculling take it into account.
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
+        let few = samples_of(PART, self.imu.period);
+        let mut passage = Passage::new(&self.earth_rate, &self.terms.on);
+        for begin in samples.clone().step_by(few) {
+            let part = begin..(begin + few).min(samples.end);
+            let moments = self.move_through(part.clone());
+            passage.add(&moments, self.bridged(&part));
+        }
+        self.block(passage)
+    }
+
+    /// Navigates through a few samples of a move.
+    fn move_through(&mut self, samples: Range<usize>) -> Moments {
         let period = self.imu.period;
         let mut moments = Moments::with_terms(&self.terms.on);
-        self.navigate(samples.clone(), |navigator, step| {
+        self.navigate(samples, |navigator, step| {
             let middle = (step.before + step.after) * 0.5;
             moments.add(&middle, &step.increments, &step.change, period);
             let turned = step.increments.angle - middle.tr_mul(&navigator.earth_rate) * period;
@@ -160,18 +183,28 @@ impl<'a> Navigator<'a> {
                 moments.add_terms(&middle, &responses, &step.change, period);
             }
         });
-        self.block(&samples, &moments)
+        moments
     }
 
-    /// The same where the table stands. What the instrument senses there is known, so the error
-    /// model takes it from the attitude: taken from the samples, their noise would be in both the
-    /// innovations and the sensitivity to scale factors, and the two together look like information.
+    /// The same where the table stands.
     pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
+        self.stand(samples.clone());
+        self.standing(&self.state.attitude, samples)
+    }
+
+    /// Navigates through these samples without an error model.
+    pub fn stand(&mut self, samples: Range<usize>) {
+        self.navigate(samples, |_, _| {});
+    }
+
+    /// The block of these samples where the table stands in this attitude; its state is where navigation
+    /// is now. What the instrument senses there is known, so the error model takes it from the attitude:
+    /// taken from the samples, their noise would be in both the innovations and the sensitivity to scale
+    /// factors, and the two together look like information.
+    pub fn standing(&self, attitude: &Matrix3<f64>, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
-        self.navigate(samples.clone(), |_, _| {});
-        let attitude = self.state.attitude;
         let force = -self.gravity;
-        let mut moments = Moments::standing(&attitude, &self.earth_rate, &force, duration);
+        let mut moments = Moments::standing(attitude, &self.earth_rate, &force, duration);
         if !self.terms.on.is_empty() {
             let sensed = Sensed {
                 rate: attitude.tr_mul(&self.earth_rate),
@@ -180,9 +213,11 @@ impl<'a> Navigator<'a> {
                 force: attitude.tr_mul(&force),
             };
             let responses = self.responses(&sensed);
-            moments.stand_terms(&self.terms.on, &attitude, &responses);
+            moments.stand_terms(&self.terms.on, attitude, &responses);
         }
-        self.block(&samples, &moments)
+        let mut passage = Passage::new(&self.earth_rate, &self.terms.on);
+        passage.add(&moments, self.bridged(&samples));
+        self.block(passage)
     }
 
     /// Navigates through samples and tells `each` of every one.
@@ -225,10 +260,9 @@ impl<'a> Navigator<'a> {
         self.state = state;
     }
 
-    fn block(&self, samples: &Range<usize>, moments: &Moments) -> Block {
+    fn block(&self, passage: Passage) -> Block {
         let responses = PerSensor::from_fn(|sensor| &self.instrument.get(sensor).response);
-        let bridged = self.bridged(samples);
-        moments.block(self.state, &self.earth_rate, responses, bridged)
+        passage.block(self.state, responses)
     }
 
     /// Covariance in `n` that interpolation adds to the integrals of both triads' input.

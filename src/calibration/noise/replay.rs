@@ -6,11 +6,15 @@ use nalgebra::Matrix3;
 use super::super::error::CalibrationError;
 use super::super::layout::Layout;
 use super::super::linearisation::{AttitudePrior, Linearisation};
+use super::super::model::Model;
 use super::super::parameters::to_vector;
-use super::super::pass::{Filter, Measurement, ScalarInnovation, begin, navigator};
+use super::super::pass::{
+    Filter, Innovations, Measurement, Observer, ScalarInnovation, Seen, Segment, Taken, Verdict,
+    begin, moves, navigator, segments,
+};
 use super::super::problem::{Problem, Stretch};
 use super::super::schedule::{AtRest, Step};
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{PerSensor, Sensor, Triad};
 use crate::navigation::{Block, Navigator, State};
 
 /// What a pass does at one point of linearisation, whatever the noise.
@@ -18,25 +22,22 @@ pub(super) struct Script<'a> {
     at: &'a Linearisation,
     priors: &'a [AttitudePrior],
     /// Of each stretch.
-    events: Vec<Vec<Event<'a>>>,
+    events: Vec<Vec<Event>>,
 }
 
-enum Event<'a> {
+enum Event {
     Move(Box<Block>),
-    Rest(Box<Rest<'a>>),
+    Rest(Box<Rest>),
 }
 
-/// A step of a dwell.
-struct Rest<'a> {
-    time: f64,
-    at_rest: &'a AtRest,
+/// A part of a dwell.
+struct Rest {
+    /// Whether it is the dwell's first.
+    first: bool,
     new_position: bool,
-    /// Computed state at its begin, and where the pass linearises instead.
+    /// Computed state at its begin; where the pass linearises instead is the segment's.
     from: State,
-    to: State,
-    /// The attitude that the dwell holds without a table.
-    held: Matrix3<f64>,
-    block: Block,
+    segment: Segment,
 }
 
 /// What the noise of moves grows with, over all moves.
@@ -75,12 +76,38 @@ impl<'a> Script<'a> {
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
         let events = stretches.map(|(stretch, initial)| {
             let mut navigator = navigator(stretch, at, initial, &layout)?;
-            let steps: &'a [Step] = &stretch.steps;
             let mut held = *initial;
-            let number = steps.iter().enumerate();
-            Ok(number
-                .map(|(k, step)| event(&mut navigator, &mut held, stretch, at, step, k > 0))
-                .collect())
+            let mut events = Vec::new();
+            let mut next = 0;
+            while let Some(step) = stretch.steps.get(next) {
+                if step.at_rest.is_none() {
+                    let imu = &stretch.run.recording.imu;
+                    let blocks =
+                        moves(step, &layout, imu).map(|samples| navigator.advance(samples));
+                    events.extend(blocks.map(|block| Event::Move(Box::new(block))));
+                    next += 1;
+                    continue;
+                }
+                let mut first = true;
+                let begin = next;
+                for part in segments(&stretch.steps[begin..], true) {
+                    next += part.len();
+                    let of = (problem, stretch);
+                    let rest = Rest::new(
+                        &mut navigator,
+                        of,
+                        &part,
+                        &at.triads.accel,
+                        (first, &mut held),
+                    );
+                    events.push(Event::Rest(Box::new(Rest {
+                        new_position: first && begin > 0,
+                        ..rest
+                    })));
+                    first = false;
+                }
+            }
+            Ok(events)
         });
         Ok(Self {
             at,
@@ -94,9 +121,11 @@ impl<'a> Script<'a> {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
             if let Event::Move(block) = event {
-                moves.duration += block.noise.moving;
-                for sensor in Sensor::ALL {
-                    *moves.motion.get_mut(sensor) += block.noise.motion.get(sensor);
+                for part in block.noise.parts() {
+                    moves.duration += part.moving;
+                    for sensor in Sensor::ALL {
+                        *moves.motion.get_mut(sensor) += part.motion.get(sensor);
+                    }
                 }
             }
         }
@@ -109,7 +138,7 @@ impl<'a> Script<'a> {
         let model = &problem.model;
         let parameters = model.prior_mean - to_vector(&self.at.triads);
         let mut pass = Pass {
-            problem,
+            model,
             accepted,
             filter: Filter::new(model, &parameters, &-self.at.terms),
             replay: Replay {
@@ -135,36 +164,33 @@ impl<'a> Script<'a> {
     }
 }
 
-fn event<'a>(
-    navigator: &mut Navigator,
-    held: &mut Matrix3<f64>,
-    stretch: &Stretch,
-    at: &Linearisation,
-    step: &'a Step,
-    later: bool,
-) -> Event<'a> {
-    let Some(at_rest) = &step.at_rest else {
-        return Event::Move(Box::new(navigator.advance(step.samples.clone())));
-    };
-    let from = navigator.state;
-    let to = at_rest.tied(&from, &at.triads.accel);
-    navigator.state = to;
-    if at_rest.first {
-        *held = to.attitude;
+impl Rest {
+    fn new(
+        navigator: &mut Navigator,
+        of: (&Problem, &Stretch),
+        steps: &[(&Step, &AtRest)],
+        accel: &Triad,
+        (first, held): (bool, &mut Matrix3<f64>),
+    ) -> Self {
+        let from = navigator.state;
+        if let Some((_, at_rest)) = steps.first() {
+            navigator.state = at_rest.tied(&from, accel);
+        }
+        if first {
+            *held = navigator.state.attitude;
+        }
+        Self {
+            first,
+            new_position: false,
+            from,
+            segment: Segment::navigate(navigator, of, steps, true, held),
+        }
     }
-    Event::Rest(Box::new(Rest {
-        time: stretch.run.recording.imu.time(step.samples.end),
-        at_rest,
-        new_position: at_rest.first && later,
-        from,
-        to,
-        held: *held,
-        block: navigator.advance_standing(step.samples.clone()),
-    }))
 }
 
+/// A replay of one stretch after the other.
 struct Pass<'a> {
-    problem: &'a Problem<'a>,
+    model: &'a Model,
     accepted: &'a [bool],
     filter: Filter,
     replay: Replay,
@@ -172,48 +198,62 @@ struct Pass<'a> {
 
 impl Pass<'_> {
     fn rest(&mut self, stretch: &Stretch, rest: &Rest) -> Result<(), CalibrationError> {
-        let (model, variance) = (&self.problem.model, stretch.variance);
-        let filter = &mut self.filter;
-        if rest.at_rest.first {
+        let (filter, segment) = (&mut self.filter, &rest.segment);
+        if rest.first {
             filter.come_to_rest(&rest.from);
         }
-        filter.refer(&rest.from, &rest.to);
-        if rest.at_rest.first {
+        filter.refer(&rest.from, &segment.begin);
+        if rest.first {
             filter.begin_to_hold();
         }
-        filter.propagate(&rest.block);
-        let state = &rest.block.state;
         if rest.new_position {
-            filter.redraw_table(model.position_sigma);
-            filter.update(&Measurement::position(state, variance.position));
+            filter.redraw_table(self.model.position_sigma);
+            let variance = stretch.variance.position;
+            filter.update(&Measurement::position(&segment.begin, variance));
         }
-        let of_stretch = (stretch, model, &self.filter.layout);
-        for (_, measurement) in Measurement::of_rest(of_stretch, rest.at_rest, state, &rest.held) {
-            self.observe(rest.time, &measurement)?;
+        let mut decided = Decided {
+            stretch,
+            model: self.model,
+            accepted: self.accepted,
+            replay: &mut self.replay,
+        };
+        let taken = filter.stand(segment, &mut decided);
+        let last = self.replay.distances.last();
+        match taken {
+            Taken::Whole if last.is_none_or(|distance| distance.is_finite()) => Ok(()),
+            _ => Err(CalibrationError::Diverged {
+                time: segment.end(),
+            }),
         }
-        Ok(())
+    }
+}
+
+/// Lets in what was decided before.
+struct Decided<'a> {
+    stretch: &'a Stretch<'a>,
+    model: &'a Model,
+    accepted: &'a [bool],
+    replay: &'a mut Replay,
+}
+
+impl Observer for Decided<'_> {
+    fn variance(&self, seen: &Seen) -> f64 {
+        self.stretch
+            .observation_variance(self.model, seen.kind, seen.readings)
     }
 
-    fn observe(&mut self, time: f64, measurement: &Measurement) -> Result<(), CalibrationError> {
-        let diverged = CalibrationError::Diverged { time };
-        let Replay { scalars, distances } = &mut self.replay;
+    fn judge(&mut self, innovations: Innovations) -> Verdict {
+        let Replay { scalars, distances } = &mut *self.replay;
         let accepted = self.accepted.get(distances.len()).copied().unwrap_or(true);
-        let distance = if accepted {
-            // One scalar after the other is the Cholesky factorisation of all three.
-            let three = self.filter.update(measurement);
-            scalars.extend(three);
-            three
-                .iter()
-                .map(|s| s.innovation.powi(2) / s.variance)
-                .sum()
-        } else {
-            let whitened = self.filter.whitened(measurement);
-            whitened.map_or(f64::NAN, |(whitened, _)| whitened.norm_squared())
-        };
-        if !distance.is_finite() || distance < 0.0 {
-            return Err(diverged);
+        let three = innovations.scalars;
+        let squares = three.map(|s| s.innovation.powi(2) / s.variance);
+        distances.push(squares.iter().sum());
+        match accepted {
+            true => {
+                scalars.extend(three);
+                Verdict::Accepted
+            }
+            false => Verdict::Rejected,
         }
-        distances.push(distance);
-        Ok(())
     }
 }

@@ -1,12 +1,16 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
 mod propagation;
+mod standing;
 mod update;
+
+pub(in crate::calibration) use standing::{Innovations, Observer, Taken, Verdict};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::segment::between;
 use super::sensitivity::Sensitivity;
-use crate::attitude::{skew, to_tilt_and_heading};
+use crate::attitude::skew;
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
@@ -163,19 +167,12 @@ impl Filter {
         }
     }
 
-    /// Refers the navigation errors to another computed state of the same moment, to first order as all of
-    /// a pass: the filter stays linear, and what it finds does not depend on the order of what it is told.
+    /// Refers the navigation errors to another computed state of the same moment.
     pub fn refer(&mut self, from: &State, to: &State) {
-        let turned = to_tilt_and_heading(&(from.attitude * to.attitude.transpose()));
+        let by = between(from, to);
         let turn = self.layout.turn_at_rest();
-        for (first, by) in [
-            (ATTITUDE, turned),
-            (VELOCITY, to.velocity - from.velocity),
-            (POSITION, to.position - from.position),
-        ]
-        .into_iter()
-        .chain(turn.map(|turn| (turn, turned)))
-        {
+        let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
+        for (first, by) in firsts.chain(turn.map(|turn| (turn, by[0]))) {
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += by;
         }

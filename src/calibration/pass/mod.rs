@@ -1,10 +1,13 @@
 //! One pass of the filter over all stretches: with feedback as it goes, or linearised at a given point.
 
 mod filter;
+mod gate;
 mod initial_attitude;
+mod local;
 mod measurement;
 mod mode;
 mod result;
+mod segment;
 mod sensitivity;
 mod stretch;
 
@@ -15,13 +18,14 @@ use super::model::Model;
 use super::parameters::{ParameterVector, to_vector};
 use super::problem::{Problem, Stretch};
 use crate::imu::TermVector;
-pub(super) use filter::Filter;
+pub(super) use filter::{Filter, Innovations, Observer, Taken, Verdict};
 use initial_attitude::InitialAttitude;
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
 pub use result::Epoch;
 use result::Sums;
 pub(super) use result::{PassResult, Tried};
+pub(super) use segment::{Seen, Segment, moves, segments};
 use stretch::OneStretch;
 pub(super) use stretch::navigator;
 

@@ -1,16 +1,15 @@
 //! A pass within a stretch.
 
-use std::ops::Range;
-
 use nalgebra::Matrix3;
 
-use super::filter::Filter;
+use super::filter::{Filter, Taken};
+use super::gate::{Judge, Memory};
 use super::measurement::Measurement;
-use super::mode::{Gate, Mode};
+use super::mode::Mode;
 use super::result::Sums;
+use super::segment::{Segment, moves, segments};
 use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
-use crate::calibration::innovation::{Innovation, Observation};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::parameters::{from_vector, to_vector};
@@ -18,13 +17,6 @@ use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::schedule::{AtRest, Step};
 use crate::navigation::{Navigator, State, TermValues};
 
-/// After this many rejections in a row the gate doubts itself rather than the data.
-const REOPEN: usize = 5;
-/// So many right behind the only one that was let in speak against that one: it alone had a wide
-/// innovation covariance, and two outliers in a row are rarer than one.
-const BEHIND_THE_FIRST: usize = 2;
-/// At most this many observations of a dwell are left out for having closed the gate.
-const MOST_CLOSING: usize = 3;
 /// Spacing of the history, s.
 const EPOCH: f64 = 1.0;
 
@@ -36,19 +28,14 @@ pub(super) struct OneStretch<'a> {
     mode: Mode<'a>,
     navigator: Navigator<'a>,
     pub sums: Sums,
-    gate: f64,
-    /// Rejections in a row of each kind of observation.
-    row: [usize; Observation::ALL.len()],
+    gate: Memory,
     /// The attitude that the dwell holds without a table, as it is computed when it begins.
     held: Matrix3<f64>,
-    /// Observations of this dwell that are left out because they closed the gate to those after them.
-    closing: Vec<usize>,
 }
 
 /// Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an
 /// outlier that it lets in closes the gate to the good observations that follow.
 struct Begin<'a> {
-    step: usize,
     navigator: Navigator<'a>,
     at: Linearisation,
     filter: Filter,
@@ -95,55 +82,61 @@ impl<'a> OneStretch<'a> {
             mode,
             navigator,
             sums,
-            gate: problem.gate(),
-            row: [0; Observation::ALL.len()],
+            gate: Memory::default(),
             held: initial,
-            closing: Vec::new(),
         })
     }
 
     pub fn run(&mut self) -> Result<(), CalibrationError> {
         let steps: &'a [Step] = &self.stretch.steps;
-        let mut begin: Option<Begin> = None;
         let mut next = 0;
         while let Some(step) = steps.get(next) {
-            let time = self.stretch.run.recording.imu.time(step.samples.end);
-            if let Some(at_rest) = &step.at_rest {
-                if at_rest.first && begin.as_ref().is_none_or(|begin| begin.step != next) {
-                    begin = Some(self.begin(next));
-                }
+            let imu = &self.stretch.run.recording.imu;
+            if step.at_rest.is_some() {
                 // The start holds what the first dwell says of table and position.
-                let new_position = at_rest.first && next > 0;
-                self.rest(step.samples.clone(), time, at_rest, new_position)?;
-                if let Some(begin) = &begin
-                    && let Some(closing) = self.closing(begin)
-                {
-                    self.go_back(begin, closing);
-                    next = begin.step;
-                    continue;
-                }
-            } else {
-                let block = self.navigator.advance(step.samples.clone());
+                next += self.dwell(&steps[next..], next > 0)?;
+                continue;
+            }
+            for samples in moves(step, &self.sums.filter.layout, imu) {
+                let block = self.navigator.advance(samples);
                 self.sums.filter.propagate(&block);
             }
-            let last = self.sums.history.last();
-            if last.is_none_or(|last| (time - last.time).abs() >= EPOCH) {
-                let epoch = self.sums.epoch(time);
-                self.sums.history.push(epoch);
-            }
+            self.remember(imu.time(step.samples.end));
             next += 1;
-            let in_dwell = |step: &Step| step.at_rest.as_ref().is_some_and(|rest| !rest.first);
-            if step.at_rest.is_some() && !steps.get(next).is_some_and(in_dwell) {
-                let posterior = self.sums.filter.constants();
-                self.sums.posteriors.push(posterior);
-            }
         }
         Ok(())
     }
 
-    fn begin(&mut self, step: usize) -> Begin<'a> {
-        self.row = Default::default();
-        self.closing.clear();
+    /// The dwell that begins with the first of these steps; how many it has.
+    fn dwell(&mut self, steps: &'a [Step], new_position: bool) -> Result<usize, CalibrationError> {
+        let begin = self.begin();
+        let mut done = 0;
+        let held = matches!(self.mode, Mode::Held(_));
+        let mut parts = segments(steps, held);
+        while let Some(part) = parts.next() {
+            if self.part(&part, done == 0, new_position)? {
+                done += part.len();
+            } else {
+                self.go_back(&begin);
+                (done, parts) = (0, segments(steps, held));
+            }
+        }
+        let posterior = self.sums.filter.constants();
+        self.sums.posteriors.push(posterior);
+        Ok(done)
+    }
+
+    /// Keeps what is known at this time for the history.
+    fn remember(&mut self, time: f64) {
+        let last = self.sums.history.last();
+        if last.is_none_or(|last| (time - last.time).abs() >= EPOCH) {
+            let epoch = self.sums.epoch(time);
+            self.sums.history.push(epoch);
+        }
+    }
+
+    fn begin(&mut self) -> Begin<'a> {
+        self.gate = Memory::of_dwell(self.sums.innovations.len());
         let Sums {
             at,
             filter,
@@ -154,7 +147,6 @@ impl<'a> OneStretch<'a> {
             ..
         } = &self.sums;
         Begin {
-            step,
             navigator: self.navigator.clone(),
             at: at.clone(),
             filter: filter.clone(),
@@ -165,33 +157,7 @@ impl<'a> OneStretch<'a> {
         }
     }
 
-    /// The observation that closed the gate: where several in a row were rejected, the dwell's first of
-    /// their kind that was not. None if there is no such thing, or were too many already.
-    fn closing(&self, begin: &Begin) -> Option<usize> {
-        if matches!(self.mode, Mode::Held(Gate::As(_))) {
-            return None;
-        }
-        if self.closing.len() >= MOST_CLOSING {
-            return None;
-        }
-        let row = |kind: Observation| self.row[kind as usize];
-        let mut closed = Observation::ALL
-            .into_iter()
-            .filter(|&kind| row(kind) >= BEHIND_THE_FIRST);
-        closed.find_map(|kind| {
-            let of_dwell = self.sums.innovations.iter().enumerate();
-            let of_kind = of_dwell.skip(begin.innovations);
-            let mut let_in = of_kind.filter(|(_, i)| i.accepted && i.observation == kind);
-            let (first, _) = let_in.next()?;
-            let most = match let_in.next() {
-                Some(_) => REOPEN,
-                None => BEHIND_THE_FIRST,
-            };
-            (row(kind) >= most).then_some(first)
-        })
-    }
-
-    fn go_back(&mut self, begin: &Begin<'a>, closing: usize) {
+    fn go_back(&mut self, begin: &Begin<'a>) {
         self.navigator = begin.navigator.clone();
         self.sums.at = begin.at.clone();
         self.sums.filter = begin.filter.clone();
@@ -199,91 +165,67 @@ impl<'a> OneStretch<'a> {
         self.sums.history.truncate(begin.history);
         self.sums.cost = begin.cost;
         self.sums.log_determinant = begin.log_determinant;
-        self.row = Default::default();
-        self.closing.push(closing);
+        self.gate.again();
     }
 
-    /// A step within a dwell, which ends at `time`.
-    fn rest(
+    /// A part of a dwell; whether it was taken in.
+    fn part(
         &mut self,
-        samples: Range<usize>,
-        time: f64,
-        at_rest: &AtRest,
+        steps: &[(&'a Step, &'a AtRest)],
+        first: bool,
         new_position: bool,
-    ) -> Result<(), CalibrationError> {
-        let (model, variance) = (&self.problem.model, self.stretch.variance);
+    ) -> Result<bool, CalibrationError> {
+        let Some(&(_, at_rest)) = steps.first() else {
+            return Ok(true);
+        };
+        let (problem, stretch) = (self.problem, self.stretch);
         let filter = &mut self.sums.filter;
-        if matches!(self.mode, Mode::Held(_)) {
+        let held = matches!(self.mode, Mode::Held(_));
+        if held {
             let tied = at_rest.tied(&self.navigator.state, &self.sums.at.triads.accel);
-            if at_rest.first {
+            if first {
                 filter.come_to_rest(&self.navigator.state);
             }
             filter.refer(&self.navigator.state, &tied);
             self.navigator.state = tied;
         }
-        if at_rest.first {
+        if first {
             filter.begin_to_hold();
             self.held = self.navigator.state.attitude;
         }
-        let block = self.navigator.advance_standing(samples);
-        filter.propagate(&block);
-        let state = block.state;
-        if new_position {
-            filter.redraw_table(model.position_sigma);
+        let navigator = &mut self.navigator;
+        let of = (problem, stretch);
+        let segment = Segment::navigate(navigator, of, steps, held, &self.held);
+        if first && new_position {
+            filter.redraw_table(problem.model.position_sigma);
             // Between positions the IMU moves by its distance from the table's centre, within one
             // not at all: one observation a dwell, however long it is.
-            filter.update(&Measurement::position(&state, variance.position));
+            let variance = stretch.variance.position;
+            filter.update(&Measurement::position(&segment.begin, variance));
         }
-        let of_stretch = (self.stretch, model, &self.sums.filter.layout);
-        let measurements = Measurement::of_rest(of_stretch, at_rest, &state, &self.held);
-        for (observation, measurement) in measurements {
-            self.observe(time, observation, &measurement)?;
-        }
-        match self.mode {
-            Mode::Feedback => self.feed_back(),
-            Mode::Held(_) => Ok(()),
-        }
-    }
-
-    fn observe(
-        &mut self,
-        time: f64,
-        observation: Observation,
-        measurement: &Measurement,
-    ) -> Result<(), CalibrationError> {
         let sums = &mut self.sums;
-        let (whitened, log_determinant) = sums
-            .filter
-            .whitened(measurement)
-            .ok_or(CalibrationError::Diverged { time })?;
-        let distance = whitened.norm_squared();
-        let index = sums.innovations.len();
-        let row = &mut self.row[observation as usize];
-        let accepted = match self.mode {
-            Mode::Held(Gate::Open) => true,
-            Mode::Held(Gate::As(other)) => other.get(index).is_none_or(|i| i.accepted),
-            Mode::Held(Gate::Innovations) | Mode::Feedback => {
-                let sound = distance <= self.gate && !self.closing.contains(&index);
-                sound || *row >= REOPEN
-            }
-        };
-        if accepted {
-            *row = 0;
-            sums.cost += distance;
-            sums.log_determinant += log_determinant;
-            sums.filter.update(measurement);
-        } else {
-            *row += 1;
-            sums.cost += self.gate;
-        }
-        sums.innovations.push(Innovation {
-            time,
-            observation,
-            whitened: whitened.into(),
-            accepted,
+        let mut judge = Judge {
+            stretch,
+            model: &problem.model,
+            mode: self.mode,
+            limit: problem.gate(),
             dwell: sums.posteriors.len() - 1,
-        });
-        Ok(())
+            memory: &mut self.gate,
+            innovations: &mut sums.innovations,
+            cost: &mut sums.cost,
+            log_determinant: &mut sums.log_determinant,
+        };
+        let time = segment.end();
+        match sums.filter.stand(&segment, &mut judge) {
+            Taken::Whole => {}
+            Taken::Abandoned => return Ok(false),
+            Taken::Diverged => return Err(CalibrationError::Diverged { time }),
+        }
+        if !held {
+            self.feed_back()?;
+        }
+        self.remember(time);
+        Ok(true)
     }
 
     fn feed_back(&mut self) -> Result<(), CalibrationError> {

@@ -10,20 +10,54 @@ impl Filter {
     /// Carries mean and covariance over a block.
     pub fn propagate(&mut self, block: &Block) {
         match self.layout.turn_at_rest() {
-            Some(_) => self.carry::<{ NAVIGATION + 3 }>(block),
-            None => self.carry::<NAVIGATION>(block),
+            Some(_) => self.propagate_with::<{ NAVIGATION + 3 }>(block),
+            None => self.propagate_with::<NAVIGATION>(block),
         }
         self.vary(block.duration);
     }
 
-    /// Only the rows of Φ of `MOVING` states differ from identity: navigation errors and, where there is
-    /// one, the turn at rest. Of `Φ P Φᵀ + Q` only their rows and columns change.
-    fn carry<const MOVING: usize>(&mut self, block: &Block) {
+    /// Navigation errors move and, where there is one, the turn at rest.
+    fn propagate_with<const MOVING: usize>(&mut self, block: &Block) {
+        let turn = self.layout.turn_at_rest();
+        let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
+        let moving: Vec<usize> = (0..NAVIGATION).chain(turn).collect();
+        // The turn has the noise of the attitude, and its own.
+        let own = |place: usize| match place.checked_sub(NAVIGATION) {
+            Some(axis) => ATTITUDE + axis,
+            None => place,
+        };
+        let of_navigation = block.noise.covariance(&self.noise);
+        let mut noise = [[0.0; MOVING]; MOVING];
+        for (row, of_row) in noise.iter_mut().enumerate() {
+            for (column, noise) in of_row.iter_mut().enumerate() {
+                *noise = of_navigation[(own(row), own(column))];
+            }
+            if row >= NAVIGATION {
+                of_row[row] += self.turning.powi(2) * block.duration;
+            }
+        }
         let phi = self.moving_rows::<MOVING>(block);
+        let on = self.layout.terms().count();
+        let tried = self.layout.tried_terms().zip(&block.terms[on..]);
+        let tried: Vec<_> = tried
+            .map(|((k, _), term)| (k, std::array::from_fn(|place| term.column[own(place)])))
+            .collect();
+        self.carry(&phi, &moving, &noise, tried.into_iter());
+    }
+
+    /// Only the rows of Φ of the states that move differ from identity. Of `Φ P Φᵀ + Q` only their rows and
+    /// columns change. `phi` holds these rows, a column for each of the first states; `tried` what
+    /// parameters that are tried add.
+    pub(super) fn carry<const MOVING: usize>(
+        &mut self,
+        phi: &[[f64; MOVING]],
+        moving: &[usize],
+        noise: &[[f64; MOVING]; MOVING],
+        tried: impl Iterator<Item = (usize, [f64; MOVING])>,
+    ) {
         let n = self.x.len();
         let mut x = [0.0; MOVING];
         let mut rows = vec![[0.0; MOVING]; n];
-        let mut corner = [[0.0; MOVING]; MOVING];
         let p = self.p.as_slice();
         for (k, column) in phi.iter().enumerate() {
             add_scaled(&mut x, column, self.x[k]);
@@ -36,55 +70,50 @@ impl Filter {
             }
             *row = sum;
         }
+        let mut corner = *noise;
         for (k, row_of_corner) in corner.iter_mut().enumerate() {
-            let mut sum = [0.0; MOVING];
             for (column, row) in phi.iter().zip(&rows) {
-                add_scaled(&mut sum, row, column[k]);
-            }
-            *row_of_corner = sum;
-        }
-        let turn = self.layout.turn_at_rest().unwrap_or(n);
-        // Where a moving state is, and which navigation error's noise it has.
-        let place = |moving: usize| match moving.checked_sub(NAVIGATION) {
-            Some(axis) => (turn + axis, ATTITUDE + axis),
-            None => (moving, moving),
-        };
-        let constants = NAVIGATION..turn;
-        for constant in constants.chain((turn + 3).min(n)..n) {
-            for (moving, &covariance) in rows[constant].iter().enumerate() {
-                let (moving, _) = place(moving);
-                self.p[(moving, constant)] = covariance;
-                self.p[(constant, moving)] = covariance;
+                add_scaled(row_of_corner, row, column[k]);
             }
         }
-        let noise = block.noise.covariance(&self.noise);
-        for (column, sum) in corner.iter().enumerate() {
-            let (at_column, of_column) = place(column);
+        for (state, row) in rows.iter().enumerate() {
+            if !moving.contains(&state) {
+                for (&moving, &covariance) in moving.iter().zip(row) {
+                    self.p[(moving, state)] = covariance;
+                    self.p[(state, moving)] = covariance;
+                }
+            }
+        }
+        for (column, &at_column) in moving.iter().enumerate() {
             self.x[at_column] = x[column];
-            for (row, sum) in sum.iter().enumerate() {
-                let (at_row, of_row) = place(row);
-                self.p[(at_row, at_column)] = sum + noise[(of_row, of_column)];
-            }
-            if at_column >= NAVIGATION {
-                self.p[(at_column, at_column)] += self.turning.powi(2) * block.duration;
+            for (row, &at_row) in moving.iter().enumerate() {
+                self.p[(at_row, at_column)] = corner[column][row];
             }
         }
         if let Some(sensitivity) = &mut self.sensitivity {
-            let on = self.layout.terms().count();
-            let tried = self.layout.tried_terms().zip(&block.terms[on..]);
-            let tried = tried.map(|((k, _), term)| {
-                (
-                    k,
-                    std::array::from_fn(|moving| term.column[place(moving).1]),
-                )
-            });
-            sensitivity.propagate(&phi, |moving| place(moving).0, tried);
+            sensitivity.propagate(phi, |place| moving[place], tried);
         }
     }
 
     /// The rows of Φ of the states that move, column by column: navigation errors, the states that drive
     /// them, the turn at rest.
     fn moving_rows<const MOVING: usize>(&self, block: &Block) -> Vec<[f64; MOVING]> {
+        let driving = self.driving_columns(block).into_iter().enumerate();
+        let driving = driving.map(|(state, column)| {
+            std::array::from_fn(|moving| match moving.checked_sub(NAVIGATION) {
+                // By as much as the attitude error has changed.
+                Some(axis) if state == ATTITUDE + axis => column[state] - 1.0,
+                Some(axis) => column[ATTITUDE + axis],
+                None => column[moving],
+            })
+        });
+        let turn = (NAVIGATION..MOVING)
+            .map(|itself| std::array::from_fn(|moving| if moving == itself { 1.0 } else { 0.0 }));
+        driving.chain(turn).collect()
+    }
+
+    /// What navigation errors, and each state that drives them, make of the navigation errors.
+    pub(super) fn driving_columns(&self, block: &Block) -> Vec<[f64; NAVIGATION]> {
         let PerSensor { gyro, accel } = &block.parameters;
         let navigation = block.navigation.column_iter();
         let of_triad = |sensor: Sensor, parameter: usize| match sensor {
@@ -98,30 +127,15 @@ impl Filter {
         let on = self.layout.terms().count();
         let terms = block.terms.iter().take(on);
         let terms = terms.map(|term| term.column.column(0));
-        // Stated gravity that is too small pulls the computed velocity down too little.
-        let t = block.duration;
-        let pull = [0.0, 0.0, 0.0, 0.0, 0.0, t, 0.0, 0.0, 0.5 * t * t];
-        let gravity = self.layout.gravity().map(|_| pull);
+        let gravity = self.layout.gravity().map(|_| block.gravity.column(0));
         // A bias does the same whether it varies or stays.
         let varying = self.layout.varying_biases();
         let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        let known = navigation.chain(parameters).chain(terms);
-        let known = known.map(|column| std::array::from_fn(|row| column[row]));
-        let varying = varying.map(|column| std::array::from_fn(|row| column[row]));
-        let driving = known.chain(gravity).chain(varying);
-        let driving = driving
-            .enumerate()
-            .map(|(state, column): (usize, [f64; NAVIGATION])| {
-                std::array::from_fn(|moving| match moving.checked_sub(NAVIGATION) {
-                    // By as much as the attitude error has changed.
-                    Some(axis) if state == ATTITUDE + axis => column[state] - 1.0,
-                    Some(axis) => column[ATTITUDE + axis],
-                    None => column[moving],
-                })
-            });
-        let turn = (NAVIGATION..MOVING)
-            .map(|itself| std::array::from_fn(|moving| if moving == itself { 1.0 } else { 0.0 }));
-        driving.chain(turn).collect()
+        let driving = navigation.chain(parameters).chain(terms);
+        let driving = driving.chain(gravity).chain(varying);
+        driving
+            .map(|column| std::array::from_fn(|row| column[row]))
+            .collect()
     }
 
     /// Varying biases forget as time goes by, and are driven.

@@ -1,11 +1,15 @@
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::*;
+use crate::calibration::innovation::Observation;
 use crate::calibration::parameters::PARAMETERS;
-use crate::calibration::pass::measurement::Measurement;
-use crate::calibration::{Options, parameter};
+use crate::calibration::pass::measurement::{Measurement, ScalarInnovation};
+use crate::calibration::pass::segment::{Seen, Segment, segments};
+use crate::calibration::problem::Stretch;
+use crate::calibration::{AttitudePrior, ErrorTerm, Options, Problem, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
-use crate::navigation::{Block, BlockMatrix, NoiseInput, ParameterBlock};
+use crate::navigation::{Block, BlockMatrix, Navigator, NoiseInput, NoiseInputs, ParameterBlock};
+use crate::run::Aiding;
 use crate::simulation::Scenario;
 use approx::assert_relative_eq;
 
@@ -31,7 +35,7 @@ fn filter() -> Filter {
 }
 
 /// Noise with nothing special about it.
-fn noise_input(scale: f64, wave: &dyn Fn(usize, usize) -> f64) -> NoiseInput {
+fn noise_input(scale: f64, wave: &dyn Fn(usize, usize) -> f64) -> NoiseInputs {
     let positive = |first: usize| {
         let root = Matrix3::from_fn(|r, c| wave(first + r, c));
         root * root.transpose() * scale
@@ -40,7 +44,13 @@ fn noise_input(scale: f64, wave: &dyn Fn(usize, usize) -> f64) -> NoiseInput {
         gyro: positive(0),
         accel: positive(3),
     };
-    NoiseInput::bridging(0.1, Vector3::new(0.1, -0.2, 9.8), bridged)
+    let mut inputs = NoiseInputs::new(Vector3::zeros());
+    inputs.push(NoiseInput::bridging(
+        0.1,
+        Vector3::new(0.1, -0.2, 9.8),
+        bridged,
+    ));
+    inputs
 }
 
 /// A block with nothing special about it.
@@ -56,6 +66,7 @@ fn block(seed: f64) -> Block {
             gyro: ParameterBlock::from_fn(wave),
             accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
         },
+        gravity: SVector::from_fn(|row, _| wave(row, 1)),
         terms: Vec::new(),
         noise: noise_input(1e-8, &wave),
     }
@@ -94,7 +105,6 @@ fn measurement(first: usize, minus: Option<usize>, z: Vector3<f64>, variance: f6
     Measurement {
         residual: z,
         rows: [0, 1, 2].map(row),
-        tried: Default::default(),
         variance,
     }
 }
@@ -187,13 +197,6 @@ fn scalar_updates_equal_the_dense_one_with_the_full_gain() {
         let innovation = z - h * mean;
         let x = mean + gain * innovation;
         let p = (StateMatrix::identity() - gain * h) * before;
-        let (whitened, log_determinant) = filter.whitened(&measurement).unwrap();
-        assert_relative_eq!(log_determinant, s.determinant().ln(), max_relative = 1e-9);
-        assert_relative_eq!(
-            whitened.norm_squared(),
-            innovation.dot(&(s.try_inverse().unwrap() * innovation)),
-            max_relative = 1e-9
-        );
         filter.update(&measurement);
         let after = StateMatrix::from_iterator(filter.p.iter().copied());
         let mean = SVector::<f64, STATES>::from_iterator(filter.x.iter().copied());
@@ -237,4 +240,139 @@ fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
     assert!((correlation - correlation.transpose()).amax() < 1e-9);
     let smallest = correlation.symmetric_eigenvalues().min();
     assert!(smallest > 0.0, "smallest eigenvalue {smallest}");
+}
+
+/// Lets all in and keeps the innovations.
+struct Open<'a> {
+    stretch: &'a Stretch<'a>,
+    model: &'a Model,
+    scalars: Vec<ScalarInnovation>,
+}
+
+impl Observer for Open<'_> {
+    fn variance(&self, seen: &Seen) -> f64 {
+        self.stretch
+            .observation_variance(self.model, seen.kind, seen.readings)
+    }
+
+    fn judge(&mut self, innovations: Innovations) -> Verdict {
+        self.scalars.extend(innovations.scalars);
+        Verdict::Accepted
+    }
+}
+
+impl Filter {
+    /// A part of a dwell as a textbook has it: step by step, all states in every scalar.
+    fn step_by_step(&mut self, segment: &Segment, open: &Open) -> Vec<ScalarInnovation> {
+        let mut scalars = Vec::new();
+        for step in &segment.steps {
+            let turn = self.layout.turn_at_rest();
+            let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter();
+            let referred = firsts.zip(step.referred);
+            for (first, by) in referred.chain(turn.map(|turn| (turn, step.referred[0]))) {
+                let mut error = self.x.fixed_rows_mut::<3>(first);
+                error += by;
+            }
+            self.propagate(&segment.models[step.model]);
+            for seen in &step.seen {
+                for axis in 0..3 {
+                    let mut row = vec![match seen.kind {
+                        Observation::Velocity => (VELOCITY + axis, 1.0),
+                        Observation::Table => (ATTITUDE + axis, 1.0),
+                        Observation::Attitude => (turn.unwrap() + axis, 1.0),
+                    }];
+                    if seen.kind == Observation::Table {
+                        let errors = self.layout.table_position().into_iter();
+                        let errors = errors.chain(self.layout.table_base());
+                        row.extend(errors.map(|first| (first + axis, -1.0)));
+                    }
+                    let mut ph = vec![0.0; self.x.len()];
+                    for &(state, weight) in &row {
+                        for (sum, p) in ph.iter_mut().zip(self.p.column(state)) {
+                            *sum += weight * p;
+                        }
+                    }
+                    let z = seen.residual[axis];
+                    scalars.push(ScalarInnovation {
+                        innovation: z - update::times(&row, self.x.as_slice()),
+                        variance: update::times(&row, &ph) + open.variance(seen),
+                    });
+                    self.take_scalar([&row, &[]], z, open.variance(seen));
+                    self.mirror();
+                }
+            }
+        }
+        scalars
+    }
+}
+
+#[test]
+fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
+    let table = Options::default();
+    let cases = [
+        ("demo", table.clone()),
+        ("demo", table.clone().with(ErrorTerm::TableBase)),
+        ("demo", table.clone().with(ErrorTerm::GaussMarkovBias)),
+        ("demo", table.clone().aiding(Aiding::Velocity)),
+        (
+            "demo",
+            table
+                .aiding(Aiding::Velocity)
+                .with(ErrorTerm::GaussMarkovBias),
+        ),
+    ];
+    for (scenario, options) in cases {
+        let run = Scenario::load(scenario)
+            .unwrap()
+            .simulate(3, 0)
+            .unwrap()
+            .run;
+        let problem = Problem::new(&run, &options);
+        let (model, stretch) = (&problem.model, &problem.stretches()[0]);
+        let triads = crate::calibration::from_vector(model.form, &model.prior_mean);
+        let prior = AttitudePrior::of_alignment(Matrix3::identity(), 0.01);
+        let mut filter = Filter::new(model, &ParameterVector::zeros(), &TermVector::zeros());
+        let start = stretch.start(&prior, &Matrix3::identity());
+        filter.begin(&start, model.position_sigma, true, None);
+        let at = State::at_rest(Matrix3::identity());
+        let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, at);
+        let mut navigator = navigator.unwrap();
+        let part = segments(&stretch.steps, true).next().unwrap();
+        // What has gone on before leaves nothing independent of anything.
+        let before = navigator.standing(&at.attitude, part[0].0.samples.clone());
+        for _ in 0..200 {
+            filter.propagate(&before);
+        }
+        filter.begin_to_hold();
+        let of = (&problem, stretch);
+        let segment = Segment::navigate(&mut navigator, of, &part, true, &at.attitude);
+        let mut open = Open {
+            stretch,
+            model,
+            scalars: Vec::new(),
+        };
+        let mut other = filter.clone();
+        assert_eq!(filter.stand(&segment, &mut open), Taken::Whole);
+        let scalars = other.step_by_step(&segment, &open);
+        assert_eq!(scalars.len(), open.scalars.len());
+        for (one, other) in open.scalars.iter().zip(&scalars) {
+            let sigma = other.variance.sqrt();
+            assert_relative_eq!(one.variance, other.variance, max_relative = 1e-5);
+            assert_relative_eq!(
+                one.innovation / sigma,
+                other.innovation / sigma,
+                epsilon = 1e-5,
+                max_relative = 1e-5
+            );
+        }
+        for i in 0..filter.x.len() {
+            let sigma = other.p[(i, i)].sqrt().max(f64::MIN_POSITIVE);
+            assert_relative_eq!(filter.p[(i, i)], other.p[(i, i)], max_relative = 1e-5);
+            let apart = (filter.x[i] - other.x[i]) / sigma;
+            assert!(
+                apart.abs() < 1e-5,
+                "{scenario}: state {i} is {apart} σ apart"
+            );
+        }
+    }
 }

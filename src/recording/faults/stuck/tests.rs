@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 const ROWS: usize = 20_000;
+const NONE: [Range<usize>; 0] = [];
 
 /// White noise of a σ in steps, about a level.
 fn noise(seed: u64, sigma: f64, level: f64) -> Vec<f64> {
@@ -59,7 +60,7 @@ fn assert_found(values: &[f64], pulses: bool, rows: Range<usize>) {
 fn an_axis_without_its_noise_is_found() {
     for sigma in [0.7, 1.0, 10.0, 1000.0] {
         let sound = rounded(&noise(5, sigma, 0.3));
-        assert_eq!(find(&sound, false), [], "σ {sigma}");
+        assert_eq!(find(&sound, false), NONE, "σ {sigma}");
         let mut values = sound.clone();
         hold(&mut values, 7000..7100);
         assert_found(&values, false, 7000..7100);
@@ -74,8 +75,8 @@ fn a_grid_coarser_than_noise_repeats_as_it_likes() {
             let drift = |k: usize| (k / 2000) as f64 * 1.37;
             let truth = noise(seed as u64, sigma, level);
             let dwells: Vec<f64> = (0..ROWS).map(|k| truth[k] + drift(k)).collect();
-            assert_eq!(find(&rounded(&dwells), false), [], "σ {sigma} {level}");
-            assert_eq!(find(&pulses(&dwells), true), [], "σ {sigma} {level}");
+            assert_eq!(find(&rounded(&dwells), false), NONE, "σ {sigma} {level}");
+            assert_eq!(find(&pulses(&dwells), true), NONE, "σ {sigma} {level}");
         }
     }
 }
@@ -86,14 +87,14 @@ fn noise_that_is_correlated_repeats_longer() {
     for k in 1..ROWS {
         values[k] = 0.95 * values[k - 1] + 0.05 * 6.0 * values[k];
     }
-    assert_eq!(find(&rounded(&values), false), []);
+    assert_eq!(find(&rounded(&values), false), NONE);
 }
 
 #[test]
 fn pulses_of_a_rate_near_a_whole_number_are_sound_and_others_do_not_repeat() {
     for rate in [2.0, 2.003, 2.02, 2.34] {
         let sound = pulses(&noise(7, 0.02, rate));
-        assert_eq!(find(&sound, true), [], "{rate}");
+        assert_eq!(find(&sound, true), NONE, "{rate}");
     }
     let mut values = pulses(&noise(7, 0.02, 2.34));
     hold(&mut values, 7000..7100);
@@ -109,8 +110,8 @@ fn a_rate_that_drifts_through_a_step_or_touches_it_is_sound() {
         &|k| 10.0 + 1e-4 * (k as f64 - 10_000.0).powi(2),
     ] {
         let truth: Vec<f64> = (0..ROWS).map(truth).collect();
-        assert_eq!(find(&pulses(&truth), true), []);
-        assert_eq!(find(&rounded(&truth), false), []);
+        assert_eq!(find(&pulses(&truth), true), NONE);
+        assert_eq!(find(&rounded(&truth), false), NONE);
     }
 }
 
@@ -124,7 +125,7 @@ fn a_quiet_dwell_between_turns_is_no_fault() {
                 k => back * (k - 9800 - dwell) as f64,
             };
             let values: Vec<f64> = (0..ROWS).map(truth).collect();
-            assert_eq!(find(&values, true), [], "{dwell} {back}");
+            assert_eq!(find(&values, true), NONE, "{dwell} {back}");
         }
     }
 }
@@ -135,7 +136,7 @@ fn an_axis_that_stops_within_a_smooth_motion_is_found() {
     let truth = |k: usize| 9800.0 * (0.0079 * k as f64).sin();
     let mut values: Vec<f64> = (0..ROWS).map(truth).collect();
     values = pulses(&values);
-    assert_eq!(find(&values, true), []);
+    assert_eq!(find(&values, true), NONE);
     for length in [20, 50] {
         let mut values = values.clone();
         hold(&mut values, 7010..7010 + length);

@@ -1,0 +1,146 @@
+//! How long each stage of a calibration takes, in samples of the instrument a second.
+//!
+//! `cargo bench --bench stages` prints a table. `dense_filter` is the yardstick: a Kalman filter of the same
+//! 39 states that multiplies whole matrices, over the same blocks of navigation; figures compare with it
+//! on any machine.
+
+mod dense_filter;
+
+use std::sync::OnceLock;
+
+use dense_filter::DenseFilter;
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use turncal::calibration::{
+    NoisePolicy, Options, Outcome, Problem, bound, estimate, test_error_terms,
+};
+use turncal::formats::write_run;
+use turncal::imu::{InstallationForm, PerSensor, Triad};
+use turncal::navigation::{Navigator, ProcessNoise, State};
+use turncal::run::Run;
+use turncal::simulation::{Scenario, Simulated};
+use turncal::study::AccuracyStudy;
+
+fn main() {
+    divan::main();
+}
+
+/// A run on a three-axis turntable.
+fn simulated() -> &'static Simulated {
+    static RUN: OnceLock<Simulated> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let scenario = Scenario::load("demo").expect("embedded");
+        scenario.simulate(1, 0).expect("a sound scenario")
+    })
+}
+
+fn run() -> &'static Run {
+    &simulated().run
+}
+
+fn samples() -> ItemsCount {
+    ItemsCount::new(run().recording.imu.len())
+}
+
+/// Samples in a block of the yardstick.
+const BLOCK: usize = 10;
+
+fn ideal() -> PerSensor<Triad> {
+    PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General))
+}
+
+#[divan::bench]
+fn read_files(bencher: Bencher) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let output = simulated().output;
+    write_run(directory.path(), run(), output, None).expect("a run that was simulated");
+    let path = directory.path().join("run.toml");
+    bencher.counter(samples()).bench(|| Run::read(&path));
+}
+
+#[divan::bench]
+fn dwells_and_steps(bencher: Bencher) {
+    let options = Options::default();
+    bencher
+        .counter(samples())
+        .bench(|| Problem::new(run(), &options));
+}
+
+/// Strapdown navigation and its error model, as for a move.
+#[divan::bench]
+fn navigation(bencher: Bencher) {
+    let imu = &run().recording.imu;
+    let start = State::at_rest(nalgebra::Matrix3::identity());
+    let navigator = Navigator::new(imu, &run().site, &ideal(), start).expect("ideal triads");
+    bencher
+        .counter(samples())
+        .bench(|| navigator.clone().advance(0..imu.len()));
+}
+
+/// The yardstick: navigation by blocks of 10 samples and a filter of whole matrices.
+#[divan::bench]
+fn dense_filter(bencher: Bencher) {
+    let imu = &run().recording.imu;
+    let start = State::at_rest(nalgebra::Matrix3::identity());
+    let navigator = Navigator::new(imu, &run().site, &ideal(), start).expect("ideal triads");
+    let noise = PerSensor::from_fn(|_| ProcessNoise {
+        random_walk: 1e-6,
+        ..ProcessNoise::default()
+    });
+    bencher.counter(samples()).bench(|| {
+        let mut navigator = navigator.clone();
+        let mut filter = DenseFilter::new(noise);
+        for begin in (0..imu.len() - BLOCK).step_by(BLOCK) {
+            let block = navigator.advance(begin..begin + BLOCK);
+            filter.propagate(&block);
+            filter.observe(block.state.velocity, [1e-10, 1e-12]);
+            navigator.state = start;
+        }
+        filter.trace()
+    });
+}
+
+/// One pass of the filter, linearised at the truth.
+#[divan::bench]
+fn one_pass(bencher: Bencher) {
+    let problem = Problem::new(run(), &Options::default());
+    let Simulated { truth, terms, .. } = simulated();
+    bencher
+        .counter(samples())
+        .bench(|| bound(&problem, truth, terms));
+}
+
+#[divan::bench(args = [NoisePolicy::Stated, NoisePolicy::Auto])]
+fn estimator(bencher: Bencher, noise: NoisePolicy) {
+    let problem = Problem::new(run(), &Options::default().noise(noise));
+    bencher
+        .counter(samples())
+        .bench(|| estimate(&problem, &|_| {}));
+}
+
+#[divan::bench]
+fn error_terms(bencher: Bencher) {
+    static SOLVED: OnceLock<(Problem, Outcome)> = OnceLock::new();
+    let (problem, outcome) = SOLVED.get_or_init(|| {
+        let problem = Problem::new(run(), &Options::default());
+        let outcome = estimate(&problem, &|_| {}).expect("a sound run");
+        (problem, outcome)
+    });
+    bencher
+        .counter(samples())
+        .bench(|| test_error_terms(problem, outcome));
+}
+
+/// Simulation, both methods and the bound.
+#[divan::bench(sample_count = 5)]
+fn one_monte_carlo_run(bencher: Bencher) {
+    let study = AccuracyStudy {
+        scenario: Scenario::load("demo").expect("embedded"),
+        form: InstallationForm::General,
+        unmodelled: Vec::new(),
+        noise: Default::default(),
+        runs: 1,
+        seed: 1,
+    };
+    bencher.bench(|| study.run(&|| {}).expect("a sound study"));
+}

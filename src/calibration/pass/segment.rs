@@ -1,0 +1,177 @@
+//! What navigation hands to the filter at once: blocks of moves, and parts of dwells with what is observed
+//! of them.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::attitude::{log, to_tilt_and_heading};
+use crate::calibration::innovation::Observation;
+use crate::calibration::layout::Layout;
+use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::schedule::{AtRest, Step, cut, step_length};
+use crate::navigation::{Block, Navigator, State};
+use crate::recording::ImuSamples;
+use crate::turntable::AxisResponse;
+
+/// A part of a dwell, whose error model is that of one attitude.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct Segment {
+    /// Computed state at its begin.
+    pub begin: State,
+    /// How the table's attitude turns with errors of its axes, where their angles are known.
+    pub axes: Option<AxisResponse>,
+    /// Error models of its steps; one for all that are alike.
+    pub models: Vec<Block>,
+    pub steps: Vec<Standing>,
+}
+
+/// A step of a dwell.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct Standing {
+    /// When it ends, s.
+    pub time: f64,
+    /// Which of the segment's models is its own.
+    pub model: usize,
+    /// By how much errors of attitude, velocity and position become more before it, since they are referred to
+    /// another computed state.
+    pub referred: [Vector3<f64>; 3],
+    /// What is observed at its end, in order.
+    pub seen: Vec<Seen>,
+}
+
+/// An observation of three components, alike in their variance.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::calibration) struct Seen {
+    pub kind: Observation,
+    /// Computed − observed, East-North-Up.
+    pub residual: Vector3<f64>,
+    /// Of how many readings it is the mean.
+    pub readings: usize,
+}
+
+/// Steps of a dwell that are taken in at once: 5 s of them, in which a body that is held by hand keeps its
+/// attitude, too.
+const STEPS: usize = 50;
+
+/// Where the linearisation follows the estimates, a part of a dwell is so many times as long as the one before:
+/// what a dwell tells first changes them most.
+const GROWTH: usize = 4;
+
+/// The parts of a dwell, given the steps from its first on.
+pub(in crate::calibration) fn segments(
+    steps: &[Step],
+    linearisation_held: bool,
+) -> impl Iterator<Item = Vec<(&Step, &AtRest)>> {
+    let of_dwell = steps.iter().enumerate().map_while(|(number, step)| {
+        let at_rest = step.at_rest.as_ref()?;
+        (number == 0 || !at_rest.first).then_some((step, at_rest))
+    });
+    let mut rest: VecDeque<_> = of_dwell.collect();
+    let mut length = if linearisation_held { STEPS } else { 1 };
+    std::iter::from_fn(move || {
+        let part = rest.drain(..length.min(rest.len())).collect::<Vec<_>>();
+        length = STEPS.min(GROWTH * length);
+        (!part.is_empty()).then_some(part)
+    })
+}
+
+/// The blocks of a move that a filter of this layout takes: all of it at once, unless biases vary
+/// meanwhile.
+pub(in crate::calibration) fn moves(
+    step: &Step,
+    layout: &Layout,
+    imu: &ImuSamples,
+) -> impl Iterator<Item = Range<usize>> + use<> {
+    let vary = layout.varying_biases().next().is_some();
+    let length = match vary {
+        true => step_length(imu.period),
+        false => step.samples.len(),
+    };
+    cut(step.samples.clone(), length)
+}
+
+impl Segment {
+    /// Navigates from where the navigator is. A pass that holds its linearisation begins each step at the
+    /// same state of rest, `tied`, and what the step before led to is referred to it; `held` is the attitude
+    /// that was computed when the body came to rest.
+    pub fn navigate(
+        navigator: &mut Navigator,
+        (problem, stretch): (&Problem, &Stretch),
+        steps: &[(&Step, &AtRest)],
+        tied: bool,
+        held: &Matrix3<f64>,
+    ) -> Self {
+        let begin = navigator.state;
+        let mut segment = Self {
+            begin,
+            axes: steps.first().and_then(|(_, at_rest)| at_rest.axes),
+            models: Vec::new(),
+            steps: Vec::with_capacity(steps.len()),
+        };
+        let imu = &stretch.run.recording.imu;
+        // What the last model is of: so many samples, none of them interpolated.
+        let mut alike = None;
+        for (step, at_rest) in steps {
+            let mut referred = Default::default();
+            if tied && !segment.steps.is_empty() {
+                let from = navigator.state;
+                referred = between(&from, &begin);
+                navigator.state = begin;
+            }
+            let samples = step.samples.clone();
+            let bridged = imu.bridged(&samples).next().is_some();
+            if bridged || alike != Some(samples.len()) {
+                let attitude = match tied {
+                    true => begin.attitude,
+                    false => navigator.state.attitude,
+                };
+                segment
+                    .models
+                    .push(navigator.standing(&attitude, samples.clone()));
+                alike = (!bridged).then_some(samples.len());
+            }
+            navigator.stand(samples);
+            let computed = &navigator.state;
+            let seen = problem.observed(step).filter_map(|kind| {
+                let (residual, readings) = match kind {
+                    Observation::Velocity => (computed.velocity, 1),
+                    Observation::Attitude => (-log(&(computed.attitude * held.transpose())), 1),
+                    Observation::Table => {
+                        let (reading, count) = at_rest.reading.as_ref()?;
+                        (-log(&(computed.attitude * reading.transpose())), *count)
+                    }
+                };
+                Some(Seen {
+                    kind,
+                    residual,
+                    readings,
+                })
+            });
+            segment.steps.push(Standing {
+                time: imu.time(step.samples.end),
+                model: segment.models.len() - 1,
+                referred,
+                seen: seen.collect(),
+            });
+        }
+        segment
+    }
+
+    /// When it ends, s.
+    pub fn end(&self) -> f64 {
+        self.steps.last().map_or(0.0, |step| step.time)
+    }
+}
+
+/// By how much errors of attitude, velocity and position become more when they are referred to another
+/// computed state of the same moment, to first order as all of a pass: the filter stays linear, and what it
+/// finds does not depend on the order of what it is told.
+pub(super) fn between(from: &State, to: &State) -> [Vector3<f64>; 3] {
+    [
+        to_tilt_and_heading(&(from.attitude * to.attitude.transpose())),
+        to.velocity - from.velocity,
+        to.position - from.position,
+    ]
+}

@@ -1,0 +1,65 @@
+//! How navigation errors go on by themselves.
+
+use nalgebra::{SVector, Vector3};
+
+use super::block::NAVIGATION;
+use super::vectors::Vectors;
+
+/// Attitude, velocity and position errors, a column of each cause.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Errors<const N: usize> {
+    pub attitude: Vectors<N>,
+    pub velocity: Vectors<N>,
+    pub position: Vectors<N>,
+}
+
+/// What a few samples make of the navigation errors that are there when they begin.
+pub(super) struct Transition {
+    /// Of the Earth, rad.
+    pub earth_turn: Vector3<f64>,
+    /// ∫f_n dt, m/s.
+    pub force: Vector3<f64>,
+    /// s
+    pub duration: f64,
+}
+
+impl Transition {
+    /// Takes errors over the samples: the Earth turns them, force acts on tilt, velocity moves position.
+    pub fn carry<const N: usize>(&self, errors: &mut Errors<N>) {
+        let before = *errors;
+        let mut by_force = Vectors::default();
+        by_force.add_cross(&self.force, &before.attitude);
+        errors
+            .attitude
+            .add_cross(&-self.earth_turn, &before.attitude);
+        errors.velocity.add(1.0, &by_force);
+        errors
+            .velocity
+            .add_cross(&(self.earth_turn * -2.0), &before.velocity);
+        errors.position.add(0.5 * self.duration, &by_force);
+        errors.position.add(self.duration, &before.velocity);
+    }
+}
+
+impl<const N: usize> Errors<N> {
+    /// Of navigation error `row`, by its cause.
+    pub fn component(&self, row: usize, column: usize) -> f64 {
+        let Self {
+            attitude,
+            velocity,
+            position,
+        } = self;
+        [attitude, velocity, position][row / 3].0[row % 3][column]
+    }
+
+    /// The errors' sum with these weights.
+    pub fn times(&self, weights: &SVector<f64, N>) -> SVector<f64, NAVIGATION> {
+        let mut sum = SVector::<f64, NAVIGATION>::zeros();
+        let kinds = [&self.attitude, &self.velocity, &self.position];
+        for (k, of_kind) in kinds.into_iter().enumerate() {
+            sum.fixed_rows_mut::<3>(3 * k)
+                .copy_from(&of_kind.times(weights));
+        }
+        sum
+    }
+}
