@@ -160,14 +160,19 @@ fn along_table_axes(problem: &Problem) -> Model {
     model.in_form(problem.run(), model.form)
 }
 
-/// Both triads by positions alone; what they do not determine is as in the prior.
+/// Both triads by positions alone; what they do not determine, or what no triad explains, is as in the prior.
 fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
     let mut estimate = Estimate {
         triads: from_vector(model.form, &model.prior_mean),
         covariance: ParameterMatrix::zeros(),
     };
     for sensor in Sensor::ALL {
-        if let Some(fit) = determined(observed.get(sensor), model.form) {
+        let observed = observed.get(sensor);
+        let rings = |fit: &Fit| {
+            let residuals = left_by(observed, &fit.triad);
+            residuals.is_some_and(|residuals| residuals.growth().is_some())
+        };
+        if let Some(fit) = determined(observed, model.form).filter(|fit| !rings(fit)) {
             *estimate.triads.get_mut(sensor) = fit.triad;
             let first = parameter(sensor, 0);
             let mut of_triad = estimate
