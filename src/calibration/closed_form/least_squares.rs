@@ -21,6 +21,8 @@ use crate::run::Aiding;
 const SMALLEST_EIGENVALUE: f64 = 1e-4;
 /// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
 const STEPS: usize = 6;
+/// Scale factors further from zero than this many σ are of an axis that senses.
+const SENSES: f64 = 5.0;
 /// A step below this part of the σ before is no step.
 const SMALL: f64 = 1e-6;
 
@@ -172,7 +174,14 @@ fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
             let residuals = left_by(observed, &fit.triad);
             residuals.is_some_and(|residuals| residuals.growth().is_some())
         };
-        if let Some(fit) = determined(observed, model.form).filter(|fit| !rings(fit)) {
+        // An axis that may sense nothing has no direction, and σ of what is not linear hold for small errors.
+        let senses = |fit: &Fit| {
+            let known =
+                |k: usize| fit.triad.scale[k].abs() > SENSES * fit.covariance[(k, k)].sqrt();
+            (0..3).all(known)
+        };
+        let fit = determined(observed, model.form);
+        if let Some(fit) = fit.filter(|fit| senses(fit) && !rings(fit)) {
             *estimate.triads.get_mut(sensor) = fit.triad;
             let first = parameter(sensor, 0);
             let mut of_triad = estimate
