@@ -64,6 +64,7 @@ pub mod noise;
 pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;
+pub(crate) mod room;
 pub mod run;
 pub(crate) mod shown;
 pub mod simulation;

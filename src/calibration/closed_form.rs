@@ -11,6 +11,7 @@ mod table;
 
 use super::error::CalibrationError;
 use super::estimate::Estimate;
+use super::finding::Finding;
 use super::parameters::parameter;
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
@@ -58,6 +59,9 @@ pub(super) fn six_position_by(
         Reference::Labels => labels::by_labels(problem),
         Reference::Gravity => gravity::by_gravity(problem),
     }?;
+    let notes = problem.notes().cloned();
+    let notes = notes.map(|note| Finding::Recording { note });
+    closed_form.findings.splice(0..0, notes);
     closed_form.findings.extend(scatter_at_rest(problem));
     share_gravity(&mut closed_form.estimate, &problem.run().site);
     Ok(closed_form)

@@ -16,6 +16,17 @@ pub enum CalibrationError {
          --aiding table out"
     )]
     NoTable,
+    /// Less memory than a calibration takes.
+    #[error(
+        "{samples} samples were read, and there is no memory to calibrate them, about {megabytes} MB; give it \
+         more, or split the record"
+    )]
+    NoMemory {
+        /// Of all runs.
+        samples: usize,
+        /// What it takes.
+        megabytes: usize,
+    },
     /// Nothing at rest.
     #[error(
         "no dwell was found, expected: one at least, better one with each axis up and each down; the \
@@ -27,7 +38,8 @@ pub enum CalibrationError {
     /// A prior of σ zero or an estimate that went astray.
     #[error(
         "the sensitivity matrix K·C of the {} became singular: the data and [imu.prior.{0}] \
-         do not fit each other; check scale and units there", .sensor.name()
+         do not fit each other; check scale and units there, and whether an axis is dead, stuck or wrapped, rows \
+         are lost or the table's log is of another run", .sensor.name()
     )]
     Singular {
         /// Which triad.

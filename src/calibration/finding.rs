@@ -157,6 +157,15 @@ pub enum Finding {
         /// χ² without any one of these.
         without: f64,
     },
+    /// Innovations that no noise figure explains.
+    Unexplained {
+        /// NIS of all observations …
+        nis: f64,
+        /// … and what it stays below unless stated noise is more wrong than figures are.
+        limit: f64,
+        /// When an innovation was the largest, s.
+        worst: f64,
+    },
 }
 
 impl fmt::Display for Finding {
@@ -329,6 +338,13 @@ impl fmt::Display for Finding {
                     contradicted.iter().map(ContradictedLabel::to_string).collect();
                 write!(f, "Labels and record disagree. Section {}.", each.join("; section "))
             }
+            Self::Unexplained { nis, limit, worst } => write!(
+                f,
+                "NIS of {nis:.4e} is no calibration: stated noise is hardly ever so wrong that it goes beyond \
+                 {limit:.0}. The largest innovation is at {worst:.1} s: look there for rows that are lost, repeated or \
+                 wrapped, for a bump and for another table position, and at what is said of the files. Where it is \
+                 noise after all, use --noise auto."
+            ),
             Self::ResidualsLarge {
                 of,
                 chi_square,

@@ -21,6 +21,7 @@ use super::pass::{Gate, Mode, PassResult, pass};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
+use super::unexplained::unexplained;
 use crate::imu::Sensor;
 use crate::run::Aiding;
 
@@ -282,6 +283,11 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             rejected,
             observations: outcome.innovations.len(),
         });
+    }
+    // Angles that the form lacks are a cause that is found.
+    if !outcome.form_test.as_ref().is_some_and(FormTest::rejects) {
+        let all = &outcome.consistency.all;
+        findings.extend(unexplained(all, &outcome.innovations));
     }
     let looks = inconsistencies(&outcome.innovations);
     if !looks.is_empty() {

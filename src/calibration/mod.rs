@@ -47,6 +47,7 @@ mod scatter;
 mod schedule;
 mod solution;
 mod standstill;
+mod unexplained;
 
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,

@@ -77,6 +77,12 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Whether it may be used: it converged, and noise explains what it leaves.
+    pub fn is_usable(&self) -> bool {
+        let unexplained = |finding: &Finding| matches!(finding, Finding::Unexplained { .. });
+        self.converged && !self.findings.iter().any(unexplained)
+    }
+
     /// Whether the run observed the heading: two that are opposite differ by more than 6 in χ² by what
     /// the run alone says.
     pub fn heading_observed(&self) -> bool {

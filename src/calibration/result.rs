@@ -93,7 +93,7 @@ pub struct Calibration {
     )]
     pub noise: Option<NoiseRecord>,
     /// What must be known before using the values.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub warnings: Vec<String>,
     /// The same as values: kind, words, figures.
     #[serde(default)]

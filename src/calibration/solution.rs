@@ -11,6 +11,12 @@ use super::outcome::Outcome;
 use super::problem::Problem;
 use super::quality::Quality;
 use super::result::{Calibration, Method};
+use crate::room;
+
+/// Bytes of the passes, their history and innovations for each sample: 200 to 235, as measured.
+const BYTES_A_SAMPLE: usize = 256;
+/// Bytes of what does not grow with the record: threads, error terms that are tried, the report.
+const BYTES_BESIDE: usize = 16 << 20;
 
 /// What a method makes of a problem.
 #[derive(Debug, Clone)]
@@ -36,6 +42,14 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] where the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
+        let samples: usize = self.runs().map(|run| run.recording.imu.len()).sum();
+        let bytes = samples.saturating_mul(BYTES_A_SAMPLE);
+        if !room::is_there(bytes.saturating_add(BYTES_BESIDE)) {
+            return Err(CalibrationError::NoMemory {
+                samples,
+                megabytes: (bytes + BYTES_BESIDE) >> 20,
+            });
+        }
         if let Some(mounting) = Mounting::contradicted(self) {
             return Err(CalibrationError::Mounting(Box::new(mounting)));
         }
@@ -71,9 +85,14 @@ impl Solution {
         }
     }
 
-    /// Whether it may be used: a closed form always, the filter where it converged.
+    /// Whether the filter converged; a closed form always did.
     pub fn converged(&self) -> bool {
         self.outcome().is_none_or(|outcome| outcome.converged)
+    }
+
+    /// Whether it may be used: a closed form always, the filter by [`Outcome::is_usable`].
+    pub fn is_usable(&self) -> bool {
+        self.outcome().is_none_or(Outcome::is_usable)
     }
 
     /// Tests error terms and judges what is left of gravity and turns.

@@ -273,6 +273,12 @@ impl Calibrate {
                 run.recording.name
             );
         }
+        if !solution.is_usable() {
+            bail!(
+                "{}: no noise explains what the calibration leaves; values may not be used, see the findings",
+                run.recording.name
+            );
+        }
         Ok(())
     }
 }

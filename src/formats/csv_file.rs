@@ -11,6 +11,7 @@ use flate2::read::MultiGzDecoder;
 
 use super::error::{FileError, Place, list, nearest};
 use crate::recording::FileColumn;
+use crate::room;
 use crate::shown::excerpt;
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
@@ -244,18 +245,14 @@ impl CsvFile {
             0 => self.header.len() * BYTES_LOOKED_AT,
             taken => taken * BYTES_A_VALUE,
         };
-        let bytes = (2 * self.rows).saturating_mul(a_row);
-        let mut room: Vec<u8> = Vec::new();
-        let there_is = room.try_reserve_exact(bytes);
-        // What is never used need never be asked for.
-        std::hint::black_box(room);
-        there_is.map_err(|_| {
-            self.error_here(
-                format_args!("row {}, and no memory for as many more", self.rows),
-                "a record that fits into memory",
-                "Give it more memory, or split the record.",
-            )
-        })
+        if room::is_there((2 * self.rows).saturating_mul(a_row)) {
+            return Ok(());
+        }
+        Err(self.error_here(
+            format_args!("row {}, and no memory for as many more", self.rows),
+            "a record that fits into memory",
+            "Give it more memory, or split the record.",
+        ))
     }
 
     /// Line of the row.

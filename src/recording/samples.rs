@@ -153,13 +153,14 @@ impl ImuSamples {
         self.time(self.len())
     }
 
-    /// Time in s at which sample `k` begins, or the last of its stretch ended.
+    /// Time in s at which sample `k` begins, or the last of its stretch ended; before the first stretch as its
+    /// clock runs.
     pub fn time(&self, k: usize) -> f64 {
         let begun = self.stretches.partition_point(|s| s.samples.start <= k);
         self.stretches
             .get(begun.saturating_sub(1))
             .map_or(0.0, |s| {
-                s.start + (k - s.samples.start) as f64 * self.period
+                s.start + (k as f64 - s.samples.start as f64) * self.period
             })
     }
 

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use turncal::attitude::{exp, log};
 use turncal::calibration::{
     ClosedForm, Finding, Method, Options, Problem, Solution, in_body_frame, in_general_form,
-    mean_square_interval, nees, to_vector,
+    mean_square_interval, nees, six_position, to_vector,
 };
 use turncal::imu::{GaussMarkov, PerSensor};
 use turncal::recording::{LabelledMotion, Segment};
@@ -372,4 +372,35 @@ fn one_position_that_is_off_costs_no_more_than_that_position() {
     let (nees, count, sigmas) = squares(&spoilt, &made);
     let mean = nees / count as f64;
     assert!(mean < 2.0 && sigmas < 4.0, "{mean} {sigmas}");
+}
+
+#[test]
+fn labels_that_no_prior_allows_are_believed_and_the_mount_is_named() {
+    let mut made = by_hand(&Scenario::load("mems").unwrap(), DEGREE, 3);
+    let turned = exp(Vector3::z() * (8.0 * DEGREE));
+    let imu = &mut made.run.recording.imu;
+    for triad in [&mut imu.gyro, &mut imu.accel] {
+        triad.iter_mut().for_each(|row| *row = turned * *row);
+    }
+    made.run
+        .recording
+        .notes
+        .push("a note of the reader".to_owned());
+    let problem = Problem::new(&made.run, &Options::default());
+    let closed_form = six_position(&problem).unwrap();
+    let words: Vec<String> = closed_form
+        .findings
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(words[0], "a note of the reader");
+    assert!(
+        words
+            .iter()
+            .any(|text| text.contains("both triads turned alike")),
+        "{words:?}"
+    );
+    let installation = closed_form.estimate.triads.accel.installation();
+    let off = f64::midpoint(installation[(1, 0)], -installation[(0, 1)]) / turned[(1, 0)];
+    assert!((0.8..1.2).contains(&off), "{off}");
 }

@@ -2,15 +2,18 @@
 
 use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
+use super::super::prior_distance::far_from_prior;
 use super::super::problem::Problem;
-use super::result::{ClosedForm, Reference, remarks};
+use super::result::{ClosedForm, Reference, hidden};
 use crate::imu::PerSensor;
 
 /// Both triads from whatever positions there are, tied down by the prior where they are too few.
 pub(super) fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let ByGravity { estimate, ringing } = coarse::by_gravity(problem)?;
-    let mut findings = remarks(&problem.model, &estimate, Reference::Gravity);
-    findings.extend(ringing);
+    let model = &problem.model;
+    let far = far_from_prior(model, &estimate);
+    let hidden = hidden(model, &estimate, Reference::Gravity);
+    let findings = far.into_iter().chain(hidden).chain(ringing).collect();
     let stretches = problem.stretches();
     let time_at_rest = stretches.iter().map(|stretch| {
         let samples: usize = stretch.dwells.iter().map(|dwell| dwell.samples.len()).sum();

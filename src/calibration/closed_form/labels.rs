@@ -13,7 +13,7 @@ use super::super::model::Model;
 use super::super::problem::Problem;
 use super::least_squares::{across, both_triads};
 use super::observed::{Observed, Position};
-use super::result::{ClosedForm, Reference, remarks};
+use super::result::{ClosedForm, Reference, hidden};
 use crate::attitude::skew;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
@@ -115,7 +115,7 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
         }
     });
     let (estimate, mut findings) = both_triads(&observed, problem)?;
-    findings.extend(remarks(model, &estimate, Reference::Labels));
+    findings.extend(hidden(model, &estimate, Reference::Labels));
     if !contradicted.is_empty() {
         findings.push(Finding::LabelsContradicted { contradicted });
     }

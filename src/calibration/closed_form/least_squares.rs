@@ -6,7 +6,9 @@ use super::super::error::CalibrationError;
 use super::super::estimate::{Estimate, largest_growth};
 use super::super::finding::Finding;
 use super::super::linearisation::singular;
+use super::super::model::Model;
 use super::super::parameters::{ParameterMatrix, from_vector, parameter};
+use super::super::prior_distance::{far_from_prior, widened};
 use super::super::problem::Problem;
 use super::super::residuals::Residuals;
 use super::observed::{NOISELESS, Observed, Position};
@@ -19,6 +21,8 @@ use crate::run::Aiding;
 const SMALLEST_EIGENVALUE: f64 = 1e-4;
 /// Steps of Gauss–Newton at most; scale factors wrong by percents need three.
 const STEPS: usize = 6;
+/// Scale factors further from zero than this many σ are of an axis that senses.
+const SENSES: f64 = 5.0;
 /// A step below this part of the σ before is no step.
 const SMALL: f64 = 1e-6;
 
@@ -32,7 +36,8 @@ pub(super) struct Fit {
 }
 
 /// Both triads from positions; with what is known beforehand where they do not determine a triad. Where
-/// residuals ring, σ are widened until they do not, and a finding says so.
+/// residuals ring, σ are widened until they do not, and a finding says so. The same where positions alone
+/// contradict the prior, which would else hide what they say.
 pub(super) fn both_triads(
     observed: &PerSensor<Observed>,
     problem: &Problem,
@@ -40,11 +45,16 @@ pub(super) fn both_triads(
     let form = problem.model.form;
     let mut covariance = ParameterMatrix::zeros();
     let mut triads = PerSensor::from_fn(|_| Triad::ideal(form));
-    let mut findings = Vec::new();
+    let mut prior = along_table_axes(problem);
+    let of_positions = without_prior(observed, &prior);
+    let mut findings = Vec::from_iter(far_from_prior(&prior, &of_positions));
+    if !findings.is_empty() {
+        prior = widened(&prior, &of_positions).unwrap_or(prior);
+    }
     let mut common = Vec::new();
     for sensor in Sensor::ALL {
         let stated = observed.get(sensor);
-        let fit = fitted(stated, problem, sensor)?;
+        let fit = fitted(stated, &prior, sensor)?;
         let residuals = left_by(stated, &fit.triad);
         let rings = residuals
             .as_ref()
@@ -61,7 +71,7 @@ pub(super) fn both_triads(
                     &all
                 };
                 let variance = unexplained(stated, &fit.triad, places);
-                let wider = fitted(&stated.widened(variance, places), problem, sensor)?;
+                let wider = fitted(&stated.widened(variance, places), &prior, sensor)?;
                 let times = worst.groups.iter().map(|&k| stated.times[k]);
                 let variances = [&fit, &wider].map(|fit| fit.covariance.diagonal());
                 findings.push(Finding::ResidualsLarge {
@@ -144,31 +154,62 @@ fn unexplained(observed: &Observed, triad: &Triad, places: &[usize]) -> f64 {
     high
 }
 
-fn fitted(observed: &Observed, problem: &Problem, sensor: Sensor) -> Result<Fit, CalibrationError> {
-    match determined(observed, problem.model.form) {
-        Some(fit) if knows_more(problem, sensor, &fit.covariance) => Ok(fit),
-        _ => with_prior(problem, sensor, observed),
+/// The model of a problem, its prior along the axes of table or labels, so that no angle is a choice of the
+/// body frame.
+fn along_table_axes(problem: &Problem) -> Model {
+    let mut model = problem.model.clone();
+    model.aiding = Aiding::Table;
+    model.in_form(problem.run(), model.form)
+}
+
+/// Both triads by positions alone; what they do not determine, or what no triad explains, is as in the prior.
+fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
+    let mut estimate = Estimate {
+        triads: from_vector(model.form, &model.prior_mean),
+        covariance: ParameterMatrix::zeros(),
+    };
+    for sensor in Sensor::ALL {
+        let observed = observed.get(sensor);
+        let rings = |fit: &Fit| {
+            let residuals = left_by(observed, &fit.triad);
+            residuals.is_some_and(|residuals| residuals.growth().is_some())
+        };
+        // An axis that may sense nothing has no direction, and σ of what is not linear hold for small errors.
+        let senses = |fit: &Fit| {
+            let known =
+                |k: usize| fit.triad.scale[k].abs() > SENSES * fit.covariance[(k, k)].sqrt();
+            (0..3).all(known)
+        };
+        let fit = determined(observed, model.form);
+        if let Some(fit) = fit.filter(|fit| senses(fit) && !rings(fit)) {
+            *estimate.triads.get_mut(sensor) = fit.triad;
+            let first = parameter(sensor, 0);
+            let mut of_triad = estimate
+                .covariance
+                .view_mut((first, first), (PER_TRIAD, PER_TRIAD));
+            of_triad.copy_from(&fit.covariance);
+        }
+    }
+    estimate
+}
+
+fn fitted(observed: &Observed, model: &Model, sensor: Sensor) -> Result<Fit, CalibrationError> {
+    match determined(observed, model.form) {
+        Some(fit) if knows_more(model, sensor, &fit.covariance) => Ok(fit),
+        _ => with_prior(model, sensor, observed),
     }
 }
 
 /// Whether positions alone know every parameter better than the prior does.
-fn knows_more(problem: &Problem, sensor: Sensor, covariance: &DMatrix<f64>) -> bool {
+fn knows_more(model: &Model, sensor: Sensor, covariance: &DMatrix<f64>) -> bool {
     (0..PER_TRIAD).all(|k| {
-        let prior = problem.model.prior_sigma[parameter(sensor, k)];
+        let prior = model.prior_sigma[parameter(sensor, k)];
         prior == 0.0 || covariance[(k, k)].sqrt() < prior
     })
 }
 
 /// One triad from positions and its prior.
-fn with_prior(
-    problem: &Problem,
-    sensor: Sensor,
-    observed: &Observed,
-) -> Result<Fit, CalibrationError> {
-    // Inputs are along the axes of table or labels, so that no angle is a choice of the body frame.
-    let mut model = problem.model.clone();
-    model.aiding = Aiding::Table;
-    let model = model.in_form(problem.run(), model.form);
+fn with_prior(model: &Model, sensor: Sensor, observed: &Observed) -> Result<Fit, CalibrationError> {
     let prior = from_vector(model.form, &model.prior_mean);
     let mean = prior.get(sensor).to_vector();
     let sigma = TriadVector::from_fn(|k, _| model.prior_sigma[parameter(sensor, k)]);

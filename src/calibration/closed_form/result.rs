@@ -4,7 +4,6 @@ use super::super::estimate::Estimate;
 use super::super::finding::Finding;
 use super::super::model::Model;
 use super::super::parameters::{OBSERVED_BELOW, parameter_name};
-use super::super::prior_distance::far_from_prior;
 use crate::imu::{BodyFrame, PerSensor};
 
 /// Where the inputs of a closed form are known from.
@@ -45,9 +44,8 @@ pub struct ClosedForm {
     pub findings: Vec<Finding>,
 }
 
-/// Parameters that are hardly better known than before, and those that the prior does not allow, if
-/// there are any.
-pub(super) fn remarks(model: &Model, estimate: &Estimate, reference: Reference) -> Vec<Finding> {
+/// Parameters that are hardly better known than before, if there are any.
+pub(super) fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Finding> {
     let sigma = estimate.sigma();
     let hidden = |&i: &usize| {
         let prior = model.prior_sigma[i];
@@ -57,16 +55,12 @@ pub(super) fn remarks(model: &Model, estimate: &Estimate, reference: Reference) 
     let hidden: Vec<String> = names
         .filter_map(|index| parameter_name(estimate.form(), index))
         .collect();
-    let hidden = (!hidden.is_empty()).then_some(Finding::NotObserved {
+    (!hidden.is_empty()).then_some(Finding::NotObserved {
         by: match reference {
             Reference::Table => "these positions",
             Reference::Labels => "these sections",
             Reference::Gravity => "these dwells and moves",
         },
         parameters: hidden,
-    });
-    far_from_prior(model, estimate)
-        .into_iter()
-        .chain(hidden)
-        .collect()
+    })
 }

@@ -7,7 +7,7 @@ use super::super::model::Model;
 use super::super::problem::Problem;
 use super::least_squares::both_triads;
 use super::observed::{Observed, Position};
-use super::result::{ClosedForm, Reference, remarks};
+use super::result::{ClosedForm, Reference, hidden};
 use crate::attitude::skew;
 use crate::imu::{PerSensor, Sensor};
 use crate::run::{Dwell, MeanOutput, Run};
@@ -51,7 +51,7 @@ pub fn six_position_of(
         return Err(CalibrationError::NoDwells);
     }
     let (estimate, mut findings) = both_triads(&chosen, problem)?;
-    findings.extend(remarks(model, &estimate, Reference::Table));
+    findings.extend(hidden(model, &estimate, Reference::Table));
     let standing_time = dwells
         .iter()
         .zip(used)

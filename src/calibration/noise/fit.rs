@@ -14,7 +14,7 @@ use super::factors::{Factors, SOURCES, Scale};
 use super::replay::{Replay, Script};
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
-const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
+pub(in crate::calibration) const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 /// Step of ln σ, or of a variance that is zero over its reference, for differences.
 const DIFFERENCE: f64 = 1e-3;
 /// A variance that is not stated and below this of its reference is none.

@@ -16,6 +16,7 @@ mod run_toml;
 mod selection;
 mod source;
 
+pub(super) use fit::LOG_SIGMA;
 pub(super) use learn::{Learnt, learn};
 pub use policy::NoisePolicy;
 pub use report::{NoiseReport, NoiseTest, SourceFigures};

@@ -20,7 +20,7 @@ const APART: f64 = 0.05;
 
 impl Run {
     /// Stretches of the log whose readings stay.
-    pub(super) fn standstills_of_table(&self, table: &TableLog) -> Vec<Dwell> {
+    pub(in crate::run) fn standstills_of_table(&self, table: &TableLog) -> Vec<Dwell> {
         // Two readings of three components each.
         let limit = STANDING_ANGLE.max(STANDING_SIGMAS * self.table.reading_sigma * 6f64.sqrt());
         let mut dwells = Vec::new();

@@ -6,4 +6,5 @@ mod doubts;
 pub mod made;
 mod reading;
 mod round_trip;
+mod unexplained;
 mod wrong_input;

@@ -1,5 +1,8 @@
 //! What is possible in a run, and so out of the ordinary that it is said.
 
+mod clock;
+mod columns;
+
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use super::{Aiding, Run};
@@ -21,8 +24,14 @@ impl Run {
     /// What is possible in it, and so out of the ordinary that it is said: a sentence for each.
     pub(crate) fn doubts(&self) -> Vec<String> {
         let table = self.recording.table.as_ref();
-        let of_table = table.map(|table| [coverage(self, table), order(self, table)]);
-        let all = [gravity(self)]
+        let of_table = table.map(|table| {
+            [
+                coverage(self, table),
+                order(self, table),
+                clock::clock(self, table),
+            ]
+        });
+        let all = [gravity(self), columns::columns(self)]
             .into_iter()
             .chain(of_table.into_iter().flatten());
         all.flatten().collect()

@@ -1,0 +1,50 @@
+//! Innovations that no noise figure explains.
+
+use super::finding::Finding;
+use super::innovation::{Innovation, Nis};
+use super::noise::LOG_SIGMA;
+use crate::statistics::chi_square_limit;
+
+/// Part of stated figures that are wrong by more than what is still taken for a wrong figure.
+const SO_WRONG: f64 = 1e-2;
+
+/// The finding where innovations are larger than a data sheet's figures can be wrong by.
+///
+/// Noise as stated is wrong by a factor of three at one σ, wherever it is learnt; by so much that NIS, its
+/// square, goes beyond the limit, once in a hundred. Beyond, samples and model are of two things.
+pub(super) fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
+    let sigmas = chi_square_limit(1.0, 2.0 * SO_WRONG).sqrt();
+    let limit = (2.0 * LOG_SIGMA * sigmas).exp();
+    let distances = innovations.iter().map(|i| (i.time, i.distance()));
+    let worst = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;
+    (all.mean > limit).then_some(Finding::Unexplained {
+        nis: all.mean,
+        limit,
+        worst: worst.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::innovation::{Observation, consistency};
+
+    fn found(factor: f64) -> bool {
+        let innovations: Vec<Innovation> = (0..300)
+            .map(|k| Innovation {
+                time: f64::from(k),
+                observation: Observation::Velocity,
+                whitened: [factor; 3],
+                accepted: true,
+                dwell: 0,
+            })
+            .collect();
+        unexplained(&consistency(&innovations).all, &innovations).is_some()
+    }
+
+    #[test]
+    fn noise_stated_ten_times_too_small_is_a_wrong_figure_and_thirty_times_is_another_instrument() {
+        assert!(!found(10.0));
+        assert!(found(30.0));
+    }
+}

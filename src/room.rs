@@ -1,0 +1,27 @@
+//! Whether there is memory for what comes.
+
+use std::hint::black_box;
+
+/// Whether so many bytes can be had at this moment.
+///
+/// An allocation that fails within a calculation ends the program, and safe code cannot catch that. What a
+/// step will take is therefore asked for as a whole before it begins, where an error can still be given, and
+/// let go again; memory that is never touched costs nothing.
+pub(crate) fn is_there(bytes: usize) -> bool {
+    let mut room: Vec<u8> = Vec::new();
+    let granted = room.try_reserve_exact(bytes).is_ok();
+    // What is never used need never be asked for.
+    black_box(room);
+    granted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_room_for_little_and_none_for_more_than_can_be_addressed() {
+        assert!(is_there(1 << 10));
+        assert!(!is_there(usize::MAX));
+    }
+}

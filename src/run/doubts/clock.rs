@@ -1,0 +1,282 @@
+//! Moves as the gyros and as the table saw them: how far, and when.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use crate::attitude::log;
+use crate::earth::ROTATION_RATE;
+use crate::recording::{TableLog, nanoseconds};
+use crate::run::Run;
+use crate::units::{DEGREE, PPM};
+
+/// A move that differs by more than this part of it is another one …
+const OTHER_ANGLE: f64 = 0.1;
+/// … or that many σ of the gyros' scale and bias.
+const SIGMAS: f64 = 5.0;
+/// Between two readings a table that turns by less has turned the shorter way, rad.
+const SHORTER_WAY: f64 = 1.0;
+/// The way of the gyros is measured in steps this long, s, so that noise adds little to it.
+const STEP: f64 = 0.1;
+/// What turns by less has not turned, rad.
+const SMALLEST: f64 = 1.0 * DEGREE;
+
+/// A move from one dwell to the next.
+#[derive(Debug, Clone, Copy)]
+struct Move {
+    /// How far it goes, and when, by the gyros.
+    gyros: Way,
+    /// The same by the table.
+    table: Way,
+    /// By how much the ways of the same move may differ, rad.
+    tolerance: f64,
+    /// The longest time between two readings, s.
+    interval: f64,
+}
+
+impl Move {
+    fn is_another(&self) -> bool {
+        (self.gyros.angle - self.table.angle).abs() > self.tolerance
+    }
+
+    /// By how much the gyros are later, s.
+    fn late(&self) -> f64 {
+        self.gyros.middle - self.table.middle
+    }
+}
+
+/// Steps of a move, summed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Way {
+    /// In all, one way and the other, rad.
+    angle: f64,
+    /// Mean time of it, s.
+    middle: f64,
+    /// Rate, rad/s.
+    fastest: f64,
+}
+
+impl Way {
+    /// Of steps with their times in the middle, durations in s and angles in rad, but for those at rest: they
+    /// turn by less than `noise` and by less than rate `zero` makes.
+    fn of(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> Self {
+        let mut way = Self::default();
+        for (time, duration, angle) in steps {
+            way.fastest = way.fastest.max(angle / duration);
+            if angle > noise + zero * duration {
+                way.middle += angle * time;
+                way.angle += angle;
+            }
+        }
+        way.middle /= way.angle.max(f64::MIN_POSITIVE);
+        way
+    }
+}
+
+/// Moves that the gyros make by another angle than the table, or at another time.
+///
+/// Rows that one log has lost, clocks that run apart and a log of another run all show there, however the
+/// samples are stamped.
+pub(super) fn clock(run: &Run, table: &TableLog) -> Option<String> {
+    let moves = moves(run, table);
+    let (another, same): (Vec<Move>, Vec<Move>) = moves.iter().copied().partition(Move::is_another);
+    if let Some(first) = another.first() {
+        return Some(format!(
+            "In {} of {} moves the gyros do not turn as far as the table, or further: the first is at {:.1} s, \
+             {:.1}° by the gyros and {:.1}° by the table. Either rows are lost, repeated, clipped or wrapped there, \
+             or both logs are not of one run or clock, or gyro_unit, scale or the unit of the table's angles is \
+             another.",
+            another.len(),
+            moves.len(),
+            first.table.middle,
+            first.gyros.angle / DEGREE,
+            first.table.angle / DEGREE
+        ));
+    }
+    let (first, last) = (same.first()?, same.last()?);
+    let late: Vec<f64> = same.iter().map(Move::late).collect();
+    let (low, high) = late
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &late| {
+            (low.min(late), high.max(late))
+        });
+    let interval = same.iter().map(|m| m.interval).fold(0.0, f64::max);
+    let resolved = interval + run.recording.imu.period;
+    if low.abs().max(high.abs()) <= resolved {
+        return None;
+    }
+    let by = |late: f64| match late > 0.0 {
+        true => format!("{late:.2} s later"),
+        false => format!("{:.2} s earlier", -late),
+    };
+    if high - low <= resolved {
+        return Some(format!(
+            "The gyros turn {} than the table in all {} moves: bring both logs to one clock.",
+            by(0.5 * (low + high)),
+            same.len()
+        ));
+    }
+    let steps = late.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let (place, step) = steps
+        .enumerate()
+        .max_by(|one, other| one.1.total_cmp(&other.1))?;
+    if step > 0.5 * (high - low) {
+        let (before, after) = (&same[place], &same[place + 1]);
+        let change = after.late() - before.late();
+        return Some(format!(
+            "Against the table the gyros turn {} from the move at {:.1} s to that at {:.1} s: {} about {:.0} rows \
+             in between, or the table's log jumps there.",
+            by(change),
+            before.table.middle,
+            after.table.middle,
+            match change < 0.0 {
+                true => "the IMU's log has lost",
+                false => "the IMU's log repeats",
+            },
+            change.abs() / run.recording.imu.period
+        ));
+    }
+    let apart = (last.late() - first.late()) / (last.table.middle - first.table.middle);
+    Some(format!(
+        "The IMU's clock and the table's run apart by {:.0} ppm: the gyros turn {} than the table in the move at \
+         {} s, {} in that at {} s. Rows are lost or repeated all along, or sample_period_s or the stamps of one log \
+         are wrong; scale factors follow them.",
+        apart / PPM,
+        by(first.late()),
+        nanoseconds((first.table.middle * 10.0).round() / 10.0),
+        by(last.late()),
+        nanoseconds((last.table.middle * 10.0).round() / 10.0)
+    ))
+}
+
+/// Moves that both logs resolve, from the middle of one standstill of the table to that of the next; the
+/// first and the last reach to the ends of what both logs cover.
+fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
+    let imu = &run.recording.imu;
+    let stands: Vec<Range<usize>> = run
+        .standstills_of_table(table)
+        .into_iter()
+        .map(|standstill| standstill.samples)
+        .collect();
+    let covered = |time: Option<&f64>| {
+        let edge = imu.edge(time.copied().unwrap_or(0.0));
+        edge.clamp(0.0, imu.len() as f64) as usize
+    };
+    let (first, last) = (covered(table.time.first()), covered(table.time.last()));
+    let count = stands.len().saturating_sub(1);
+    let between = stands.windows(2).enumerate().filter_map(|(k, pair)| {
+        let middle = |samples: &Range<usize>| samples.start.midpoint(samples.end);
+        let begin = if k == 0 { first } else { middle(&pair[0]) };
+        let end = match k + 1 == count {
+            true => last,
+            false => middle(&pair[1]),
+        };
+        let samples = begin..end;
+        let is_whole = !samples.is_empty() && imu.unbroken(&samples) && !imu.is_lost(&samples);
+        is_whole.then(|| of_samples(run, table, samples)).flatten()
+    });
+    between.collect()
+}
+
+/// What both logs say of these samples; none where readings are too far apart, or nothing turns.
+fn of_samples(run: &Run, table: &TableLog, samples: Range<usize>) -> Option<Move> {
+    let imu = &run.recording.imu;
+    let prior = &run.instrument.prior.gyro;
+    let (begin, end) = (imu.time(samples.start), imu.time(samples.end));
+    let readings =
+        table.time.partition_point(|&t| t < begin)..table.time.partition_point(|&t| t < end);
+    let (times, attitudes) = (&table.time[readings.clone()], &table.attitude[readings]);
+    let (first, last) = (*times.first()?, *times.last()?);
+    let intervals = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let interval = intervals.fold((first - begin).max(end - last), f64::max);
+    let steps = times.windows(2).zip(attitudes.windows(2));
+    let by_table = steps.map(|(time, attitude)| {
+        let angle = log(&(attitude[1] * attitude[0].transpose())).norm();
+        (time[0].midpoint(time[1]), time[1] - time[0], angle)
+    });
+    // Two readings of three components each, as where standstills are found.
+    let by_table = Way::of(
+        by_table,
+        SIGMAS * run.table.reading_sigma * 6f64.sqrt(),
+        0.0,
+    );
+    let length = ((STEP / imu.period).round() as usize).max(1);
+    let starts = samples.clone().step_by(length);
+    let by_gyros = starts.map(|start| {
+        let part = start..(start + length).min(samples.end);
+        let duration = part.len() as f64 * imu.period;
+        let sum: Vector3<f64> = imu.gyro[part.clone()].iter().sum();
+        let time = imu.time(part.start) + 0.5 * duration;
+        (time, duration, (sum - prior.bias * duration).norm())
+    });
+    let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt();
+    let zero = SIGMAS * prior.bias_sigma.norm() + ROTATION_RATE;
+    let by_gyros = Way::of(by_gyros, noise, zero);
+    let is_resolved = by_gyros.fastest.max(by_table.fastest) * interval < SHORTER_WAY;
+    let part = OTHER_ANGLE.max(SIGMAS * prior.scale_sigma.amax());
+    let longest = by_gyros.angle.max(by_table.angle);
+    (is_resolved && longest > SMALLEST).then_some(Move {
+        gyros: by_gyros,
+        table: by_table,
+        tolerance: part * longest + zero * (end - begin),
+        interval,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Scenario;
+
+    fn said(spoil: impl Fn(&mut Run)) -> Option<String> {
+        let mut run = Scenario::load("mems").unwrap().simulate(1, 0).unwrap().run;
+        spoil(&mut run);
+        clock(&run, run.recording.table.as_ref().unwrap())
+    }
+
+    fn lose(run: &mut Run, lost: impl Fn(usize) -> bool) {
+        let imu = &mut run.recording.imu;
+        let count = imu.len();
+        for triad in [&mut imu.gyro, &mut imu.accel] {
+            let mut number = 0..count;
+            triad.retain(|_| !lost(number.next().unwrap()));
+        }
+        let kept = imu.len();
+        imu.stretches[0].samples.end = kept;
+    }
+
+    #[test]
+    fn both_logs_of_a_sound_run_agree() {
+        assert_eq!(said(|_| {}), None);
+        let run = Scenario::load("demo-six-position").unwrap();
+        let run = run.simulate(1, 0).unwrap().run;
+        assert_eq!(clock(&run, run.recording.table.as_ref().unwrap()), None);
+    }
+
+    #[test]
+    fn rows_that_are_lost_are_counted_wherever_they_were() {
+        let at_rest = said(|run| lose(run, |k| (31_200..31_250).contains(&k))).unwrap();
+        assert!(at_rest.contains("has lost about 50 rows"), "{at_rest}");
+        let all_along = said(|run| lose(run, |k| k % 1000 == 0)).unwrap();
+        let words = all_along.split_whitespace();
+        let ppm: f64 = words
+            .skip_while(|word| *word != "by")
+            .nth(1)
+            .unwrap()
+            .parse()
+            .unwrap();
+        assert!((ppm + 1000.0).abs() < 20.0, "{all_along}");
+    }
+
+    #[test]
+    fn a_table_log_that_is_late_or_of_another_run_is_named() {
+        let table = |run: &mut Run, late: f64| {
+            let table = run.recording.table.as_mut().unwrap();
+            table.time.iter_mut().for_each(|time| *time += late);
+        };
+        let late = said(|run| table(run, 0.5)).unwrap();
+        assert!(late.contains("0.50 s earlier than the table"), "{late}");
+        let of_another = said(|run| table(run, 60.0)).unwrap();
+        assert!(of_another.contains("not of one run"), "{of_another}");
+    }
+}
