@@ -58,6 +58,7 @@ pub mod calibration;
 pub mod earth;
 pub mod formats;
 pub mod imu;
+pub mod lot;
 pub mod models;
 pub mod navigation;
 pub mod noise;

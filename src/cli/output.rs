@@ -13,7 +13,7 @@ use turncal::report::{self, Document, terminal};
 pub struct Overwrite {
     /// Replace the output directory if it exists and holds only what turncal wrote
     #[arg(long)]
-    force: bool,
+    pub force: bool,
 }
 
 impl Overwrite {

@@ -13,6 +13,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::{FileError, Place};
+pub(in crate::formats) use manifest::FILE as LIST;
 use stage::Stage;
 pub use stage::abandon_unfinished;
 
@@ -112,6 +113,25 @@ impl WholeDirectory {
             .map_err(|error| unwritable(target, "put the output in place", &error))?;
         self.stage.commit(self.force)
     }
+}
+
+/// Writes the list of a directory that grows, in which nothing but these names is turncal's; what is in a name
+/// that ends in `/` has a list of its own. Files that the list before named and this one does not go.
+pub(super) fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
+    for old in manifest::listed_files(directory) {
+        let still = |name: &&str| old.file_name() == Some(name.as_ref());
+        if !names.iter().any(|name| still(&name)) {
+            fs::remove_file(&old)
+                .map_err(|error| unwritable(directory, "remove what is out of date", &error))?;
+        }
+    }
+    let list = manifest::of_names(names.iter().copied());
+    write_whole(&directory.join(manifest::FILE), list.as_bytes(), true)
+}
+
+/// Removes what a killed process left unfinished in a directory.
+pub(super) fn clear_abandoned(directory: &Path) {
+    stage::remove_abandoned(directory);
 }
 
 /// Refuses a directory that holds anything beside what was written by a [`WholeDirectory`].

@@ -8,8 +8,8 @@ use turncal::report;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
-use super::super::calibrate::{Aiding, Installation, Noise};
 use super::super::error_term::TermArgument;
+use super::super::estimation::{Aiding, Installation, Noise};
 use super::super::input::{at_least_two, seed};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
