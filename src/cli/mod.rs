@@ -16,6 +16,7 @@ mod input;
 mod list;
 mod lot;
 mod man;
+mod merge;
 mod names;
 mod navigate;
 mod noise;
@@ -62,6 +63,7 @@ enum Command {
     Apply(apply::Apply),
     Export(export::Export),
     Study(study::Study),
+    Merge(merge::Merge),
     Init(init::Init),
     Check(check::Check),
     Allan(allan::Allan),
@@ -83,6 +85,7 @@ impl Cli {
             Command::Apply(apply) => apply.run(),
             Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
+            Command::Merge(merge) => merge.run(),
             Command::Init(init) => init.run(),
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),

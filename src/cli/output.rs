@@ -4,9 +4,12 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use turncal::formats::FileError;
-use turncal::formats::WholeDirectory;
+use serde::Serialize;
+use turncal::formats::{FileError, Job, JobKind, Part, WholeDirectory};
 use turncal::report::{self, Document, terminal};
+use turncal::study::Shard;
+
+use super::input::shard;
 
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -38,6 +41,21 @@ pub struct Delivery {
 }
 
 impl Delivery {
+    /// The directory, if one is asked for.
+    pub fn output(&self) -> Option<&Path> {
+        self.output.as_deref()
+    }
+
+    /// Whether JSON is asked for.
+    pub fn json(&self) -> bool {
+        self.json
+    }
+
+    /// Whether an existing directory may be replaced.
+    pub fn force(&self) -> bool {
+        self.overwrite.force
+    }
+
     /// Begins the directory, if one is asked for, so that long work is not done in vain; none of
     /// `inputs` may lie in it.
     pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, FileError> {
@@ -53,6 +71,30 @@ impl Delivery {
     }
 }
 
+/// The part of a study that is to be made.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct Sharding {
+    /// Make part i of M of the runs into DIR, to be merged with the others
+    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json")]
+    shard: Option<Shard>,
+}
+
+impl Sharding {
+    /// The part of a study of so many runs; none if all is to be made.
+    pub fn part(
+        self,
+        job: JobKind,
+        study: &impl Serialize,
+        runs: u64,
+    ) -> anyhow::Result<Option<Part>> {
+        let part = |shard| {
+            let options = serde_json::to_value(study)?;
+            Ok(Part::new(Job::new(job, options, runs), Some(shard)))
+        };
+        self.shard.map(part).transpose()
+    }
+}
+
 /// A delivery whose directory has been begun.
 pub struct Begun<'a> {
     directory: Option<(&'a Path, WholeDirectory)>,
@@ -60,6 +102,18 @@ pub struct Begun<'a> {
 }
 
 impl Begun<'_> {
+    /// Writes files into the directory, and shows nothing.
+    pub fn fill<E: Into<anyhow::Error>>(
+        self,
+        write: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> anyhow::Result<()> {
+        if let Some((_, whole)) = self.directory {
+            write(&whole.path()).map_err(Into::into)?;
+            whole.commit()?;
+        }
+        Ok(())
+    }
+
     /// Writes and prints a document as it is asked for.
     pub fn deliver(self, document: &Document) -> anyhow::Result<()> {
         let mut page = None;

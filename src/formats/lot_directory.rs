@@ -54,6 +54,13 @@ pub fn unit_key(job: &str, run: &Path) -> String {
     digest_of(&(job, input_digests(run)))
 }
 
+/// A unit in the directory of a part of its lot.
+pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
+    let directory = part.join(UNITS).join(name);
+    let record = UnitRecord::read(&directory)?;
+    read_unit(&directory, &record.key)
+}
+
 impl LotDirectory {
     /// Begins a lot's directory, or goes on with one that the same job has begun; `waiting` is told if another
     /// process has to finish first. With `force` everything begins anew.

@@ -4,6 +4,7 @@ use super::limits::{Check, Verdict};
 use super::quantity::{Quantity, Sample};
 use super::unit::Unit;
 use crate::calibration::frame::Canonical;
+use crate::imu::{Nominal, PerSensor, Sensor};
 
 /// A unit in the lot.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,22 @@ pub struct Row {
 }
 
 impl Row {
+    /// The nominal scale that its run states farthest from the lot's: triad, axis and by which part; none where
+    /// all are the same but for rounding.
+    pub fn nominal_off(&self, lot: &PerSensor<Nominal>) -> Option<(Sensor, usize, f64)> {
+        const ROUNDING: f64 = 1e-12;
+        let own = &self.unit.calibrated.as_ref().ok()?.nominal;
+        let axes = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| [0, 1, 2].map(|axis| (sensor, axis)));
+        let off = axes.map(|(sensor, axis)| {
+            let part = own.get(sensor)[axis] / lot.get(sensor).0[axis] - 1.0;
+            (sensor, axis, part)
+        });
+        off.filter(|off| off.2.abs() > ROUNDING)
+            .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
+    }
+
     /// A quantity of the unit.
     pub fn sample(&self, quantity: Quantity) -> Option<Sample> {
         let canonical = self.canonical.as_ref().ok()?;

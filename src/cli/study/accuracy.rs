@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use turncal::formats::{JobKind, write_part};
 use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
@@ -11,7 +12,7 @@ use turncal::study::AccuracyStudy;
 use super::super::error_term::TermArgument;
 use super::super::estimation::{Aiding, Installation, Noise};
 use super::super::input::{at_least_two, seed};
-use super::super::output::Delivery;
+use super::super::output::{Delivery, Sharding};
 use super::super::progress::Runs;
 
 /// How accurate the filter is, and whether its σ are true
@@ -62,6 +63,8 @@ pub struct Accuracy {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     delivery: Delivery,
 }
 
@@ -91,6 +94,16 @@ impl Accuracy {
             scenario,
         };
         let begun = self.delivery.begin(&[Path::new(&self.scenario)])?;
+        let part = self
+            .sharding
+            .part(JobKind::StudyAccuracy, &study, self.runs)?;
+        if let Some(part) = part {
+            let held = part.held();
+            let runs = Runs::new(held.len() as u64);
+            let trials = study.trials(&held, &|| runs.one_done())?;
+            drop(runs);
+            return begun.fill(|directory| write_part(directory, part, &trials));
+        }
         let runs = Runs::new(self.runs);
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);

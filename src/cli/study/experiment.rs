@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use turncal::formats::{JobKind, write_part};
 use turncal::models::{self, Place};
 use turncal::report;
 use turncal::simulation::Scenario;
@@ -9,7 +10,7 @@ use turncal::study::ExperimentStudy;
 use turncal::study::navigation::INTERVAL;
 
 use super::super::input::{at_least_two, hours, seed};
-use super::super::output::Delivery;
+use super::super::output::{Delivery, Sharding};
 use super::super::progress::Runs;
 
 const HOUR: f64 = 3600.0;
@@ -41,6 +42,8 @@ pub struct Experiment {
     #[arg(long, default_value_t = 40.0, value_parser = hours)]
     hours: f64,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     delivery: Delivery,
 }
 
@@ -58,6 +61,16 @@ impl Experiment {
             samples: self.samples,
         };
         let begun = self.delivery.begin(&[Path::new(&self.trajectory)])?;
+        let part = self
+            .sharding
+            .part(JobKind::StudyExperiment, &study, self.samples)?;
+        if let Some(part) = part {
+            let held = part.held();
+            let runs = Runs::new(held.len() as u64);
+            let trials = study.trials(&held, &|| runs.one_done())?;
+            drop(runs);
+            return begun.fill(|directory| write_part(directory, part, &trials));
+        }
         let runs = Runs::new(self.samples);
         let experiment = study.run(&|| runs.one_done())?;
         drop(runs);

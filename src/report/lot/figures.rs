@@ -16,14 +16,11 @@ pub(super) fn parameters(lot: &Lot) -> Plot {
             Quantity::Noise(..) => String::new(),
         });
         let names: Vec<String> = names.collect();
+        let title = format!("{}, {}", group.title(), group.unit());
         let limits = limits(lot, &quantities);
-        panel(
-            lot,
-            &format!("{}, {}", group.title(), group.unit()),
-            &quantities,
-            &names,
-        )
-        .with_all(limits)
+        let mut panel = panel(lot, &title, &quantities, &names);
+        panel.y = panel.y.including(limits.iter().copied());
+        panel.with_all(limits.into_iter().map(|y| Series::level(y).dashed()))
     });
     Plot::new("lot.svg", "Every unit", (2, 330), panels).caption(
         "Units in the order given, with their own 1σ; long lines: limits that all axes share. Crosses are apart \
@@ -89,7 +86,7 @@ fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> P
 }
 
 /// Limits that all parameters of a group share.
-fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<Series> {
+fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
     let Some(specification) = &lot.specification else {
         return Vec::new();
     };
@@ -104,9 +101,7 @@ fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<Series> {
     };
     let all: Option<Vec<[f64; 2]>> = quantities.iter().map(of).collect();
     match all.as_deref() {
-        Some([first, rest @ ..]) if rest.iter().all(|other| other == first) => {
-            first.map(|y| Series::level(y).dashed()).to_vec()
-        }
+        Some([first, rest @ ..]) if rest.iter().all(|other| other == first) => first.to_vec(),
         _ => Vec::new(),
     }
 }

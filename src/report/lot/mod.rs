@@ -8,9 +8,13 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use super::document::{Document, Facts};
-use super::number::count;
-use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Statistics, Verdict};
+use super::number::{count, three_digits};
+use crate::imu::AXES;
+use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
+use crate::units::PPM;
 use shown::{change, title};
 
 /// Everything that is said of a lot.
@@ -24,6 +28,8 @@ pub fn document(lot: &Lot) -> Document {
     say_failures(lot, &mut document);
     say_verdicts(lot, &mut document);
     say_outliers(lot, &mut document);
+    say_nominal(lot, &mut document);
+    say_findings(lot, &mut document);
     say_trends(lot, &mut document);
     document.both(facts(lot));
     document.both(tables::units(lot));
@@ -64,7 +70,7 @@ fn facts(lot: &Lot) -> Facts {
             "gravity",
             format!(
                 "the same for all, 1σ {:.1} ppm: in every σ of accelerometer K and in their mean, not in their scatter",
-                gravity / crate::units::PPM
+                gravity / PPM
             ),
         );
     }
@@ -94,7 +100,9 @@ fn say_verdicts(lot: &Lot, document: &mut Document) {
         );
         document.say(false, words);
     }
-    let undecided = names(Verdict::NotDecided);
+    let failed: Vec<&str> = lot.failures().map(|(unit, _)| unit.name.as_str()).collect();
+    let mut undecided = names(Verdict::NotDecided);
+    undecided.retain(|name| !failed.contains(name));
     if !undecided.is_empty() {
         let words = format!(
             "Not decided with {percent} % confidence: {}. A smaller σ decides.",
@@ -103,7 +111,8 @@ fn say_verdicts(lot: &Lot, document: &mut Document) {
         document.say(false, words);
     }
     if failing.len() + undecided.len() == 0 {
-        let words = format!("All units are within all limits with {percent} % confidence.");
+        let words =
+            format!("All calibrated units are within all limits with {percent} % confidence.");
         document.say(true, words);
     }
 }
@@ -134,9 +143,61 @@ fn say_outliers(lot: &Lot, document: &mut Document) {
     }
 }
 
+/// Units of one type have one nominal scale: who states another is named, where most state the same.
+fn say_nominal(lot: &Lot, document: &mut Document) {
+    let same = |row: &Row| row.nominal_off(&lot.nominal).is_none();
+    let stated = lot.rows.iter().filter(|row| row.unit.calibrated.is_ok());
+    let others: Vec<&Row> = stated.clone().filter(|row| !same(row)).collect();
+    if 2 * others.len() > stated.count() {
+        return;
+    }
+    for row in others {
+        if let Some((sensor, axis, off)) = row.nominal_off(&lot.nominal) {
+            document.say(
+                false,
+                format!(
+                    "{} states another nominal scale than the lot: {} {}, {} ppm off; its scale factors are given \
+                     against the lot's.",
+                    row.unit.name,
+                    sensor.name(),
+                    AXES[axis],
+                    three_digits(off / PPM)
+                ),
+            );
+        }
+    }
+}
+
+/// What the units' own calibrations warn of, by kind.
+fn say_findings(lot: &Lot, document: &mut Document) {
+    let mut kinds: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for row in &lot.rows {
+        let calibration = row.unit.calibrated.as_ref().ok().map(|of| &of.calibration);
+        let findings = calibration.into_iter().flat_map(|c| &c.findings);
+        for finding in findings {
+            let units = kinds.entry(finding.kind.as_str()).or_default();
+            if units.last() != Some(&row.unit.name.as_str()) {
+                units.push(&row.unit.name);
+            }
+        }
+    }
+    let calibrated = lot
+        .rows
+        .iter()
+        .filter(|row| row.unit.calibrated.is_ok())
+        .count();
+    for (kind, units) in kinds {
+        let who = match units.len() == calibrated {
+            true => "all units".to_owned(),
+            false => units.join(", "),
+        };
+        let words = format!("Their own reports warn of `{kind}`: {who}.");
+        document.say(false, words);
+    }
+}
+
 fn say_trends(lot: &Lot, document: &mut Document) {
-    let trends = |of: &'static str| move |statistics: &Statistics| (of, statistics.trends.len());
-    let told: usize = lot.statistics.iter().map(trends("")).map(|t| t.1).sum();
+    let told: usize = lot.statistics.iter().map(|of| of.trends.len()).sum();
     for statistics in &lot.statistics {
         for trend in &statistics.trends {
             document.say(false, change(statistics.quantity, trend));

@@ -3,7 +3,7 @@
 use super::super::group::{Group, short_name};
 use super::super::number::{plus_minus, sigma, three_digits, value};
 use crate::imu::{AXES, InstallationForm, Sensor};
-use crate::lot::{Against, Quantity, Sample, Trend};
+use crate::lot::{Against, Quantity, Sample, Spread, Trend};
 use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
 
 /// Such as `gyro K x` or `gyro noise x`.
@@ -105,10 +105,12 @@ pub(super) fn chance(p: f64) -> String {
 }
 
 /// A spread with its own σ, or what it stays below.
-pub(super) fn spread(quantity: Quantity, of: &crate::lot::Spread) -> String {
+pub(super) fn spread(quantity: Quantity, of: &Spread) -> String {
     let shown = |x: f64| shown_spread(quantity, x);
     match of.sigma {
         Some(own) if of.interval.0 > 0.0 => plus_minus(shown(of.value), shown(own)),
-        _ => format!("< {}", sigma(shown(of.interval.1))),
+        _ if of.interval.1 > 0.0 => format!("< {}", sigma(shown(of.interval.1))),
+        // The scatter is less than the units' σ alone make.
+        _ => "0".to_owned(),
     }
 }

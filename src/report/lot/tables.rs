@@ -2,8 +2,8 @@
 
 use super::super::document::{NONE, Table, cells};
 use super::super::group::{Group, axis_name};
-use super::super::number::{count, or_dash, value};
-use super::shown::{chance, shown, spread, spread_symbol, symbol, title, with_sigma};
+use super::super::number::{count, or_dash, sigma, three_digits, value};
+use super::shown::{chance, shown, shown_spread, spread, spread_symbol, symbol, title, with_sigma};
 use crate::imu::{InstallationForm, Sensor};
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
 
@@ -18,7 +18,9 @@ pub(super) fn units(lot: &Lot) -> Table {
         let meta = |key: &str| row.unit.meta.get(key).cloned().unwrap_or(NONE.to_owned());
         let mut cells = cells![row.unit.name.as_str(), meta("serial"), meta("date")];
         if lot.specification.is_some() {
-            let reason = row.checks.iter().find(|c| Some(c.verdict) == row.verdict);
+            let open = row.canonical.is_ok().then_some(row.checks.as_slice());
+            let mut open = open.unwrap_or_default().iter();
+            let reason = open.find(|check| Some(check.verdict) == row.verdict);
             cells.push(verdict(row.verdict, reason));
         }
         match (&row.canonical, &row.unit.calibrated) {
@@ -125,13 +127,13 @@ fn row(of: &Statistics) -> Vec<String> {
         value: of.scatter.mean,
         sigma: of.scatter.mean_sigma,
     };
-    let scatter = super::shown::shown_spread(quantity, of.scatter.deviation);
+    let scatter = shown_spread(quantity, of.scatter.deviation);
     let chi2 = of.scatter.chi_square;
     cells![
         title(quantity),
         symbol(quantity),
         with_sigma(shown(quantity, mean)),
-        super::super::number::sigma(scatter),
+        sigma(scatter),
         or_dash(
             chi2.map(|c| c.value / c.freedom as f64),
             super::super::number::three_digits
@@ -146,6 +148,15 @@ fn row(of: &Statistics) -> Vec<String> {
             outliers => count(outliers),
         },
     ]
+}
+
+/// χ²/n, whose size means nothing where it is far beyond chance.
+fn ratio(of: f64) -> String {
+    const FAR: f64 = 1000.0;
+    match of > FAR {
+        true => format!("> {FAR}"),
+        false => three_digits(of),
+    }
 }
 
 /// Every parameter of every unit, a table for each group, and one of noise for each triad.
@@ -207,7 +218,7 @@ pub(super) fn values(lot: &Lot) -> Vec<Table> {
 pub(super) fn undecided(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = Quantity::Parameter(check.limit.parameter);
-        let in_unit = |x: f64| super::shown::shown_spread(quantity, x);
+        let in_unit = |x: f64| shown_spread(quantity, x);
         let off = check
             .off
             .map(|(off, own)| with_sigma((in_unit(off), in_unit(own))));
