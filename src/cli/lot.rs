@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use rayon::prelude::*;
 use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
 use turncal::imu::PerSensor;
 use turncal::lot::{self, Lot, Specification, Unit};
@@ -19,6 +18,7 @@ use super::calibrated::{Calibrated, write_report};
 use super::estimation::Estimation;
 use super::output::show;
 use super::progress::Runs;
+use super::threads::piece_by_piece;
 
 /// Written where no directory is named.
 pub const DIRECTORY: &str = "lot-calibration";
@@ -52,15 +52,14 @@ impl Request<'_> {
         let held = part.held();
         let progress = Runs::new(held.len() as u64);
         let key = part.job.key();
-        // One unit at a time is taken, so that a slow one holds up none.
-        let units = held.into_par_iter().with_max_len(1).map(|place| {
-            let place = usize::try_from(place)?;
+        let units = piece_by_piece(held.len(), |piece| {
+            let place = usize::try_from(held[piece])?;
             let (run, name) = (&self.runs[place], &names[place]);
             let unit = self.unit(run, name, &key, directory.as_ref());
             progress.one_done();
             unit
         });
-        let units = units.collect::<anyhow::Result<Vec<Unit>>>()?;
+        let units = units.into_iter().collect::<anyhow::Result<Vec<Unit>>>()?;
         drop(progress);
         if let Some(shard) = self.shard {
             if let Some(directory) = &directory {

@@ -5,10 +5,18 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
-/// The largest part of a lot that can be apart from the rest.
-const MOST: f64 = 0.25;
 /// Fewer values than this have no others to be apart from.
 const FEWEST: usize = 5;
+
+/// How many values can be apart from the rest: one in four where the limits hold for several, which Rosner
+/// found from 25 values on, and of two from 15 on; else one, for which they hold by themselves (Grubbs).
+fn most(count: usize) -> usize {
+    match count {
+        25.. => count / 4,
+        15.. => 2,
+        _ => 1,
+    }
+}
 
 /// Places of the outliers among values with their variances, at this chance of any among normal ones.
 pub(super) fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
@@ -16,9 +24,8 @@ pub(super) fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
         return Vec::new();
     }
     let mut left: Vec<(usize, f64)> = standardised(samples).into_iter().enumerate().collect();
-    let most = (MOST * samples.len() as f64).ceil() as usize;
     let (mut removed, mut outliers) = (Vec::new(), 0);
-    for _ in 0..most {
+    for _ in 0..most(samples.len()) {
         let Some((place, deviate)) = extreme(&left) else {
             break;
         };

@@ -20,6 +20,7 @@ mod init;
 #[cfg(unix)]
 mod interrupted;
 mod learnt_noise;
+mod lot;
 mod modules;
 mod mounting;
 mod navigate;

@@ -134,10 +134,7 @@ fn row(of: &Statistics) -> Vec<String> {
         symbol(quantity),
         with_sigma(shown(quantity, mean)),
         sigma(scatter),
-        or_dash(
-            chi2.map(|c| c.value / c.freedom as f64),
-            super::super::number::three_digits
-        ),
+        or_dash(chi2.map(|c| c.value / c.freedom as f64), ratio),
         or_dash(chi2.map(|c| c.p), chance),
         spread(quantity, &of.scatter.spread),
         spread_symbol(quantity),
