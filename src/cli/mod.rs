@@ -22,6 +22,7 @@ mod navigate;
 mod noise;
 mod output;
 mod progress;
+mod sharding;
 mod signals;
 mod simulate;
 mod study;

@@ -4,12 +4,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use serde::Serialize;
-use turncal::formats::{FileError, Job, JobKind, Part, WholeDirectory};
+use turncal::formats::{FileError, WholeDirectory};
 use turncal::report::{self, Document, terminal};
-use turncal::study::Shard;
-
-use super::input::shard;
 
 /// What every command that writes has in common.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -71,30 +67,6 @@ impl Delivery {
     }
 }
 
-/// The part of a study that is to be made.
-#[derive(Debug, Clone, Copy, clap::Args)]
-pub struct Sharding {
-    /// Make part i of M of the runs into DIR, to be merged with the others
-    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json")]
-    shard: Option<Shard>,
-}
-
-impl Sharding {
-    /// The part of a study of so many runs; none if all is to be made.
-    pub fn part(
-        self,
-        job: JobKind,
-        study: &impl Serialize,
-        runs: u64,
-    ) -> anyhow::Result<Option<Part>> {
-        let part = |shard| {
-            let options = serde_json::to_value(study)?;
-            Ok(Part::new(Job::new(job, options, runs), Some(shard)))
-        };
-        self.shard.map(part).transpose()
-    }
-}
-
 /// A delivery whose directory has been begun.
 pub struct Begun<'a> {
     directory: Option<(&'a Path, WholeDirectory)>,
@@ -103,12 +75,9 @@ pub struct Begun<'a> {
 
 impl Begun<'_> {
     /// Writes files into the directory, and shows nothing.
-    pub fn fill<E: Into<anyhow::Error>>(
-        self,
-        write: impl FnOnce(&Path) -> Result<(), E>,
-    ) -> anyhow::Result<()> {
+    pub fn fill(self, write: impl FnOnce(&Path) -> Result<(), FileError>) -> Result<(), FileError> {
         if let Some((_, whole)) = self.directory {
-            write(&whole.path()).map_err(Into::into)?;
+            write(&whole.path())?;
             whole.commit()?;
         }
         Ok(())

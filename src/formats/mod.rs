@@ -34,7 +34,7 @@ pub use digest::{digest_of_bytes, input_digests};
 pub use error::{FileError, Place};
 pub use job::{JOB_FILE, Job, JobKind, Part};
 pub use lot_directory::{LotDirectory, read_part_unit, unit_key};
-pub use parts::{Parts, write_part};
+pub use parts::{Parts, part_is_there, write_part};
 pub(crate) use quantity::unit_scale;
 pub(crate) use sheet::Sheet;
 pub(crate) use whole::write_whole_with;

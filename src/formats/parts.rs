@@ -35,6 +35,22 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
     write(JOB_FILE, &part.to_json())
 }
 
+/// Whether a directory holds this part of a study, whole.
+pub fn part_is_there(directory: &Path, part: &Part) -> bool {
+    let Ok(found) = Part::read(directory) else {
+        return false;
+    };
+    let Ok(results) = fs::read(directory.join(RESULTS)) else {
+        return false;
+    };
+    let whole = found.results.as_deref() == Some(digest_of_bytes(&results).as_str());
+    let expected = Part {
+        results: found.results.clone(),
+        ..part.clone()
+    };
+    whole && found == expected
+}
+
 /// All parts of one job.
 #[derive(Debug, Clone)]
 pub struct Parts {

@@ -95,7 +95,7 @@ fn the_spread_of_a_lot_is_found_within_its_own_sigma_and_is_real() {
             sigma,
             interval,
         } = scale.scatter.spread;
-        assert!(scale.real && scale.count == 50);
+        assert!(scale.real && scale.count == 50, "{scale:?}");
         inside += usize::from((interval.0..=interval.1).contains(&draw.spread));
         pull += ((value - draw.spread) / sigma.unwrap()).powi(2);
         assert!((scale.scatter.mean - 1.0).abs() < 5.0 * scale.scatter.mean_sigma);

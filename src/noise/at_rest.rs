@@ -88,7 +88,7 @@ mod tests {
         };
         let gyro: Vec<_> = (0..samples).map(|_| draw(truth)).collect();
         let accel: Vec<_> = (0..samples).map(|_| draw([1e-4; 3])).collect();
-        let imu = ImuSamples::new(period, 0.0, gyro, accel).unwrap();
+        let imu = ImuSamples::new(0.0, period, gyro, accel).unwrap();
         let dwells: Vec<Range<usize>> = (0..20).map(|k| 2000 * k..2000 * k + 1600).collect();
         let found = RestNoise::of(&imu, &dwells).unwrap();
         assert_eq!(found.tau_s, 4.0);

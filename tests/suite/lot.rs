@@ -36,18 +36,18 @@ bias_ug = { nominal = 2913.5, within = 900 }
 ";
 
 /// Runs the command in a directory.
-fn turncal(here: &Path, arguments: &[&str]) -> Output {
+pub fn turncal(here: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
     command.current_dir(here).args(arguments).output().unwrap()
 }
 
-fn on_threads(here: &Path, threads: &str, arguments: &[&str]) -> Output {
+pub fn on_threads(here: &Path, threads: &str, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
     let command = command.env("RAYON_NUM_THREADS", threads);
     command.current_dir(here).args(arguments).output().unwrap()
 }
 
-fn words(output: &Output) -> String {
+pub fn words(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -105,7 +105,7 @@ fn bytes(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     all
 }
 
-fn same(a: &Path, b: &Path) {
+pub fn same(a: &Path, b: &Path) {
     let (a, b) = (bytes(a), bytes(b));
     assert!(a.keys().eq(b.keys()), "{:?} {:?}", a.keys(), b.keys());
     let differing: Vec<_> = a.iter().filter(|(name, of)| b[*name] != **of).collect();

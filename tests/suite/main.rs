@@ -21,6 +21,7 @@ mod init;
 mod interrupted;
 mod learnt_noise;
 mod lot;
+mod lot_slow;
 mod modules;
 mod mounting;
 mod navigate;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use turncal::formats::{JobKind, write_part};
+use turncal::formats::JobKind;
 use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
@@ -12,8 +12,9 @@ use turncal::study::AccuracyStudy;
 use super::super::error_term::TermArgument;
 use super::super::estimation::{Aiding, Installation, Noise};
 use super::super::input::{at_least_two, seed};
-use super::super::output::{Delivery, Sharding};
+use super::super::output::Delivery;
 use super::super::progress::Runs;
+use super::super::sharding::Sharding;
 
 /// How accurate the filter is, and whether its σ are true
 ///
@@ -93,17 +94,17 @@ impl Accuracy {
             seed: self.seed.unwrap_or(scenario.seed),
             scenario,
         };
-        let begun = self.delivery.begin(&[Path::new(&self.scenario)])?;
+        let inputs = [Path::new(&self.scenario)];
+        let job = (JobKind::StudyAccuracy, &study, self.runs);
         let part = self
             .sharding
-            .part(JobKind::StudyAccuracy, &study, self.runs)?;
-        if let Some(part) = part {
-            let held = part.held();
-            let runs = Runs::new(held.len() as u64);
-            let trials = study.trials(&held, &|| runs.one_done())?;
-            drop(runs);
-            return begun.fill(|directory| write_part(directory, part, &trials));
+            .make(job, &self.delivery, &inputs, |runs, done| {
+                Ok(study.trials(runs, done)?)
+            })?;
+        if part {
+            return Ok(());
         }
+        let begun = self.delivery.begin(&inputs)?;
         let runs = Runs::new(self.runs);
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);

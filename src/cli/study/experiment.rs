@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use turncal::formats::{JobKind, write_part};
+use turncal::formats::JobKind;
 use turncal::models::{self, Place};
 use turncal::report;
 use turncal::simulation::Scenario;
@@ -10,8 +10,9 @@ use turncal::study::ExperimentStudy;
 use turncal::study::navigation::INTERVAL;
 
 use super::super::input::{at_least_two, hours, seed};
-use super::super::output::{Delivery, Sharding};
+use super::super::output::Delivery;
 use super::super::progress::Runs;
+use super::super::sharding::Sharding;
 
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
@@ -60,17 +61,17 @@ impl Experiment {
             intervals: (self.hours * HOUR / INTERVAL).round() as u32,
             samples: self.samples,
         };
-        let begun = self.delivery.begin(&[Path::new(&self.trajectory)])?;
+        let inputs = [Path::new(&self.trajectory)];
+        let job = (JobKind::StudyExperiment, &study, self.samples);
         let part = self
             .sharding
-            .part(JobKind::StudyExperiment, &study, self.samples)?;
-        if let Some(part) = part {
-            let held = part.held();
-            let runs = Runs::new(held.len() as u64);
-            let trials = study.trials(&held, &|| runs.one_done())?;
-            drop(runs);
-            return begun.fill(|directory| write_part(directory, part, &trials));
+            .make(job, &self.delivery, &inputs, |runs, done| {
+                Ok(study.trials(runs, done)?)
+            })?;
+        if part {
+            return Ok(());
         }
+        let begun = self.delivery.begin(&inputs)?;
         let runs = Runs::new(self.samples);
         let experiment = study.run(&|| runs.one_done())?;
         drop(runs);
