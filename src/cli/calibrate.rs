@@ -31,7 +31,8 @@ use super::progress::Activity;
   turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale
-  turncal calibrate lot/*/run.toml --specification limits.toml -o result
+  turncal calibrate lot/*/run.toml -o lot-result \\
+      --specification specification.toml
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
     /// The run's run.toml; several are the units of a lot

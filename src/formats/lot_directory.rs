@@ -98,8 +98,7 @@ impl LotDirectory {
         };
         fs::write(whole.path().join(JOB_FILE), part.to_json()).map_err(refused)?;
         fs::create_dir(whole.path().join(UNITS)).map_err(refused)?;
-        whole.commit()?;
-        list_anew(target, &[JOB_FILE, UNITS, &below_units()])?;
+        whole.commit_growing(&[JOB_FILE, UNITS, &below_units()])?;
         Ok(Self {
             root: target.to_owned(),
             _lock: lock(&units, waiting),

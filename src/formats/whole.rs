@@ -104,12 +104,24 @@ impl WholeDirectory {
 
     /// Puts the directory in its place, with a list of its entries in the file `.turncal`.
     pub fn commit(self) -> Result<(), FileError> {
+        let list = manifest::of_all(&self.path())
+            .map_err(|error| unwritable(self.stage.target(), "put the output in place", &error))?;
+        self.commit_with(&list)
+    }
+
+    /// The same for a directory that grows: see [`list_anew`].
+    pub(super) fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
+        let list = manifest::of_names(names.iter().copied());
+        self.commit_with(&list)
+    }
+
+    fn commit_with(self, list: &str) -> Result<(), FileError> {
         let target = self.stage.target();
         // Something may have been put into it since.
         if self.force && target.is_dir() {
             only_output(target)?;
         }
-        manifest::write(&self.path())
+        fs::write(self.path().join(manifest::FILE), list)
             .map_err(|error| unwritable(target, "put the output in place", &error))?;
         self.stage.commit(self.force)
     }

@@ -10,7 +10,7 @@ mod row;
 mod spread;
 mod statistics;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod trend;
 mod unit;
 

@@ -12,15 +12,16 @@ use crate::units::PPM;
 
 /// How units are drawn: 1σ of scale factors from unit to unit, and of each calibration.
 #[derive(Clone, Copy)]
-struct Draw {
-    spread: f64,
-    sigma: f64,
-    shared: f64,
+pub(crate) struct Draw {
+    pub(crate) spread: f64,
+    pub(crate) sigma: f64,
+    /// 1σ of an error of gravity that all share, in that of each calibration.
+    pub(crate) shared: f64,
 }
 
 const SCALE: f64 = 2e6;
 
-fn lot(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
+pub(crate) fn drawn(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = |sigma: f64| {
         let white: f64 = StandardNormal.sample(&mut rng);
@@ -89,7 +90,7 @@ fn the_spread_of_a_lot_is_found_within_its_own_sigma_and_is_real() {
     let (mut inside, mut real, mut pull) = (0, 0, 0.0);
     let lots = 40;
     for seed in 0..lots {
-        let found = Lot::new(lot(50, draw, seed), None);
+        let found = Lot::new(drawn(50, draw, seed), None);
         let scale = of(&found, "gyro.scale.x");
         let Spread {
             value,
@@ -119,7 +120,7 @@ fn a_lot_whose_units_differ_by_their_own_sigma_alone_has_no_real_spread() {
     };
     let (mut real, mut p) = (0, 0.0);
     for seed in 0..100 {
-        let found = Lot::new(lot(10, draw, seed), None);
+        let found = Lot::new(drawn(10, draw, seed), None);
         let scale = of(&found, "gyro.scale.y");
         real += found.statistics.iter().filter(|of| of.real).count();
         p += scale.scatter.chi_square.unwrap().p;
@@ -138,7 +139,7 @@ fn an_error_of_gravity_that_all_share_is_in_their_mean_and_not_in_their_scatter(
         sigma: 31.0 * PPM,
         shared: 30.0 * PPM,
     };
-    let found = Lot::new(lot(50, draw, 3), None);
+    let found = Lot::new(drawn(50, draw, 3), None);
     assert!((found.shared_gravity.unwrap() / PPM - 30.0).abs() < 1e-9);
     let accel = of(&found, "accel.scale.x").scatter;
     // χ² of 49 degrees of freedom: 1 ± 0.2 each; with the shared part it would be 0.06.
@@ -154,7 +155,7 @@ fn units_that_are_apart_fail_or_cannot_be_used_are_named_and_left_out() {
         sigma: 1.0 * PPM,
         shared: 0.0,
     };
-    let mut units = lot(20, draw, 5);
+    let mut units = drawn(20, draw, 5);
     calibration(&mut units[4]).calibration.gyro.scale[1] *= 1.001;
     units[7].calibrated = Err("no log".to_owned());
     calibration(&mut units[9]).calibration.converged = Some(false);
@@ -192,7 +193,7 @@ fn a_trend_with_the_serial_is_told_and_its_slope_found() {
         sigma: 1.0 * PPM,
         shared: 0.0,
     };
-    let mut units = lot(30, draw, 6);
+    let mut units = drawn(30, draw, 6);
     for (k, unit) in units.iter_mut().enumerate() {
         calibration(unit).calibration.gyro.scale[2] *= 1.0 + 3.0 * PPM * k as f64;
     }
@@ -259,7 +260,7 @@ fn a_lot_of_one_unit_or_none_has_rows_and_no_statistics() {
         sigma: 1.0 * PPM,
         shared: 0.0,
     };
-    let one = Lot::new(lot(1, draw, 1), None);
+    let one = Lot::new(drawn(1, draw, 1), None);
     assert_eq!((one.rows.len(), one.statistics.len()), (1, 0));
     assert!(Lot::new(Vec::new(), None).rows.is_empty());
     let failed = Unit {

@@ -12,16 +12,14 @@ pub(in crate::formats) const FILE: &str = ".turncal";
 const FIRST_LINE: &str = "turncal-output/1: turncal wrote what is listed here, and --force replaces \
                           this directory only while it holds nothing else";
 
-/// Lists all that is in a directory.
-pub(super) fn write(directory: &Path) -> io::Result<()> {
-    let mut list = FIRST_LINE.to_owned() + "\n";
-    let all = search(directory, Path::new(""), &mut |entry| {
-        list += &name(entry);
-        list.push('\n');
+/// The list of all that is in a directory.
+pub(super) fn of_all(directory: &Path) -> io::Result<String> {
+    let mut names = Vec::new();
+    search(directory, Path::new(""), &mut |entry| {
+        names.push(name(entry));
         false
-    });
-    all?;
-    fs::write(directory.join(FILE), list)
+    })?;
+    Ok(of_names(names.iter().map(String::as_str)))
 }
 
 /// The list of a directory that grows, of these entries. What is in an entry that ends in `/` has a list of its
