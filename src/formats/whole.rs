@@ -132,7 +132,7 @@ impl WholeDirectory {
 pub(super) fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
-        if !names.iter().any(|name| still(&name)) {
+        if !names.iter().any(still) {
             fs::remove_file(&old)
                 .map_err(|error| unwritable(directory, "remove what is out of date", &error))?;
         }

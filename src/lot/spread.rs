@@ -69,7 +69,7 @@ impl Scatter {
         let centre = samples.iter().map(|s| s.0).sum::<f64>() / (n + 1.0);
         let variance = samples.iter().map(|s| (s.0 - centre).powi(2)).sum::<f64>() / n;
         let largest = samples.iter().map(|s| s.1).fold(0.0, f64::max);
-        if !(variance + largest > 0.0) {
+        if variance + largest <= 0.0 {
             // All the same, and without σ.
             let spread = Spread {
                 value: 0.0,

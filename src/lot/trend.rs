@@ -78,7 +78,7 @@ pub(super) fn trend(against: Against, points: &[(f64, f64, f64)], chance: f64) -
         |of: &dyn Fn(&(f64, f64, f64)) -> f64| -> f64 { points.iter().map(|p| of(p) * p.2).sum() };
     let xx = moment(&|p| (p.0 - x).powi(2));
     let xy = moment(&|p| (p.0 - x) * (p.1 - y));
-    if !(xx > 0.0) {
+    if xx <= 0.0 {
         return None;
     }
     let slope = xy / xx;

@@ -131,7 +131,7 @@ fn three_wrong_units_of_fifty_are_named_and_a_killed_lot_comes_to_the_same_bytes
     // The spread that is claimed is that of the units' true values, within what the claimed σ of it leaves.
     let quantities = said["quantities"].as_array().unwrap();
     let mut pull = Vec::new();
-    for index in 0..truth[0].len() {
+    for index in 0..turncal::calibration::PARAMETERS {
         let name = turncal::calibration::parameter_name(Default::default(), index).unwrap();
         let found = quantities
             .iter()
