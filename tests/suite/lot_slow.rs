@@ -131,14 +131,16 @@ fn three_wrong_units_of_fifty_are_named_and_a_killed_lot_comes_to_the_same_bytes
     // The spread that is claimed is that of the units' true values, within what the claimed σ of it leaves.
     let quantities = said["quantities"].as_array().unwrap();
     let mut pull = Vec::new();
+    let of_all = |index: usize| -> Vec<f64> { truth.iter().map(|of| of[index]).collect() };
     for index in 0..turncal::calibration::PARAMETERS {
+        let of_units = of_all(index);
         let name = turncal::calibration::parameter_name(Default::default(), index).unwrap();
         let found = quantities
             .iter()
             .find(|q| q["name"] == name.as_str())
             .unwrap();
         let used = (0..UNITS).filter(|k| *k != CUT && !(*k == SCALED && name == "gyro.scale.y"));
-        let values: Vec<f64> = used.map(|k| truth[k as usize][index]).collect();
+        let values: Vec<f64> = used.map(|k| of_units[k as usize]).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
         let true_spread =
