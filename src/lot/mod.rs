@@ -83,6 +83,7 @@ impl Lot {
             .into_iter()
             .zip(canonical)
             .map(|(unit, canonical)| Row {
+                noise: unit.noise(&nominal),
                 unit,
                 canonical,
                 checks: Vec::new(),

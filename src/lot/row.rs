@@ -5,6 +5,7 @@ use super::quantity::{Quantity, Sample};
 use super::unit::Unit;
 use crate::calibration::frame::Canonical;
 use crate::imu::{Nominal, PerSensor, Sensor};
+use crate::noise::RestNoise;
 
 /// A unit in the lot.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +14,8 @@ pub struct Row {
     pub unit: Unit,
     /// Its calibration as the lot's are compared, or why there is none to be used.
     pub canonical: Result<Canonical, String>,
+    /// Its noise at rest, by the lot's nominal scales; none if no dwell is long enough.
+    pub noise: Option<RestNoise>,
     /// Each limit that concerns it.
     pub checks: Vec<Check>,
     /// What all checks come to; none without a specification.
@@ -47,7 +50,7 @@ impl Row {
                 (sigma > 0.0 || canonical.covariance.is_none()).then_some(Sample { value, sigma })
             }
             Quantity::Noise(sensor, axis) => {
-                let noise = self.unit.calibrated.as_ref().ok()?.noise.as_ref()?;
+                let noise = self.noise.as_ref()?;
                 let density = noise.density.get(sensor)[axis];
                 (density > 0.0).then(|| Sample {
                     value: density.ln(),

@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::calibration::result::{GravityRecord, TriadRecord};
+use crate::noise::RestNoise;
 use crate::units::PPM;
 
 /// How units are drawn: 1σ of scale factors from unit to unit, and of each calibration.
@@ -251,6 +252,35 @@ fn a_limit_is_kept_broken_or_open_by_the_probability_of_being_within_it() {
     assert!((wide[0].probability.unwrap() - 0.3829).abs() < 1e-3);
     let without = specification.checks(|_| None);
     assert_eq!(Verdict::of(&without), Verdict::NotDecided);
+}
+
+#[test]
+fn noise_is_compared_by_one_scale_whatever_the_runs_state() {
+    let draw = Draw {
+        spread: 0.0,
+        sigma: 1.0 * PPM,
+        shared: 0.0,
+    };
+    let mut units = drawn(8, draw, 1);
+    for (k, unit) in units.iter_mut().enumerate() {
+        let of = calibration(unit);
+        let stated = if k == 3 { 2.0 } else { 1.0 };
+        of.nominal.accel = [stated * SCALE; 3];
+        of.noise = Some(RestNoise {
+            tau_s: 4.0,
+            density: PerSensor {
+                gyro: [1e-6; 3],
+                accel: [1e-4 / stated; 3],
+            },
+            freedom: 50.0,
+        });
+    }
+    let found = Lot::new(units, None);
+    let accel = of(&found, "accel.noise.y");
+    assert!((accel.scatter.mean - 1e-4f64.ln()).abs() < 1e-9 && accel.outliers.is_empty());
+    let off = found.rows[3].nominal_off(&found.nominal).unwrap();
+    assert_eq!((off.0, off.2), (Sensor::Accel, 1.0));
+    assert_eq!(found.rows[4].nominal_off(&found.nominal), None);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::calibration::result::Calibration;
-use crate::imu::PerSensor;
+use crate::imu::{Nominal, PerSensor};
 use crate::noise::RestNoise;
 
 /// A unit with what came of it.
@@ -26,4 +26,18 @@ pub struct Calibrated {
     pub nominal: PerSensor<[f64; 3]>,
     /// Noise at rest, axis by axis; none if no dwell is long enough.
     pub noise: Option<RestNoise>,
+}
+
+impl Unit {
+    /// Its noise at rest, normalised by these scales in the place of its run's own.
+    pub(super) fn noise(&self, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
+        let calibrated = self.calibrated.as_ref().ok()?;
+        let noise = calibrated.noise?;
+        let density = PerSensor::from_fn(|sensor| {
+            let (own, of_lot) = (calibrated.nominal.get(sensor), nominal.get(sensor).0);
+            let density = noise.density.get(sensor);
+            [0, 1, 2].map(|axis| density[axis] * (own[axis] / of_lot[axis]).abs())
+        });
+        Some(RestNoise { density, ..noise })
+    }
 }
