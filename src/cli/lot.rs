@@ -1,9 +1,9 @@
 //! `turncal calibrate RUN.toml RUN.toml …`: a lot.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
 use turncal::imu::PerSensor;
 use turncal::lot::{self, Lot, Specification, Unit};
@@ -133,9 +133,7 @@ impl Request<'_> {
         let run = Run::read(path)?;
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
-        let solution = problem
-            .solve(method.into(), &|_| {})
-            .with_context(|| run.recording.name.clone())?;
+        let solution = problem.solve(method.into(), &|_| {})?;
         let Calibrated {
             calibration,
             document,
@@ -157,7 +155,7 @@ impl Request<'_> {
     }
 }
 
-type Meta = std::collections::BTreeMap<String, String>;
+type Meta = BTreeMap<String, String>;
 
 /// Writes and prints what is said of a lot; one with units that were not calibrated is a failure.
 pub fn deliver(
