@@ -4,6 +4,7 @@
 //! (Somigliana's closed form, continued in height by TR8350.2 Eq. 4-3).
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::units::MILLIGAL;
 
@@ -92,7 +93,7 @@ impl Curvature {
 }
 
 /// A place on the Earth where a turntable stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Site {
     /// Geodetic latitude in radians, north positive.
     pub latitude: f64,

@@ -44,7 +44,7 @@
 //! A [`recording::Recording`] is data. A [`run::Run`] adds what is known beforehand: instrument, site,
 //! table. [`calibration::Options`] say what is to be estimated; a [`calibration::Problem`] looks at
 //! all of it once. Data flow one way: [`formats`] read runs, [`calibration`] solves, [`study`] judges by
-//! navigation and Monte Carlo, `report` shows. [`earth`], [`attitude`], [`imu`], [`turntable`] and
+//! navigation and Monte Carlo, [`lot`] holds units of one type together, `report` shows. [`earth`], [`attitude`], [`imu`], [`turntable`] and
 //! [`navigation`] know none of these; [`simulation`] makes runs from [`models`]; [`survey`] looks at a
 //! run before it is calibrated, [`noise`] at its noise.
 //!
@@ -58,6 +58,7 @@ pub mod calibration;
 pub mod earth;
 pub mod formats;
 pub mod imu;
+pub mod lot;
 pub mod models;
 pub mod navigation;
 pub mod noise;

@@ -1,10 +1,12 @@
 //! Error terms: what may be estimated beside scale factors, installation and biases.
 
+use serde::{Deserialize, Serialize};
+
 use crate::imu::Term;
 use crate::turntable::AxisError;
 
 /// An error of instrument or table that is estimated where it is on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ErrorTerm {
     /// Biases that vary as first-order Gauss–Markov processes.
     GaussMarkovBias,

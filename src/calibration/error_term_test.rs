@@ -7,6 +7,8 @@
 mod evidence;
 mod joint;
 
+use serde::{Deserialize, Serialize};
+
 use super::error::CalibrationError;
 use super::error_term::ErrorTerm;
 use super::finding::Finding;
@@ -19,7 +21,7 @@ use evidence::ln_survival;
 use joint::{Fit, Joint, once_more};
 
 /// An error term against the same calibration without it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorTermTest {
     /// The error term.
     pub term: ErrorTerm,
@@ -47,7 +49,7 @@ pub struct ErrorTermTest {
 }
 
 /// What an error term that is off is to a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
     /// Nothing: it is on, or the record does not show it, or another explains what it would.
     None,

@@ -1,5 +1,6 @@
 //! Whether the data reject the installation form.
 
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::error::CalibrationError;
@@ -10,7 +11,7 @@ use super::problem::Problem;
 use crate::imu::InstallationForm;
 
 /// The likelihood ratio of a restricted installation form against the general one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FormTest {
     /// By how much the cost, −2 ln of likelihood and prior, falls if the general form is allowed.
     pub gain: f64,

@@ -47,7 +47,7 @@ pub struct Canonical {
 impl Canonical {
     /// Brings a record to a body frame and to nominal scales. A frame on the table cannot be had from
     /// a record in the accelerometer frame: there the table was not seen.
-    pub(super) fn new(
+    pub(crate) fn new(
         name: &str,
         record: &Calibration,
         nominal: &PerSensor<Nominal>,
@@ -150,7 +150,7 @@ pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSen
 }
 
 /// Indices of the parameters that a body frame leaves free, in the general form.
-pub(super) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
+pub(crate) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
     let mut free: Vec<usize> = (0..PARAMETERS).collect();
     if body_frame == BodyFrame::Accelerometer {
         let fixed: Vec<usize> = Triad::above_the_diagonal(InstallationForm::General)

@@ -1,7 +1,7 @@
 //! Innovations: what an observation differs from its prediction by, and whether it is as much as its
 //! covariance says.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// What was observed.
@@ -75,7 +75,7 @@ impl Consistency {
 }
 
 /// Mean of normalised innovations squared.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nis {
     /// Mean per scalar observation; one if σ are true. NaN without observations.
     pub mean: f64,

@@ -2,6 +2,7 @@
 
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
 use super::innovation::mean_square_interval;
 
@@ -10,7 +11,7 @@ use super::innovation::mean_square_interval;
 const NO_DIRECTION: f64 = 1e-11;
 
 /// Normalised estimation error squared, a mean of squares of independent numbers of σ 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nees {
     /// NEES/n.
     pub mean: f64,

@@ -48,7 +48,8 @@ pub struct ChiSquare {
 }
 
 impl ChiSquare {
-    fn new(value: f64, freedom: usize) -> Option<Self> {
+    /// Of a sum with its degrees of freedom; none without any.
+    pub(crate) fn new(value: f64, freedom: usize) -> Option<Self> {
         let p = ChiSquared::new(freedom as f64).ok()?.sf(value);
         Some(Self { value, freedom, p })
     }

@@ -14,7 +14,8 @@ use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 
-use super::calibrate::{dwell_times, navigate, note, solve, write_report};
+use super::calibrate::solve;
+use super::calibrated::{dwell_times, navigate, note, write_report};
 use super::input::seed;
 use super::output::{Overwrite, show};
 use super::progress::Activity;

@@ -9,7 +9,7 @@ use turncal::imu::Term;
 use turncal::run;
 use turncal::turntable::AxisError;
 
-use super::calibrate::Aiding;
+use super::estimation::Aiding;
 
 /// An error term that a run can switch on: it adds parameters to those estimated.
 #[derive(Debug, Clone, Copy)]

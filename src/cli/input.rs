@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use turncal::study::navigation::INTERVAL;
+use turncal::study::{Shard, ShardError};
 
 const HOUR: f64 = 3600.0;
 
@@ -20,6 +21,11 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
         ));
     }
     Ok(path.into())
+}
+
+/// A part i/M of a job.
+pub fn shard(text: &str) -> Result<Shard, String> {
+    text.parse().map_err(|error: ShardError| error.to_string())
 }
 
 /// A number between two others.

@@ -3,21 +3,26 @@
 mod allan;
 mod apply;
 mod calibrate;
+mod calibrated;
 mod check;
 mod compare;
 mod completions;
 mod demo;
 mod error_term;
+mod estimation;
 mod export;
 mod init;
 mod input;
 mod list;
+mod lot;
 mod man;
+mod merge;
 mod names;
 mod navigate;
 mod noise;
 mod output;
 mod progress;
+mod sharding;
 mod signals;
 mod simulate;
 mod study;
@@ -59,6 +64,7 @@ enum Command {
     Apply(apply::Apply),
     Export(export::Export),
     Study(study::Study),
+    Merge(merge::Merge),
     Init(init::Init),
     Check(check::Check),
     Allan(allan::Allan),
@@ -80,6 +86,7 @@ impl Cli {
             Command::Apply(apply) => apply.run(),
             Command::Export(export) => export.run(),
             Command::Study(study) => study.run(),
+            Command::Merge(merge) => merge.run(),
             Command::Init(init) => init.run(),
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),

@@ -4,8 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use turncal::formats::FileError;
-use turncal::formats::WholeDirectory;
+use turncal::formats::{FileError, WholeDirectory};
 use turncal::report::{self, Document, terminal};
 
 /// What every command that writes has in common.
@@ -13,7 +12,7 @@ use turncal::report::{self, Document, terminal};
 pub struct Overwrite {
     /// Replace the output directory if it exists and holds only what turncal wrote
     #[arg(long)]
-    force: bool,
+    pub force: bool,
 }
 
 impl Overwrite {
@@ -38,6 +37,21 @@ pub struct Delivery {
 }
 
 impl Delivery {
+    /// The directory, if one is asked for.
+    pub fn output(&self) -> Option<&Path> {
+        self.output.as_deref()
+    }
+
+    /// Whether JSON is asked for.
+    pub fn json(&self) -> bool {
+        self.json
+    }
+
+    /// Whether an existing directory may be replaced.
+    pub fn force(&self) -> bool {
+        self.overwrite.force
+    }
+
     /// Begins the directory, if one is asked for, so that long work is not done in vain; none of
     /// `inputs` may lie in it.
     pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, FileError> {
@@ -60,6 +74,15 @@ pub struct Begun<'a> {
 }
 
 impl Begun<'_> {
+    /// Writes files into the directory, and shows nothing.
+    pub fn fill(self, write: impl FnOnce(&Path) -> Result<(), FileError>) -> Result<(), FileError> {
+        if let Some((_, whole)) = self.directory {
+            write(&whole.path())?;
+            whole.commit()?;
+        }
+        Ok(())
+    }
+
     /// Writes and prints a document as it is asked for.
     pub fn deliver(self, document: &Document) -> anyhow::Result<()> {
         let mut page = None;

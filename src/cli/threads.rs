@@ -1,5 +1,9 @@
 //! On how many threads a command works.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 
 /// Does `work` on one thread a processor or as many as RAYON_NUM_THREADS says, and on this one alone
@@ -13,5 +17,66 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
             let _pool = alone.build()?;
             Ok(work())
         }
+    }
+}
+
+/// Does so many pieces of work, as many at once as there are threads; each is begun and ended by one of them, so
+/// that no more are in memory and the first are done early. Results are in order.
+pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));
+    let threads = rayon::current_num_threads();
+    let workers = threads.min(count).max(1);
+    let worker = || {
+        loop {
+            let piece = next.fetch_add(1, Ordering::Relaxed);
+            if piece >= count {
+                break;
+            }
+            let result = work(piece);
+            let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
+            results.push((piece, result));
+        }
+    };
+    // Threads that pieces are fewer than work inside them.
+    let own_pool = || {
+        let pool = ThreadPoolBuilder::new().num_threads((threads / workers).max(1));
+        match pool.build() {
+            Ok(pool) => pool.install(worker),
+            Err(_) => worker(),
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..workers {
+            // Where no more can be started, those that are there do it all.
+            let _ = thread::Builder::new().spawn_scoped(scope, own_pool);
+        }
+        own_pool();
+    });
+    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.sort_by_key(|(piece, _)| *piece);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_piece_is_done_once_and_in_order_and_no_more_at_once_than_there_are_threads() {
+        let pool = ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let (now, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let work = |piece| {
+            let begun = now.fetch_add(1, Ordering::SeqCst) + 1;
+            most.fetch_max(begun, Ordering::SeqCst);
+            // A piece that is itself parallel must not take up another.
+            rayon::join(thread::yield_now, thread::yield_now);
+            now.fetch_sub(1, Ordering::SeqCst);
+            piece * 2
+        };
+        let done = pool.install(|| piece_by_piece(50, work));
+        assert_eq!(done, (0..50).map(|piece| piece * 2).collect::<Vec<_>>());
+        assert!(most.into_inner() <= 3);
+        assert!(piece_by_piece(0, |piece| piece).is_empty());
     }
 }

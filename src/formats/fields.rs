@@ -62,13 +62,17 @@ impl<'a> Fields<'a> {
         table: &'a Spanned<DeTable<'a>>,
         known: &[&str],
     ) -> Result<Self, FileError> {
+        Self::of(document, table).with_only(known)
+    }
+
+    /// The same where names are not checked here.
+    pub fn of(document: Document<'a>, table: &'a Spanned<DeTable<'a>>) -> Self {
         Self {
             document,
             name: String::new(),
             span: None,
             entries: table.get_ref(),
         }
-        .with_only(known)
     }
 
     /// Refuses a field that is not among the known ones.
@@ -212,6 +216,11 @@ impl<'a> Field<'a> {
             .get(self.value.span())
             .and_then(|text| text.lines().next())
             .unwrap_or("a value")
+    }
+
+    /// Whether it is a table with fields of its own.
+    pub fn is_table(&self) -> bool {
+        self.value.get_ref().is_table()
     }
 
     /// A finite number.

@@ -108,6 +108,22 @@ impl Run {
         Ok(run.with_notes(doubts))
     }
 
+    /// `[meta]` of a `run.toml` alone, for a run whose logs cannot be read.
+    ///
+    /// # Errors
+    /// [`FileError`] if not even that can be read.
+    pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
+        let text = small_file::text(path).map_err(|error| {
+            FileError::io(path, "read the run", &error, "Give the path of a run.toml.")
+        })?;
+        let document = Document {
+            file: path,
+            text: &text,
+        };
+        let table = document.parse()?;
+        meta(&Fields::of(document, &table))
+    }
+
     fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.recording.notes.extend(notes);
         self

@@ -13,6 +13,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::{FileError, Place};
+pub(in crate::formats) use manifest::FILE as LIST;
 use stage::Stage;
 pub use stage::abandon_unfinished;
 
@@ -103,15 +104,46 @@ impl WholeDirectory {
 
     /// Puts the directory in its place, with a list of its entries in the file `.turncal`.
     pub fn commit(self) -> Result<(), FileError> {
+        let list = manifest::of_all(&self.path())
+            .map_err(|error| unwritable(self.stage.target(), "put the output in place", &error))?;
+        self.commit_with(&list)
+    }
+
+    /// The same for a directory that grows: see [`list_anew`].
+    pub(super) fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
+        let list = manifest::of_names(names.iter().copied());
+        self.commit_with(&list)
+    }
+
+    fn commit_with(self, list: &str) -> Result<(), FileError> {
         let target = self.stage.target();
         // Something may have been put into it since.
         if self.force && target.is_dir() {
             only_output(target)?;
         }
-        manifest::write(&self.path())
+        fs::write(self.path().join(manifest::FILE), list)
             .map_err(|error| unwritable(target, "put the output in place", &error))?;
         self.stage.commit(self.force)
     }
+}
+
+/// Writes the list of a directory that grows, in which nothing but these names is turncal's; what is in a name
+/// that ends in `/` has a list of its own. Files that the list before named and this one does not go.
+pub(super) fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
+    for old in manifest::listed_files(directory) {
+        let still = |name: &&str| old.file_name() == Some(name.as_ref());
+        if !names.iter().any(still) {
+            fs::remove_file(&old)
+                .map_err(|error| unwritable(directory, "remove what is out of date", &error))?;
+        }
+    }
+    let list = manifest::of_names(names.iter().copied());
+    write_whole(&directory.join(manifest::FILE), list.as_bytes(), true)
+}
+
+/// Removes what a killed process left unfinished in a directory.
+pub(super) fn clear_abandoned(directory: &Path) {
+    stage::remove_abandoned(directory);
 }
 
 /// Refuses a directory that holds anything beside what was written by a [`WholeDirectory`].

@@ -3,9 +3,10 @@
 use nalgebra::Vector3;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
 /// What one sample holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Output {
     /// Whole pulses counted during the sample.
     Pulse,
@@ -16,7 +17,7 @@ pub enum Output {
 }
 
 /// Noise of one triad, alike on its three axes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Noise {
     /// Angle random walk in rad/√s, or velocity random walk in (m/s)/√s.
     pub random_walk: f64,
@@ -25,7 +26,7 @@ pub struct Noise {
 }
 
 /// A bias that varies as a stationary first-order Gauss–Markov process.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GaussMarkov {
     /// Stationary 1σ in rad/s or m/s².
     pub sigma: f64,
@@ -35,7 +36,7 @@ pub struct GaussMarkov {
 
 /// White noise that a triad has in moves beside that at rest: 1σ densities of the angle or velocity that it
 /// adds up to. Simulations do not make it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionNoise {
     /// By how fast a move is, √s: over the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
     pub by_motion: f64,

@@ -2,6 +2,7 @@
 //! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::{AXES, Sensor};
 use crate::attitude::exp;
@@ -23,7 +24,7 @@ pub const REFERENCE_RATE: f64 = 100.0 * DEGREE;
 /// asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
 /// scale factor); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect,
 /// time offset).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Term {
     /// Accelerometers add `q_i f_i²`; q in s²/m.
     AccelSecondOrder,

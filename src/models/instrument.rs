@@ -3,7 +3,7 @@
 use nalgebra::{SVector, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{
@@ -12,7 +12,7 @@ use crate::imu::{
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// A grade of instrument.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Instrument {
     /// Its name.
     pub name: String,
@@ -27,7 +27,7 @@ pub struct Instrument {
 }
 
 /// How a triad's scale factors and biases differ between instruments of a grade.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Variation {
     /// Scale factor − 1.
     pub scale: Spread,
@@ -36,13 +36,13 @@ pub struct Variation {
 }
 
 /// How a quantity is distributed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     mean: f64,
     shape: Shape,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Shape {
     /// Uniform within ± this.
     Uniform(f64),
@@ -81,7 +81,7 @@ impl Spread {
 }
 
 /// An installation form and how large its angles are.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InstallationModel {
     /// The form.
     pub form: InstallationForm,

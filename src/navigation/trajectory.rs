@@ -7,6 +7,7 @@
 mod leg;
 mod travel;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use leg::Leg;
@@ -20,7 +21,7 @@ const LEAST_ROUND: f64 = 1.0;
 /// A start and segments, gone through again and again.
 ///
 /// The body points where it goes: heading is that of the velocity, pitch its angle above the horizon.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trajectory {
     start: Start,
     banks: bool,
@@ -28,7 +29,7 @@ pub struct Trajectory {
 }
 
 /// Where a trajectory starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Start {
     /// Geodetic latitude in radians, north positive.
     pub latitude: f64,
@@ -43,7 +44,7 @@ pub struct Start {
 }
 
 /// Moves that begin together. The segment ends with the last of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// The least time that it takes, s.
     pub duration: f64,
@@ -56,7 +57,7 @@ pub struct Segment {
 }
 
 /// A change of a quantity, and how fast it may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// By or to what.
     pub amount: f64,

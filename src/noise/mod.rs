@@ -7,6 +7,7 @@
 
 pub mod allan;
 mod analysis;
+mod at_rest;
 pub mod conventions;
 mod covariance;
 mod fit;
@@ -15,6 +16,7 @@ mod process;
 mod standing;
 
 pub use analysis::{AxisNoise, NoiseAnalysis, NoiseFigures, TriadNoise};
+pub use at_rest::RestNoise;
 pub use identify::{Clusters, Found, Hidden, Identified, of_kind};
 pub use process::Process;
 pub use standing::{Stretch, StretchError};

@@ -22,21 +22,29 @@ pub enum ReportError {
     Draw(#[from] svg::DrawError),
 }
 
-/// Writes `index.html`, which holds the figures and needs neither other files nor a network, every figure as an
-/// SVG file of its own, and the document's further files into an existing directory.
+/// The files of a document by name: `index.html`, which holds the figures and needs neither other files nor a
+/// network, every figure as an SVG file of its own, and the document's further files.
+///
+/// # Errors
+/// [`ReportError`] if a figure cannot be drawn.
+pub fn files(document: &Document) -> Result<Vec<(String, String)>, ReportError> {
+    let drawn = document.plots().map(svg::draw);
+    let drawn = drawn.collect::<Result<Vec<_>, _>>()?;
+    let page = html::page(document, &drawn);
+    let figures = document.plots().map(|plot| plot.file.clone()).zip(drawn);
+    let further = document.files.iter().cloned();
+    Ok(figures
+        .chain(further)
+        .chain([("index.html".to_owned(), page)])
+        .collect())
+}
+
+/// Writes the [`files`] of a document into an existing directory.
 ///
 /// # Errors
 /// [`ReportError`] if a figure cannot be drawn or a file not be written.
 pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
-    let drawn = document.plots().map(svg::draw);
-    let drawn = drawn.collect::<Result<Vec<_>, _>>()?;
-    let page = html::page(document, &drawn);
-    let figures = document.plots().map(|plot| plot.file.as_str()).zip(&drawn);
-    let further = document
-        .files
-        .iter()
-        .map(|(name, text)| (name.as_str(), text));
-    for (name, text) in figures.chain(further).chain([("index.html", &page)]) {
+    for (name, text) in files(document)? {
         let path = directory.join(name);
         fs::write(&path, text).map_err(|source| ReportError::Write { path, source })?;
     }

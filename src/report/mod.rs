@@ -40,6 +40,7 @@ pub mod demo;
 mod effects;
 pub mod experiment;
 mod group;
+pub mod lot;
 pub mod navigation;
 mod outlook;
 mod quantity;
@@ -49,7 +50,7 @@ pub mod table1;
 mod terms;
 
 pub use document::Document;
-pub use files::{ReportError, write};
+pub use files::{ReportError, files, write};
 
 /// The figures of a document by name as JSON.
 pub fn json(document: &Document) -> String {

@@ -1,13 +1,14 @@
 //! What an ideal IMU on a moving table senses: exact integrals, finer than its samples.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::earth::Site;
 use crate::imu::{self, PerSensor, Sensor, TermVector};
 use crate::turntable::Motion;
 
 /// How increments are integrated.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Integrator {
     /// Length of a sample, s.
     pub period: f64,

@@ -3,7 +3,7 @@
 use nalgebra::{SVector, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::Integrator;
 use crate::calibration::ErrorTerm;
@@ -23,7 +23,7 @@ const STEPS: u32 = 4;
 const MOST_SAMPLES: f64 = 2e7;
 
 /// Everything that makes a simulated run but its random numbers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
     /// A short name for titles and file names.
     pub name: String,
@@ -58,7 +58,7 @@ pub struct Scenario {
 
 /// True values of a triad that a scenario gives; the others are drawn. The prior stays that of the
 /// grade.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Given {
     /// Scale factors − 1.
     pub scale: Option<Vector3<f64>>,

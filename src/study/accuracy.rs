@@ -10,6 +10,7 @@ mod navigation;
 mod trial;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::navigation::NavigationStudyError;
 use crate::calibration::ErrorTerm;
@@ -31,8 +32,11 @@ pub use figures::Figures;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
+/// Each mission, followed once, or why it cannot be navigated.
+type Ways = Vec<(Journey, Result<Way, NavigationStudyError>)>;
+
 /// What is studied.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct AccuracyStudy {
     /// What is simulated.
     pub scenario: Scenario,
@@ -134,26 +138,57 @@ impl AccuracyStudy {
     /// counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
+        let all: Vec<u64> = (0..self.runs).collect();
+        let (ways, trials) =
+            rayon::join(|| self.ways(), || self.trials_with(&baseline, &all, done));
+        self.assemble(baseline, ways?, trials?)
+    }
+
+    /// Makes some of the runs, given by their numbers; `done` is told of each.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn trials(&self, runs: &[u64], done: &(dyn Fn() + Sync)) -> Result<Vec<Trial>, StudyError> {
+        self.trials_with(&Baseline::new(&self.scenario)?, runs, done)
+    }
+
+    /// What all runs say, in the order of their numbers.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn result(&self, trials: Vec<Trial>) -> Result<Accuracy, StudyError> {
+        self.assemble(Baseline::new(&self.scenario)?, self.ways()?, trials)
+    }
+
+    fn trials_with(
+        &self,
+        baseline: &Baseline,
+        runs: &[u64],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Trial>, StudyError> {
+        let all = runs.par_iter().with_max_len(1).map(|&run| {
+            let trial = self.trial(baseline, run);
+            done();
+            trial
+        });
+        all.collect()
+    }
+
+    fn ways(&self) -> Result<Ways, StudyError> {
+        let all = Journey::ALL.into_par_iter();
+        let ways = all.map(|journey| Ok((journey, Way::of(journey, &self.scenario)?)));
+        ways.collect()
+    }
+
+    fn assemble(
+        &self,
+        baseline: Baseline,
+        ways: Ways,
+        trials: Vec<Trial>,
+    ) -> Result<Accuracy, StudyError> {
         let table_time = self.scenario.duration()?;
-        let (ways, trials) = rayon::join(
-            || {
-                let all = Journey::ALL.into_par_iter();
-                let ways = all.map(|journey| Ok((journey, Way::of(journey, &self.scenario)?)));
-                ways.collect::<Result<Vec<_>, StudyError>>()
-            },
-            || {
-                let all = (0..self.runs).into_par_iter();
-                let trials = all.map(|run| {
-                    let trial = self.trial(&baseline, run);
-                    done();
-                    trial
-                });
-                trials.collect::<Result<Vec<_>, StudyError>>()
-            },
-        );
-        let trials = trials?;
         let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());
-        for (journey, way) in ways? {
+        for (journey, way) in ways {
             match way {
                 Ok(way) => navigation.push(way.worth(&trials)),
                 Err(error) => not_navigated.push((journey, error)),

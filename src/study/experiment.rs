@@ -14,6 +14,7 @@ mod tests;
 
 use nalgebra::SMatrix;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::Ratio;
 use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
@@ -37,7 +38,7 @@ const HOUR_PATH: &str = "three-axis-hour";
 const EVERY: usize = 10;
 
 /// What is studied.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ExperimentStudy {
     /// What is simulated; its path is the filter's short one.
     pub scenario: Scenario,
@@ -178,28 +179,62 @@ impl ExperimentStudy {
     /// it is counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Experiment, ExperimentError> {
         let scenarios = method::Scenarios::new(&self.scenario)?;
-        let table_times = scenarios.table_times()?;
-        let (ways, trials) = rayon::join(
-            || {
-                let all = Situation::ALL.into_par_iter();
-                let ways = all.map(|situation| self.way(situation));
-                ways.collect::<Result<Vec<_>, ExperimentError>>()
-            },
-            || {
-                let all = (0..self.samples).into_par_iter();
-                let trials = all.map(|run| {
-                    let trial = scenarios.trial(self.seed, run)?;
-                    done();
-                    Ok(trial)
-                });
-                trials.collect::<Result<Vec<_>, ExperimentError>>()
-            },
-        );
-        let trials = trials?;
+        let all: Vec<u64> = (0..self.samples).collect();
+        let (ways, trials) =
+            rayon::join(|| self.ways(), || self.trials_with(&scenarios, &all, done));
+        self.assemble(&scenarios, &ways?, trials?)
+    }
+
+    /// Makes some of the instruments, given by their numbers; `done` is told of each.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn trials(
+        &self,
+        runs: &[u64],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Trial>, ExperimentError> {
+        self.trials_with(&method::Scenarios::new(&self.scenario)?, runs, done)
+    }
+
+    /// What all instruments say, in the order of their numbers.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn result(&self, trials: Vec<Trial>) -> Result<Experiment, ExperimentError> {
+        let scenarios = method::Scenarios::new(&self.scenario)?;
+        self.assemble(&scenarios, &self.ways()?, trials)
+    }
+
+    fn trials_with(
+        &self,
+        scenarios: &method::Scenarios,
+        runs: &[u64],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Trial>, ExperimentError> {
+        let all = runs.par_iter().with_max_len(1).map(|&run| {
+            let trial = scenarios.trial(self.seed, run)?;
+            done();
+            Ok(trial)
+        });
+        all.collect()
+    }
+
+    fn ways(&self) -> Result<Vec<Way>, ExperimentError> {
+        let all = Situation::ALL.into_par_iter();
+        all.map(|situation| self.way(situation)).collect()
+    }
+
+    fn assemble(
+        &self,
+        scenarios: &method::Scenarios,
+        ways: &[Way],
+        trials: Vec<Trial>,
+    ) -> Result<Experiment, ExperimentError> {
         Ok(Experiment {
-            navigations: ways?.iter().map(|way| way.navigated(&trials)).collect(),
+            navigations: ways.iter().map(|way| way.navigated(&trials)).collect(),
             study: self.clone(),
-            table_times,
+            table_times: scenarios.table_times()?,
             trials,
         })
     }

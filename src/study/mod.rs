@@ -4,9 +4,11 @@ pub mod accuracy;
 pub mod experiment;
 pub mod navigation;
 mod ratio;
+mod shard;
 pub mod table1;
 
 pub use accuracy::{Accuracy, AccuracyStudy, Figures, GroupAccuracy, NavigationAccuracy};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
+pub use shard::{Shard, ShardError};
 pub use table1::{Table1, Table1Study};

@@ -1,5 +1,6 @@
 //! What a table is wrong by and does not read.
 
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -22,7 +23,7 @@ pub type AxisResponse = SMatrix<f64, 3, AXIS_ERRORS>;
 pub type AxisAngles = [Option<(Vector3<f64>, f64)>; AXES];
 
 /// A kind of error of the axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AxisError {
     /// An axis within another is not at right angles to it: constant tilts in two directions across.
     Tilt,

@@ -1,9 +1,10 @@
 //! What a table is told to do.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// A sequence of positions, with the attitude that it starts from.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Path {
     /// How long the table stands before the first step, s.
     pub first_dwell: f64,
@@ -12,7 +13,7 @@ pub struct Path {
 }
 
 /// Moves in the table's own axes or in the body's.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Moves {
     /// Turns of the table's axes.
     Axes {
@@ -31,7 +32,7 @@ pub enum Moves {
 }
 
 /// All named axes turn at once, then the table stands.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxesStep {
     /// By how much each axis turns, outermost first, rad.
     pub angles: Vec<f64>,
@@ -44,7 +45,7 @@ pub struct AxesStep {
 }
 
 /// One rotation about a body axis, then the table stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BodyStep {
     /// Where to.
     pub rotation: Rotation,
@@ -57,7 +58,7 @@ pub struct BodyStep {
 }
 
 /// A rotation in body axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Rotation {
     /// By a rotation vector along body axes, rad.
     By(Vector3<f64>),

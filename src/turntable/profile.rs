@@ -1,5 +1,6 @@
 //! How an axis gets from one angle to another.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Angle, rate and acceleration at one moment.
@@ -15,7 +16,7 @@ pub struct Turned {
 
 /// A turn whose rate rises and falls along raised cosines, with a constant stretch between them, so
 /// that the acceleration is continuous and everything is known in closed form.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
     rate: f64,
     ramp: f64,

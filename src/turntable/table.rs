@@ -1,6 +1,7 @@
 //! The table: its axes, their limits, and what is wrong with them.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::{AxisError, PHASES};
 
@@ -8,7 +9,7 @@ use super::{AxisError, PHASES};
 const SINE: usize = 1;
 
 /// A rotation axis of a table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// What its makers call it, such as `outer`.
     pub name: String,
@@ -21,7 +22,7 @@ pub struct Axis {
 }
 
 /// A turntable of any number of axes, `C_b_n = C_base R(axis₁, a₁) R(axis₂, a₂) … C_mount`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The axes from the outermost to the innermost.
     pub axes: Vec<Axis>,
@@ -32,7 +33,7 @@ pub struct Table {
 }
 
 /// 1σ of a table's errors, all in rad.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableErrors {
     /// Position error per axis of the navigation frame: constant while the table stands, new at
     /// every position.

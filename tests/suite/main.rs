@@ -20,6 +20,8 @@ mod init;
 #[cfg(unix)]
 mod interrupted;
 mod learnt_noise;
+mod lot;
+mod lot_slow;
 mod modules;
 mod mounting;
 mod navigate;

@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
+use turncal::formats::JobKind;
 use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
 use turncal::simulation::Scenario;
 use turncal::study::AccuracyStudy;
 
-use super::super::calibrate::{Aiding, Installation, Noise};
 use super::super::error_term::TermArgument;
+use super::super::estimation::{Aiding, Installation, Noise};
 use super::super::input::{at_least_two, seed};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
+use super::super::sharding::Sharding;
 
 /// How accurate the filter is, and whether its σ are true
 ///
@@ -62,6 +64,8 @@ pub struct Accuracy {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     delivery: Delivery,
 }
 
@@ -90,7 +94,17 @@ impl Accuracy {
             seed: self.seed.unwrap_or(scenario.seed),
             scenario,
         };
-        let begun = self.delivery.begin(&[Path::new(&self.scenario)])?;
+        let inputs = [Path::new(&self.scenario)];
+        let job = (JobKind::StudyAccuracy, &study, self.runs);
+        let part = self
+            .sharding
+            .make(job, &self.delivery, &inputs, |runs, done| {
+                Ok(study.trials(runs, done)?)
+            })?;
+        if part {
+            return Ok(());
+        }
+        let begun = self.delivery.begin(&inputs)?;
         let runs = Runs::new(self.runs);
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use turncal::formats::JobKind;
 use turncal::models::{self, Place};
 use turncal::report;
 use turncal::simulation::Scenario;
@@ -11,6 +12,7 @@ use turncal::study::navigation::INTERVAL;
 use super::super::input::{at_least_two, hours, seed};
 use super::super::output::Delivery;
 use super::super::progress::Runs;
+use super::super::sharding::Sharding;
 
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
@@ -41,6 +43,8 @@ pub struct Experiment {
     #[arg(long, default_value_t = 40.0, value_parser = hours)]
     hours: f64,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     delivery: Delivery,
 }
 
@@ -57,7 +61,17 @@ impl Experiment {
             intervals: (self.hours * HOUR / INTERVAL).round() as u32,
             samples: self.samples,
         };
-        let begun = self.delivery.begin(&[Path::new(&self.trajectory)])?;
+        let inputs = [Path::new(&self.trajectory)];
+        let job = (JobKind::StudyExperiment, &study, self.samples);
+        let part = self
+            .sharding
+            .make(job, &self.delivery, &inputs, |runs, done| {
+                Ok(study.trials(runs, done)?)
+            })?;
+        if part {
+            return Ok(());
+        }
+        let begun = self.delivery.begin(&inputs)?;
         let runs = Runs::new(self.samples);
         let experiment = study.run(&|| runs.one_done())?;
         drop(runs);

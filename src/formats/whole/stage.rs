@@ -195,7 +195,7 @@ fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
 }
 
 /// Removes the stages in a directory whose processes live no more.
-fn remove_abandoned(parent: &Path) {
+pub(super) fn remove_abandoned(parent: &Path) {
     let Ok(entries) = fs::read_dir(parent) else {
         return;
     };

@@ -1,6 +1,7 @@
 //! One run of the study.
 
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
 use super::{AccuracyStudy, Baseline, StudyError};
 use crate::calibration::{AUXILIARY, AuxiliaryVector, auxiliary_vector};
@@ -16,7 +17,7 @@ use crate::imu::{InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 
 /// One run. Errors are estimate minus truth; everything is in the general form.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
     /// Its number, the stream of its random numbers.
     pub run: u64,
@@ -39,7 +40,7 @@ pub struct Trial {
 }
 
 /// What the filter gave in one run.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Filtered {
     /// Error of each parameter.
     pub error: ParameterVector,

@@ -1,5 +1,7 @@
 //! The methods, and what each makes of an instrument.
 
+use serde::{Deserialize, Serialize};
+
 use super::{ExperimentError, HOUR_PATH, POSITIONS};
 use crate::calibration::to_vector;
 use crate::calibration::{Estimate, estimate, in_general_form, six_position};
@@ -45,7 +47,7 @@ impl Method {
 }
 
 /// One instrument.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
     /// Its number, the stream of its random numbers.
     pub run: u64,
@@ -61,7 +63,7 @@ impl Trial {
 }
 
 /// A calibration, in the general form.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibrated {
     /// Errors, true − estimated.
     pub error: ParameterVector,

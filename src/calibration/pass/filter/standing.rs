@@ -94,14 +94,11 @@ impl Filter {
                 referred,
                 seen,
             } = step;
-            for (k, by) in referred.iter().enumerate() {
+            let turned = turn.map(|turn| (turn, referred[0]));
+            let errors = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(*referred);
+            for (first, by) in errors.chain(turned) {
                 for axis in 0..3 {
-                    local.refer(3 * k + axis, by[axis]);
-                }
-            }
-            for axis in 0..3 {
-                if let Some(turn) = turn {
-                    local.refer(turn + axis, referred[0][axis]);
+                    local.refer(first + axis, by[axis]);
                 }
             }
             local.propagate(&models[*model]);

@@ -1,0 +1,157 @@
+//! A run's calibration with all that is said of it, alike for one run and for a lot.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use rayon::prelude::*;
+use turncal::calibration::result::TermRecord;
+use turncal::calibration::{
+    Calibration, ClosedForm, Estimate, Problem, Reference, Solution, in_body_frame, triads_of,
+};
+use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
+use turncal::report::Document;
+use turncal::report::calibration::{self as of_calibration, Navigated, Report};
+use turncal::run::Run;
+use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
+
+use super::estimation::Method;
+
+/// A true calibration, in the general form, with the constants beside it.
+pub struct Truth {
+    triads: PerSensor<Triad>,
+    terms: BTreeMap<String, TermRecord>,
+}
+
+/// A calibration and its report.
+pub struct Calibrated {
+    pub calibration: Calibration,
+    pub document: Document,
+    pub converged: bool,
+}
+
+impl Calibrated {
+    /// Judges a solution and says what it is worth.
+    pub fn new(
+        problem: &Problem,
+        solution: &Solution,
+        method: Method,
+        truth: Option<&Truth>,
+    ) -> anyhow::Result<Self> {
+        let run = problem.run();
+        let method = match method {
+            Method::Ekf => "EKF",
+            Method::SixPosition => "closed form",
+        };
+        let triads = truth.map(|truth| &truth.triads);
+        let (assessment, navigation) = rayon::join(
+            || solution.assess(problem),
+            || navigate(run, &[(method, solution.estimate())], triads),
+        );
+        let assessment = assessment?;
+        let calibration = solution.calibration(problem, &assessment);
+        let findings = solution.findings(&assessment);
+        let note = solution.closed_form().map(note).unwrap_or_default();
+        let dwells = dwell_times(problem);
+        let form = solution.estimate().form();
+        let in_form =
+            triads.map(|truth| PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form)));
+        let no_terms = BTreeMap::new();
+        let report = Report {
+            title: &run.recording.name,
+            run,
+            aiding: problem.model.aiding,
+            body_frame: calibration.body_frame,
+            outcome: solution.outcome(),
+            findings: &findings,
+            effects: &assessment.error_terms,
+            quality: Some(&assessment.quality),
+            true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
+            closed_form: solution
+                .closed_form()
+                .map(|closed_form| of_calibration::ClosedForm {
+                    estimate: &closed_form.estimate,
+                    note: &note,
+                }),
+            truth: in_form.as_ref(),
+            dwells: &dwells,
+            navigation: navigation.as_deref(),
+        };
+        Ok(Self {
+            document: report.document(),
+            converged: solution.converged(),
+            calibration,
+        })
+    }
+}
+
+/// What a closed form was made of, in a few words.
+pub fn note(closed_form: &ClosedForm) -> String {
+    let PerSensor { gyro, accel } = closed_form.positions;
+    let turns = closed_form.turns;
+    let from = match closed_form.reference {
+        Reference::Table => {
+            format!("{gyro} positions for the gyros, {accel} for the accelerometers")
+        }
+        Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
+        Reference::Gravity => {
+            format!("gravity in {accel} dwells and its direction over {turns} turns")
+        }
+    };
+    let minutes = closed_form.standing_time / 60.0;
+    let digits = usize::from(minutes < 10.0);
+    format!("{from}, {minutes:.digits$} min at rest")
+}
+
+/// Navigates 40 h standing level at the run's site by the calibration of each method.
+pub fn navigate(
+    run: &Run,
+    methods: &[(&'static str, &Estimate)],
+    truth: Option<&PerSensor<Triad>>,
+) -> std::result::Result<Vec<Navigated>, NavigationStudyError> {
+    let mission = Mission::standing_level(&run.site, FORTY_HOURS);
+    let all = methods.par_iter().map(|&(method, estimate)| {
+        let outlook = mission.outlook(estimate, truth)?;
+        Ok(Navigated { method, outlook })
+    });
+    all.collect()
+}
+
+/// Begin and end of each dwell, s.
+pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
+    let imu = &problem.run().recording.imu;
+    let dwells = problem.dwells();
+    dwells
+        .map(|dwell| imu.time(dwell.samples.start)..imu.time(dwell.samples.end))
+        .collect()
+}
+
+/// Writes a report into a new directory.
+pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir(directory)
+        .with_context(|| format!("cannot create {}", directory.display()))?;
+    Ok(turncal::report::write(document, directory)?)
+}
+
+/// A truth in the general form, which can hold any.
+pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
+    let record = Calibration::read(path)?;
+    if let Some(unit) = &record.unit
+        && *unit != run.instrument.unit
+    {
+        bail!(
+            "{}: units are {} and {}, those of the run {} and {}; give the truth of this run",
+            path.display(),
+            unit.gyro,
+            unit.accel,
+            run.instrument.unit.gyro,
+            run.instrument.unit.accel
+        );
+    }
+    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
+    Ok(Truth {
+        triads: in_body_frame(&triads, body_frame),
+        terms: record.terms,
+    })
+}

@@ -1,0 +1,169 @@
+//! How a run is estimated, alike for one run and for a lot.
+
+use anyhow::Context;
+use clap::ValueEnum;
+use clap::error::ErrorKind;
+use serde_json::{Value, json};
+use turncal::calibration::{self, CalibrationError, NoisePolicy, Options, Problem};
+use turncal::imu::InstallationForm;
+use turncal::run::Run;
+
+use super::error_term::TermArgument;
+
+/// Arguments that say how.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Estimation {
+    /// How to estimate
+    #[arg(long, value_enum, default_value_t = Method::Ekf)]
+    pub method: Method,
+    /// How installation angles make the installation matrix
+    #[arg(long, value_enum, default_value_t = Installation::General)]
+    pub installation: Installation,
+    /// What is observed [default: table if the run has its log, else velocity]
+    #[arg(long, value_enum)]
+    aiding: Option<Aiding>,
+    /// Error terms to estimate, beside those that the run switches on
+    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
+    with: Vec<TermArgument>,
+    /// Which noise the filter uses
+    #[arg(long, value_enum, default_value_t = Noise::default())]
+    noise: Noise,
+}
+
+/// How to estimate.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Method {
+    /// Extended Kalman filter over the whole run
+    Ekf,
+    /// Closed form: from the table's positions, else from labelled sections, else from gravity
+    SixPosition,
+}
+
+/// An installation form.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Installation {
+    /// Six direction cosines, rows of unit norm
+    General,
+    /// Six off-diagonal entries, unit diagonal
+    SixAngle,
+    /// Identity plus a cross-product matrix
+    ThreeAngle,
+}
+
+/// What the filter observes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Aiding {
+    /// Zero velocity in every dwell, and the attitude of the table
+    Table,
+    /// Zero velocity alone; the accelerometers define the body axes
+    Velocity,
+}
+
+/// Which noise the filter uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Noise {
+    /// As run.toml and models state it
+    Stated,
+    /// As stated unless the data contradict that, which right figures do once in a thousand runs
+    Auto,
+    /// As the data show it, around what is stated
+    Learnt,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        match NoisePolicy::default() {
+            NoisePolicy::Stated => Self::Stated,
+            NoisePolicy::Auto => Self::Auto,
+            NoisePolicy::Learnt => Self::Learnt,
+        }
+    }
+}
+
+impl From<Noise> for NoisePolicy {
+    fn from(noise: Noise) -> Self {
+        match noise {
+            Noise::Stated => Self::Stated,
+            Noise::Auto => Self::Auto,
+            Noise::Learnt => Self::Learnt,
+        }
+    }
+}
+
+impl From<Installation> for InstallationForm {
+    fn from(form: Installation) -> Self {
+        match form {
+            Installation::General => Self::General,
+            Installation::SixAngle => Self::SixAngle,
+            Installation::ThreeAngle => Self::ThreeAngle,
+        }
+    }
+}
+
+impl From<Aiding> for turncal::run::Aiding {
+    fn from(aiding: Aiding) -> Self {
+        match aiding {
+            Aiding::Table => Self::Table,
+            Aiding::Velocity => Self::Velocity,
+        }
+    }
+}
+
+impl From<Method> for calibration::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Ekf => Self::Ekf,
+            Method::SixPosition => Self::SixPosition,
+        }
+    }
+}
+
+impl Estimation {
+    /// Ends the program where arguments exclude each other.
+    pub fn check(&self) {
+        if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
+            let message = format!(
+                "--with {}: --method six-position estimates scale factors, installation and biases only; \
+                 leave --with out, or estimate it by --method ekf\n",
+                term.0.name()
+            );
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
+        for term in &self.with {
+            term.needs_table(self.aiding);
+        }
+    }
+
+    /// The problem that a run poses.
+    pub fn problem<'a>(&self, run: &'a Run, path: &std::path::Path) -> anyhow::Result<Problem<'a>> {
+        if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
+            return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
+        }
+        let mut options = Options::default()
+            .installation(self.installation.into())
+            .noise(self.noise.into());
+        options.aiding = self.aiding.map(turncal::run::Aiding::from);
+        let mut problem = Problem::new(run, &options);
+        for term in &self.with {
+            term.switch_on(&mut problem)?;
+        }
+        Ok(problem)
+    }
+
+    /// All of it by name, as the command line spells it.
+    pub fn in_words(&self) -> Value {
+        let terms: Vec<&str> = self.with.iter().map(|term| term.0.name()).collect();
+        json!({
+            "method": word(&self.method),
+            "installation": word(&self.installation),
+            "aiding": self.aiding.as_ref().map(word),
+            "with": terms,
+            "noise": word(&self.noise),
+        })
+    }
+}
+
+/// A value as the command line spells it.
+fn word(value: &impl ValueEnum) -> Option<String> {
+    Some(value.to_possible_value()?.get_name().to_owned())
+}

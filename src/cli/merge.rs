@@ -1,0 +1,85 @@
+//! `turncal merge`: parts of a job as one result.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use serde::de::DeserializeOwned;
+use turncal::formats::{JobKind, LotDirectory, Part, Parts, read_part_unit};
+use turncal::lot::{Lot, Unit};
+use turncal::report;
+use turncal::report::terminal::printable;
+use turncal::study::{AccuracyStudy, ExperimentStudy};
+
+use super::lot;
+use super::output::Delivery;
+
+/// Puts parts of a job together, as one machine would have made it
+///
+/// Parts are directories that --shard wrote: of a lot or of a study. Order, number and machine do not matter;
+/// a run that is missing or there twice, and a part of another job, are refused.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:
+  turncal study accuracy --runs 500 --shard 1/2 -o part-1
+  turncal study accuracy --runs 500 --shard 2/2 -o part-2
+  turncal merge part-1 part-2 -o accuracy")]
+pub struct Merge {
+    /// Directories of all parts
+    #[arg(required = true, value_name = "PART")]
+    parts: Vec<PathBuf>,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Merge {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let parts = Parts::read(&self.parts)?;
+        let inputs: Vec<&Path> = self.parts.iter().map(PathBuf::as_path).collect();
+        match parts.job.job {
+            JobKind::Lot => self.lot(&parts, &inputs),
+            JobKind::StudyAccuracy => {
+                let study: AccuracyStudy = self.study(&parts)?;
+                let begun = self.delivery.begin(&inputs)?;
+                let accuracy = study.result(parts.results()?)?;
+                begun.deliver(&report::accuracy::document(&accuracy))
+            }
+            JobKind::StudyExperiment => {
+                let study: ExperimentStudy = self.study(&parts)?;
+                let begun = self.delivery.begin(&inputs)?;
+                let experiment = study.result(parts.results()?)?;
+                begun.deliver(&report::experiment::document(&experiment))
+            }
+        }
+    }
+
+    fn study<T: DeserializeOwned>(&self, parts: &Parts) -> anyhow::Result<T> {
+        serde_json::from_value(parts.job.options.clone()).with_context(|| {
+            let first = self.parts.first().map_or(Path::new(""), PathBuf::as_path);
+            format!(
+                "{}: job.json does not state a study; make the parts again",
+                first.display()
+            )
+        })
+    }
+
+    fn lot(&self, parts: &Parts, inputs: &[&Path]) -> anyhow::Result<()> {
+        let target = self.delivery.output();
+        let part = Part::new(parts.job.clone(), None);
+        let waiting = || {
+            let name = printable(&target.unwrap_or(Path::new("")).display().to_string());
+            eprintln!("note: another turncal works in {name}; waiting until it is done");
+        };
+        let open =
+            |target| LotDirectory::open(target, &part, self.delivery.force(), inputs, &waiting);
+        let directory = target.map(open).transpose()?;
+        let units = parts
+            .units()
+            .into_iter()
+            .map(|(name, part)| match &directory {
+                Some(directory) => directory.copy(part, name),
+                None => read_part_unit(part, name),
+            });
+        let units = units.collect::<Result<Vec<Unit>, _>>()?;
+        let lot = Lot::new(units, parts.job.specification.clone());
+        lot::deliver(&lot, directory.as_ref().zip(target), self.delivery.json())
+    }
+}

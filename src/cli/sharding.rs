@@ -1,0 +1,59 @@
+//! Parts of studies.
+
+use std::path::Path;
+
+use serde::Serialize;
+use turncal::formats::{Job, JobKind, Part, part_is_there, write_part};
+use turncal::study::Shard;
+
+use super::input::shard;
+use super::output::Delivery;
+use super::progress::Runs;
+
+/// The part of a study that is to be made.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct Sharding {
+    /// Make part i of M of the runs into DIR, to be merged with the others
+    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json")]
+    shard: Option<Shard>,
+}
+
+impl Sharding {
+    /// Makes the part of a study of so many runs that is asked for, unless it is there already; false if all of
+    /// the study is asked for. `trials` makes runs by their numbers, telling of each.
+    pub fn make<T: Serialize>(
+        self,
+        (job, study, runs): (JobKind, &impl Serialize, u64),
+        delivery: &Delivery,
+        inputs: &[&Path],
+        trials: impl FnOnce(&[u64], &(dyn Fn() + Sync)) -> anyhow::Result<Vec<T>>,
+    ) -> anyhow::Result<bool> {
+        let Some((shard, target)) = self.shard.zip(delivery.output()) else {
+            return Ok(false);
+        };
+        let part = Part::new(
+            Job::new(job, serde_json::to_value(study)?, runs),
+            Some(shard),
+        );
+        if !delivery.force() && part_is_there(target, &part) {
+            eprintln!("part {shard} is there already");
+            return Ok(true);
+        }
+        let begun = delivery.begin(inputs)?;
+        let held = part.held();
+        let progress = Runs::new(held.len() as u64);
+        let made = trials(&held, &|| progress.one_done())?;
+        drop(progress);
+        let written = begun.fill(|directory| write_part(directory, part.clone(), &made));
+        // Another process may have made the same part in the meantime.
+        match written {
+            Err(_) if part_is_there(target, &part) => {}
+            written => written?,
+        }
+        eprintln!(
+            "part {shard}: {} of {runs} runs; merge all parts with turncal merge",
+            held.len()
+        );
+        Ok(true)
+    }
+}

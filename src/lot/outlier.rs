@@ -1,0 +1,130 @@
+//! Units apart from the others: the generalized extreme Studentized deviate test (Rosner, *Technometrics* 25,
+//! 1983, 165), which several outliers together do not deceive, at a stated rate of false alarms.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::statistics::{SIGMA_OF_MEDIAN, median};
+
+/// Fewer values than this have no others to be apart from.
+const FEWEST: usize = 5;
+
+/// How many values can be apart from the rest: one in four where the limits hold for several, which Rosner
+/// found from 25 values on, and of two from 15 on; else one, for which they hold by themselves (Grubbs).
+fn most(count: usize) -> usize {
+    match count {
+        25.. => count / 4,
+        15.. => 2,
+        _ => 1,
+    }
+}
+
+/// Places of the outliers among values with their variances, at this chance of any among normal ones.
+pub(super) fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
+    if samples.len() < FEWEST {
+        return Vec::new();
+    }
+    let mut left: Vec<(usize, f64)> = standardised(samples).into_iter().enumerate().collect();
+    let (mut removed, mut outliers) = (Vec::new(), 0);
+    for _ in 0..most(samples.len()) {
+        let Some((place, deviate)) = extreme(&left) else {
+            break;
+        };
+        let beyond = deviate > limit(left.len(), chance);
+        removed.push(left.remove(place).0);
+        if beyond {
+            outliers = removed.len();
+        }
+    }
+    removed.truncate(outliers);
+    removed.sort_unstable();
+    removed
+}
+
+/// Values on one scale: from the median, in what their own σ and a robust spread of the lot make together.
+fn standardised(samples: &[(f64, f64)]) -> Vec<f64> {
+    let middle = |values: &mut Vec<f64>| median(values).unwrap_or_default();
+    let centre = middle(&mut samples.iter().map(|s| s.0).collect());
+    let deviation = middle(&mut samples.iter().map(|s| (s.0 - centre).abs()).collect());
+    let own = middle(&mut samples.iter().map(|s| s.1).collect());
+    let spread = ((SIGMA_OF_MEDIAN * deviation).powi(2) - own).max(0.0);
+    let scale = |variance: f64| {
+        let all = spread + variance;
+        if all > 0.0 { all.sqrt() } else { 1.0 }
+    };
+    samples
+        .iter()
+        .map(|s| (s.0 - centre) / scale(s.1))
+        .collect()
+}
+
+/// Place and Studentized deviate of the value that is farthest from the mean; none where all are the same.
+fn extreme(values: &[(usize, f64)]) -> Option<(usize, f64)> {
+    let count = values.len() as f64;
+    let mean = values.iter().map(|v| v.1).sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|v| (v.1 - mean).powi(2)).sum();
+    let deviation = (squares / (count - 1.0)).sqrt();
+    let distances = values.iter().map(|v| (v.1 - mean).abs()).enumerate();
+    let (place, distance) = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (deviation > 0.0).then(|| (place, distance / deviation))
+}
+
+/// What the largest of so many deviates stays below but for this chance.
+fn limit(count: usize, chance: f64) -> f64 {
+    let n = count as f64;
+    let Ok(student) = StudentsT::new(0.0, 1.0, n - 2.0) else {
+        return f64::INFINITY;
+    };
+    let t = student.inverse_cdf(1.0 - chance / (2.0 * n));
+    (n - 1.0) * t / ((n - 2.0 + t * t) * n).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    /// NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.5.17.3: Rosner's own 54 values.
+    const ROSNER: [f64; 54] = [
+        -0.25, 0.68, 0.94, 1.15, 1.20, 1.26, 1.26, 1.34, 1.38, 1.43, 1.49, 1.49, 1.55, 1.56, 1.58,
+        1.65, 1.69, 1.70, 1.76, 1.77, 1.81, 1.91, 1.94, 1.96, 1.99, 2.06, 2.09, 2.10, 2.14, 2.15,
+        2.23, 2.24, 2.26, 2.35, 2.37, 2.40, 2.47, 2.54, 2.62, 2.64, 2.90, 2.92, 2.92, 2.93, 3.21,
+        3.26, 3.30, 3.59, 3.68, 4.30, 4.64, 5.34, 5.42, 6.01,
+    ];
+
+    #[test]
+    fn the_published_example_has_its_three_outliers_and_its_limits() {
+        let samples: Vec<(f64, f64)> = ROSNER.iter().map(|&x| (x, 0.0)).collect();
+        assert_eq!(outliers(&samples, 0.05), [51, 52, 53]);
+        for (count, published) in [(54, 3.158), (53, 3.151), (45, 3.085)] {
+            assert!((limit(count, 0.05) - published).abs() < 2e-3, "{count}");
+        }
+    }
+
+    #[test]
+    fn sound_lots_have_outliers_as_seldom_as_stated() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let (lots, chance) = (2000, 0.05);
+        for count in [6, 20, 50] {
+            let alarms = (0..lots).filter(|_| {
+                let draw = |_| (StandardNormal.sample(&mut rng), 0.0);
+                let samples: Vec<(f64, f64)> = (0..count).map(draw).collect();
+                !outliers(&samples, chance).is_empty()
+            });
+            // 5 % of 2000 is 100 ± 10; more false alarms than four σ above are too many.
+            let alarms = alarms.count();
+            assert!(alarms < 140 && alarms > 20, "{count}: {alarms}");
+        }
+    }
+
+    #[test]
+    fn a_value_with_a_wide_sigma_of_its_own_is_not_apart() {
+        let mut samples: Vec<(f64, f64)> = (0..20).map(|k| (f64::from(k % 5), 1.0)).collect();
+        samples.push((60.0, 1.0));
+        assert_eq!(outliers(&samples, 0.01), [20]);
+        samples[20].1 = 900.0;
+        assert!(outliers(&samples, 0.01).is_empty());
+    }
+}

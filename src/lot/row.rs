@@ -1,0 +1,62 @@
+//! A unit as the lot sees it.
+
+use super::limits::{Check, Verdict};
+use super::quantity::{Quantity, Sample};
+use super::unit::Unit;
+use crate::calibration::frame::Canonical;
+use crate::imu::{Nominal, PerSensor, Sensor};
+use crate::noise::RestNoise;
+
+/// A unit in the lot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The unit.
+    pub unit: Unit,
+    /// Its calibration as the lot's are compared, or why there is none to be used.
+    pub canonical: Result<Canonical, String>,
+    /// Its noise at rest, by the lot's nominal scales; none if no dwell is long enough.
+    pub noise: Option<RestNoise>,
+    /// Each limit that concerns it.
+    pub checks: Vec<Check>,
+    /// What all checks come to; none without a specification.
+    pub verdict: Option<Verdict>,
+}
+
+impl Row {
+    /// The nominal scale that its run states farthest from the lot's: triad, axis and by which part; none where
+    /// all are the same but for rounding.
+    pub fn nominal_off(&self, lot: &PerSensor<Nominal>) -> Option<(Sensor, usize, f64)> {
+        const ROUNDING: f64 = 1e-12;
+        let own = &self.unit.calibrated.as_ref().ok()?.nominal;
+        let axes = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| [0, 1, 2].map(|axis| (sensor, axis)));
+        let off = axes.map(|(sensor, axis)| {
+            let part = own.get(sensor)[axis] / lot.get(sensor).0[axis] - 1.0;
+            (sensor, axis, part)
+        });
+        off.filter(|off| off.2.abs() > ROUNDING)
+            .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
+    }
+
+    /// A quantity of the unit.
+    pub fn sample(&self, quantity: Quantity) -> Option<Sample> {
+        let canonical = self.canonical.as_ref().ok()?;
+        match quantity {
+            Quantity::Parameter(index) => {
+                let sigma = canonical.sigma().map_or(0.0, |sigma| sigma[index]);
+                let value = canonical.vector()[index];
+                // A parameter without σ beside others that have one was not estimated.
+                (sigma > 0.0 || canonical.covariance.is_none()).then_some(Sample { value, sigma })
+            }
+            Quantity::Noise(sensor, axis) => {
+                let noise = self.noise.as_ref()?;
+                let density = noise.density.get(sensor)[axis];
+                (density > 0.0).then(|| Sample {
+                    value: density.ln(),
+                    sigma: noise.relative_sigma(),
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Whether values change with the serial number or with time.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use toml::value::Datetime;
+
+use super::unit::Unit;
+
+/// What a value may change with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Against {
+    /// The last number in the serial.
+    Serial,
+    /// The date, in days.
+    Date,
+}
+
+/// A change that is beyond chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trend {
+    /// With what.
+    pub against: Against,
+    /// Change for one of the serial, or for a day.
+    pub slope: f64,
+    /// Its 1σ, from the scatter about the line.
+    pub sigma: f64,
+    /// Chance of as much or more without a trend.
+    pub p: f64,
+}
+
+impl Against {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Serial, Self::Date];
+
+    /// Where a unit stands; none if it does not say.
+    pub fn place(self, unit: &Unit) -> Option<f64> {
+        match self {
+            Self::Serial => serial_number(unit.meta.get("serial")?),
+            Self::Date => days(unit.meta.get("date")?),
+        }
+    }
+}
+
+/// The last number in a serial, such as 42 of `FOG-A042`.
+fn serial_number(serial: &str) -> Option<f64> {
+    let mut runs = serial.rsplit(|c: char| !c.is_ascii_digit());
+    runs.find(|run| !run.is_empty())?.parse().ok()
+}
+
+/// Days from 1970-01-01 to an ISO 8601 date, with the part of the day where it has a time.
+fn days(date: &str) -> Option<f64> {
+    const DAY: f64 = 86_400.0;
+    let stamp: Datetime = date.trim().parse().ok()?;
+    let date = stamp.date?;
+    // Years begin in March, so that the leap day is the last (Hinnant, *chrono-Compatible Low-Level Date
+    // Algorithms*).
+    let (month, day) = (i64::from(date.month), i64::from(date.day));
+    let year = i64::from(date.year) - i64::from(month <= 2);
+    let (era, of_era) = (year.div_euclid(400), year.rem_euclid(400));
+    let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
+    let whole = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
+    let seconds = stamp.time.map_or(0.0, |time| {
+        f64::from(time.hour) * 3600.0
+            + f64::from(time.minute) * 60.0
+            + f64::from(time.second.unwrap_or_default())
+    });
+    Some(whole as f64 + seconds / DAY)
+}
+
+/// A weighted line through values: `(place, value, weight)`; none where it is within chance.
+pub(super) fn trend(against: Against, points: &[(f64, f64, f64)], chance: f64) -> Option<Trend> {
+    let freedom = points.len().checked_sub(2).filter(|n| *n >= 2)? as f64;
+    let weights: f64 = points.iter().map(|p| p.2).sum();
+    let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+        points.iter().map(|p| of(p) * p.2).sum::<f64>() / weights
+    };
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let moment =
+        |of: &dyn Fn(&(f64, f64, f64)) -> f64| -> f64 { points.iter().map(|p| of(p) * p.2).sum() };
+    let xx = moment(&|p| (p.0 - x).powi(2));
+    let xy = moment(&|p| (p.0 - x) * (p.1 - y));
+    if xx <= 0.0 {
+        return None;
+    }
+    let slope = xy / xx;
+    let squares = moment(&|p| (p.1 - y - slope * (p.0 - x)).powi(2));
+    let sigma = (squares / freedom / xx).sqrt();
+    let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
+    let p = if sigma > 0.0 {
+        2.0 * student.sf((slope / sigma).abs())
+    } else {
+        1.0
+    };
+    (p < chance).then_some(Trend {
+        against,
+        slope,
+        sigma,
+        p,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn serials_and_dates_are_places() {
+        assert_eq!(serial_number("FOG-2 A042"), Some(42.0));
+        assert_eq!(serial_number("no number"), None);
+        assert_eq!(days("1970-01-01"), Some(0.0));
+        assert_eq!(days("2000-03-01"), Some(11_017.0));
+        assert_eq!(days("2024-02-29 12:00:00"), Some(19_782.5));
+        assert_eq!(days("March"), None);
+    }
+
+    #[test]
+    fn a_line_has_the_slope_and_sigma_of_least_squares() {
+        // Residuals ±1 about 2x: Σ(x − 1.5)² = 5, s² = 4/2.
+        let points = [
+            (0.0, 1.0, 1.0),
+            (1.0, 1.0, 1.0),
+            (2.0, 3.0, 1.0),
+            (3.0, 7.0, 1.0),
+        ];
+        let found = trend(Against::Serial, &points, 1.0).unwrap();
+        assert!((found.slope - 2.0).abs() < 1e-12, "{found:?}");
+        assert!((found.sigma - (4.0f64 / 2.0 / 5.0).sqrt()).abs() < 1e-12);
+        // Student's t of two degrees of freedom: p = 1 − t/√(2 + t²).
+        let t = found.slope / found.sigma;
+        assert!((found.p - (1.0 - t / (2.0 + t * t).sqrt())).abs() < 1e-9);
+        assert_eq!(trend(Against::Serial, &points, 0.01), None);
+        assert_eq!(trend(Against::Date, &[(0.0, 1.0, 1.0); 5], 1.0), None);
+    }
+}

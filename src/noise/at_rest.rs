@@ -1,0 +1,104 @@
+//! Noise of each axis while the instrument is at rest, from the dwells of any run.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::allan::overlapping;
+use crate::imu::{PerSensor, Sensor};
+use crate::recording::ImuSamples;
+
+/// White-noise density of each axis that has the Allan variance of the dwells at one cluster time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RestNoise {
+    /// The cluster time, s: a quarter of the median dwell, so that quantisation is small.
+    pub tau_s: f64,
+    /// Allan deviation times √τ: rad/√s and m/s/√s.
+    pub density: PerSensor<[f64; 3]>,
+    /// Equivalent degrees of freedom of each variance.
+    pub freedom: f64,
+}
+
+impl RestNoise {
+    /// Of samples in these dwells; none if no dwell is long enough.
+    pub fn of(imu: &ImuSamples, dwells: &[Range<usize>]) -> Option<Self> {
+        let mut lengths: Vec<usize> = dwells.iter().map(ExactSizeIterator::len).collect();
+        lengths.sort_unstable();
+        let size = lengths.get(lengths.len() / 2)? / 4;
+        let used: Vec<&Range<usize>> = dwells.iter().filter(|d| d.len() >= 4 * size).collect();
+        if size == 0 {
+            return None;
+        }
+        let freedoms: Vec<f64> = used.iter().map(|d| freedom(d.len(), size)).collect();
+        let freedom: f64 = freedoms.iter().sum();
+        let density = |sensor: Sensor, axis: usize| {
+            let increments = match sensor {
+                Sensor::Gyro => &imu.gyro,
+                Sensor::Accel => &imu.accel,
+            };
+            let variances = used.iter().zip(&freedoms).map(|(dwell, weight)| {
+                let of_dwell = increments[(*dwell).clone()].iter().map(|v| v[axis]);
+                let curve = overlapping(of_dwell, imu.period, &[size]);
+                weight * curve.variance.first().copied().unwrap_or_default()
+            });
+            let variance = variances.sum::<f64>() / freedom;
+            (variance * size as f64 * imu.period).sqrt()
+        };
+        Some(Self {
+            tau_s: size as f64 * imu.period,
+            density: PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| density(sensor, axis))),
+            freedom,
+        })
+    }
+
+    /// 1σ of each density as part of it.
+    pub fn relative_sigma(&self) -> f64 {
+        (2.0 * self.freedom).sqrt().recip()
+    }
+}
+
+/// Equivalent degrees of freedom of the overlapping Allan variance of white noise: Riley, NIST SP 1065, 5.4.1,
+/// for `samples` increments and clusters of `size`.
+fn freedom(samples: usize, size: usize) -> f64 {
+    let (n, m) = ((samples + 1) as f64, size as f64);
+    let clusters = 1.5 * (n - 1.0) / m - 2.0 * (n - 2.0) / n;
+    clusters * 4.0 * m * m / (4.0 * m * m + 5.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    #[test]
+    fn the_noise_of_each_axis_is_found_within_its_own_sigma() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let (period, samples) = (0.01, 40_000);
+        let truth = [1e-6, 5e-6, 1e-6];
+        let mut draw = |density: [f64; 3]| {
+            let increment = density.map(|d| {
+                let white: f64 = StandardNormal.sample(&mut rng);
+                d * f64::sqrt(period) * white
+            });
+            Vector3::from(increment)
+        };
+        let gyro: Vec<_> = (0..samples).map(|_| draw(truth)).collect();
+        let accel: Vec<_> = (0..samples).map(|_| draw([1e-4; 3])).collect();
+        let imu = ImuSamples::new(0.0, period, gyro, accel).unwrap();
+        let dwells: Vec<Range<usize>> = (0..20).map(|k| 2000 * k..2000 * k + 1600).collect();
+        let found = RestNoise::of(&imu, &dwells).unwrap();
+        assert_eq!(found.tau_s, 4.0);
+        let sigma = found.relative_sigma();
+        assert!((0.05..0.1).contains(&sigma), "{sigma}");
+        for (found, truth) in found.density.gyro.iter().zip(truth) {
+            assert!((found / truth).ln().abs() < 4.0 * sigma, "{found} {truth}");
+        }
+        assert_eq!(RestNoise::of(&imu, &[]), None);
+        let short = std::iter::once(0..3).collect::<Vec<_>>();
+        assert_eq!(RestNoise::of(&imu, &short), None);
+    }
+}

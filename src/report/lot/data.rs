@@ -1,0 +1,90 @@
+//! The figures of a lot by name; the unit of each is in its `unit`.
+
+use serde_json::{Map, Value, json};
+
+use super::rows::verdict;
+use super::shown::{shown, shown_spread, spread_symbol, unit_key};
+use crate::lot::{Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics, Verdict};
+
+pub(super) fn data(lot: &Lot) -> Value {
+    json!({
+        "format": "turncal-lot/1",
+        "body_frame": lot.body_frame,
+        "nominal_scale": { "gyro": lot.nominal.gyro.0.as_slice(), "accel": lot.nominal.accel.0.as_slice() },
+        "false_alarm": FALSE_ALARM,
+        "false_trend": FALSE_TREND,
+        "confidence": lot.specification.as_ref().map(|s| s.confidence),
+        "units": lot.rows.iter().enumerate().map(|(place, row)| unit(lot, place, row)).collect::<Value>(),
+        "quantities": lot.statistics.iter().map(|of| quantity(lot, of)).collect::<Value>(),
+    })
+}
+
+fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
+    let calibration = row.unit.calibrated.as_ref().ok().map(|of| &of.calibration);
+    let values = lot.statistics.iter().filter_map(|of| {
+        let (value, sigma) = shown(of.quantity, row.sample(of.quantity)?);
+        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(of.quantity) });
+        if let Some(check) = row
+            .checks
+            .iter()
+            .find(|c| crate::lot::Quantity::Parameter(c.limit.parameter) == of.quantity)
+        {
+            entry["verdict"] = json!(check.verdict);
+            entry["probability_within"] = json!(check.probability);
+        }
+        Some((of.quantity.name(), entry))
+    });
+    let apart: Vec<String> = lot
+        .outliers_of(place)
+        .map(|of| of.quantity.name())
+        .collect();
+    let failing = lot.statistics.iter().map(|of| of.quantity);
+    let failing = failing.filter(|q| verdict(row, *q) == Some(Verdict::Fail));
+    json!({
+        "name": row.unit.name,
+        "meta": row.unit.meta,
+        "failure": row.canonical.as_ref().err(),
+        "converged": calibration.map(|c| c.converged),
+        "nis": calibration.and_then(|c| Some(c.consistency.as_ref()?.all.nis)),
+        "warnings": calibration.map(|c| &c.warnings),
+        "verdict": row.verdict,
+        "outside": failing.map(|q| q.name()).collect::<Vec<_>>(),
+        "apart": apart,
+        "values": values.collect::<Map<_, _>>(),
+    })
+}
+
+fn quantity(lot: &Lot, of: &Statistics) -> Value {
+    let quantity = of.quantity;
+    let mean = Sample {
+        value: of.scatter.mean,
+        sigma: of.scatter.mean_sigma,
+    };
+    let (mean, mean_sigma) = shown(quantity, mean);
+    let spread = |x: f64| shown_spread(quantity, x);
+    let chi2 = of.scatter.chi_square;
+    let interval = of.scatter.spread.interval;
+    json!({
+        "name": quantity.name(),
+        "unit": unit_key(quantity),
+        "spread_unit": match spread_symbol(quantity) { "%" => "percent", _ => unit_key(quantity) },
+        "count": of.count,
+        "outliers": of.outliers.iter().map(|&k| &lot.rows[k].unit.name).collect::<Vec<_>>(),
+        "mean": mean,
+        "mean_sigma": mean_sigma,
+        "standard_deviation": spread(of.scatter.deviation),
+        "chi2": chi2.map(|c| c.value),
+        "degrees_of_freedom": chi2.map(|c| c.freedom),
+        "p": chi2.map(|c| c.p),
+        "spread": spread(of.scatter.spread.value),
+        "spread_sigma": of.scatter.spread.sigma.map(spread),
+        "spread_interval": [spread(interval.0), spread(interval.1)],
+        "spread_is_real": of.real,
+        "trends": of.trends.iter().map(|trend| json!({
+            "against": match trend.against { Against::Serial => "serial", Against::Date => "date" },
+            "slope": spread(trend.slope),
+            "slope_sigma": spread(trend.sigma),
+            "p": trend.p,
+        })).collect::<Value>(),
+    })
+}

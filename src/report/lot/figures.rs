@@ -1,0 +1,107 @@
+//! Figures of a lot: every unit's values with their σ, the mean, the limits.
+
+use super::super::group::{Group, axis_name};
+use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
+use super::shown::{shown, symbol};
+use crate::imu::{AXES, InstallationForm, Sensor};
+use crate::lot::{Lot, Quantity, Sample};
+
+pub(super) fn parameters(lot: &Lot) -> Plot {
+    let panels = Group::all().map(|group| {
+        let all = lot.statistics.iter().map(|of| of.quantity);
+        let of_group = |q: &Quantity| matches!(q, Quantity::Parameter(i) if Group::of(*i) == group);
+        let quantities: Vec<Quantity> = all.filter(of_group).collect();
+        let names = quantities.iter().map(|q| match q {
+            Quantity::Parameter(index) => axis_name(InstallationForm::General, *index),
+            Quantity::Noise(..) => String::new(),
+        });
+        let names: Vec<String> = names.collect();
+        let title = format!("{}, {}", group.title(), group.unit());
+        let limits = limits(lot, &quantities);
+        let mut panel = panel(lot, &title, &quantities, &names);
+        panel.y = panel.y.including(limits.iter().copied());
+        panel.with_all(limits.into_iter().map(|y| Series::level(y).dashed()))
+    });
+    Plot::new("lot.svg", "Every unit", (2, 330), panels).caption(
+        "Units in the order given, with their own 1σ; long lines: limits that all axes share. Crosses are apart \
+         from the lot.",
+    )
+}
+
+pub(super) fn noise(lot: &Lot) -> Plot {
+    let panels = Sensor::ALL.map(|sensor| {
+        let quantities: Vec<Quantity> = lot
+            .statistics
+            .iter()
+            .map(|of| of.quantity)
+            .filter(|q| matches!(q, Quantity::Noise(of, _) if *of == sensor))
+            .collect();
+        let unit = quantities.first().map_or("", |q| symbol(*q));
+        let names: Vec<String> = AXES.iter().map(char::to_string).collect();
+        let mut panel = panel(
+            lot,
+            &format!("{} noise at rest, {unit}", sensor.name()),
+            &quantities,
+            &names,
+        );
+        panel.y = Axis::log("").room(0.1, 0.1);
+        panel
+    });
+    Plot::new("noise.svg", "Noise at rest", (2, 330), panels).caption(
+        "White-noise density of each axis in the dwells, with its 1σ; logarithmic. Crosses are apart from the lot.",
+    )
+}
+
+/// Series for each quantity: bars and marks, crosses where a unit is apart.
+fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> Panel {
+    let spacing = 0.7 / quantities.len().max(1) as f64;
+    let shift = |n: usize| spacing * (n as f64 - 0.5 * (quantities.len() as f64 - 1.0));
+    let series = quantities
+        .iter()
+        .zip(names)
+        .enumerate()
+        .flat_map(|(n, (&quantity, name))| {
+            let points = |apart: bool| {
+                lot.rows.iter().enumerate().filter_map(move |(place, row)| {
+                    let is_apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
+                    let (value, sigma) = shown(quantity, row.sample(quantity)?);
+                    (is_apart == apart).then_some((place as f64 + 1.0 + shift(n), value, sigma))
+                })
+            };
+            let bars = points(false).chain(points(true)).filter(|p| p.2 > 0.0);
+            let bars = bars.map(|(x, y, own)| (x, y - own, y + own)).collect();
+            let at = |apart| points(apart).map(|(x, y, _)| (x, y));
+            [
+                Series::new(Shape::Intervals(bars)).nth(n).width(1.0),
+                Series::marks(Mark::Dot, at(false))
+                    .nth(n)
+                    .width(1.5)
+                    .key(name.clone()),
+                Series::marks(Mark::Cross, at(true)).nth(n).width(2.5),
+            ]
+        });
+    let series: Vec<Series> = series.collect();
+    let units = Axis::linear("unit").between(0.3, lot.rows.len() as f64 + 0.7);
+    Panel::new(title, units, Axis::linear("").room(0.05, 0.05)).with_all(series)
+}
+
+/// Limits that all parameters of a group share.
+fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
+    let Some(specification) = &lot.specification else {
+        return Vec::new();
+    };
+    let of = |quantity: &Quantity| {
+        let mut limits = specification.limits.iter();
+        let limit = limits.find(|limit| Quantity::Parameter(limit.parameter) == *quantity)?;
+        let at = |sign: f64| {
+            let value = limit.nominal + sign * limit.within;
+            shown(*quantity, Sample { value, sigma: 0.0 }).0
+        };
+        Some([at(-1.0), at(1.0)])
+    };
+    let all: Option<Vec<[f64; 2]>> = quantities.iter().map(of).collect();
+    match all.as_deref() {
+        Some([first, rest @ ..]) if rest.iter().all(|other| other == first) => first.to_vec(),
+        _ => Vec::new(),
+    }
+}

@@ -1,0 +1,116 @@
+//! How quantities of a lot are spoken of.
+
+use super::super::group::{Group, short_name};
+use super::super::number::{plus_minus, sigma, three_digits, value};
+use crate::imu::{AXES, InstallationForm, Sensor};
+use crate::lot::{Against, Quantity, Sample, Spread, Trend};
+use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
+
+/// Such as `gyro K x` or `gyro noise x`.
+pub(super) fn title(quantity: Quantity) -> String {
+    match quantity {
+        Quantity::Parameter(index) => short_name(InstallationForm::General, index),
+        Quantity::Noise(sensor, axis) => format!("{} noise {}", sensor.name(), AXES[axis]),
+    }
+}
+
+/// Symbol of its unit.
+pub(super) fn symbol(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Parameter(index) => Group::of(index).unit(),
+        Quantity::Noise(Sensor::Gyro, _) => "°/√h",
+        Quantity::Noise(Sensor::Accel, _) => "µg/√Hz",
+    }
+}
+
+/// Its unit as a name in files.
+pub(super) fn unit_key(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Parameter(index) => match Group::of(index).unit() {
+            "ppm" => "ppm",
+            "″" => "arcsec",
+            "°/h" => "deg_per_h",
+            _ => "ug",
+        },
+        Quantity::Noise(Sensor::Gyro, _) => "deg_per_sqrt_h",
+        Quantity::Noise(Sensor::Accel, _) => "ug_per_sqrt_hz",
+    }
+}
+
+/// Value and σ in that unit.
+pub(super) fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
+    match quantity {
+        Quantity::Parameter(index) => {
+            let group = Group::of(index);
+            (group.shown(of.value), of.sigma / group.unit_value())
+        }
+        Quantity::Noise(sensor, _) => {
+            let unit = match sensor {
+                Sensor::Gyro => DEG_PER_SQRT_H,
+                Sensor::Accel => MICRO_G_PER_SQRT_HZ,
+            };
+            let density = of.value.exp() / unit;
+            (density, density * of.sigma)
+        }
+    }
+}
+
+/// A difference of values in the unit of [`spread_symbol`].
+pub(super) fn shown_spread(quantity: Quantity, spread: f64) -> f64 {
+    match quantity {
+        Quantity::Parameter(index) => spread / Group::of(index).unit_value(),
+        // Of a logarithm.
+        Quantity::Noise(..) => 100.0 * spread,
+    }
+}
+
+/// Unit of differences between units.
+pub(super) fn spread_symbol(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Parameter(_) => symbol(quantity),
+        Quantity::Noise(..) => "%",
+    }
+}
+
+/// A value with its σ, or with three digits where it has none.
+pub(super) fn with_sigma((of, own): (f64, f64)) -> String {
+    match own > 0.0 {
+        true => plus_minus(of, own),
+        false => three_digits(of),
+    }
+}
+
+/// A trend in a sentence.
+pub(super) fn change(quantity: Quantity, trend: &Trend) -> String {
+    let (what, unit) = match trend.against {
+        Against::Serial => ("the serial number", "for each number"),
+        Against::Date => ("the date", "a day"),
+    };
+    let [slope, own] = [trend.slope, trend.sigma].map(|of| shown_spread(quantity, of));
+    format!(
+        "{} changes with {what}: {} {} {unit} (p = {}).",
+        title(quantity),
+        plus_minus(slope, own),
+        spread_symbol(quantity),
+        chance(trend.p)
+    )
+}
+
+/// A probability.
+pub(super) fn chance(p: f64) -> String {
+    match p < 1e-4 {
+        true => "< 0.0001".to_owned(),
+        false => value(p, 0.1 * p.max(0.01)),
+    }
+}
+
+/// A spread with its own σ, or what it stays below.
+pub(super) fn spread(quantity: Quantity, of: &Spread) -> String {
+    let shown = |x: f64| shown_spread(quantity, x);
+    match of.sigma {
+        Some(own) if of.interval.0 > 0.0 => plus_minus(shown(of.value), shown(own)),
+        _ if of.interval.1 > 0.0 => format!("< {}", sigma(shown(of.interval.1))),
+        // The scatter is less than the units' σ alone make.
+        _ => "0".to_owned(),
+    }
+}

@@ -1,0 +1,242 @@
+//! Tables of a lot.
+
+use super::super::document::{NONE, Table, cells};
+use super::super::group::{Group, axis_name};
+use super::super::number::{count, or_dash, sigma, three_digits, value};
+use super::shown::{chance, shown, shown_spread, spread, spread_symbol, symbol, title, with_sigma};
+use crate::imu::{InstallationForm, Sensor};
+use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
+
+/// One row a unit.
+pub(super) fn units(lot: &Lot) -> Table {
+    let mut columns = cells!["unit", "serial", "date"];
+    if lot.specification.is_some() {
+        columns.push("verdict".to_owned());
+    }
+    columns.extend(cells!["NIS", "warnings", "apart in"]);
+    let row = |(place, row): (usize, &Row)| {
+        let meta = |key: &str| row.unit.meta.get(key).cloned().unwrap_or(NONE.to_owned());
+        let mut cells = cells![row.unit.name.as_str(), meta("serial"), meta("date")];
+        if lot.specification.is_some() {
+            let open = row.canonical.is_ok().then_some(row.checks.as_slice());
+            let mut open = open.unwrap_or_default().iter();
+            let reason = open.find(|check| Some(check.verdict) == row.verdict);
+            cells.push(verdict(row.verdict, reason));
+        }
+        match (&row.canonical, &row.unit.calibrated) {
+            (Ok(_), Ok(calibrated)) => {
+                let apart: Vec<String> = lot
+                    .outliers_of(place)
+                    .map(|of| title(of.quantity))
+                    .collect();
+                cells.push(nis(calibrated));
+                cells.push(count(calibrated.calibration.warnings.len()));
+                cells.push(match apart.len() {
+                    0 => NONE.to_owned(),
+                    1..=3 => apart.join(", "),
+                    more => format!("{}, {} more", apart[..2].join(", "), more - 2),
+                });
+            }
+            _ => cells.extend(cells![NONE, NONE, "not calibrated"]),
+        }
+        cells
+    };
+    let table = Table::new("Units", columns)
+        .section(lot.rows.iter().enumerate().map(row))
+        .note(
+            "NIS: of all observations, one if the σ are true. Warnings: in the unit's own report.",
+        )
+        .note(format!(
+            "Apart: from the other units, by a test that names any in {} % of sound lots.",
+            100.0 * FALSE_ALARM
+        ));
+    let without = |column: &str| table.columns.iter().position(|name| name == column);
+    let optional = ["warnings", "date", "serial"]
+        .into_iter()
+        .filter_map(without);
+    Table {
+        optional: optional.collect(),
+        ..table
+    }
+}
+
+fn nis(calibrated: &Calibrated) -> String {
+    let consistency = calibrated.calibration.consistency.as_ref();
+    or_dash(consistency.map(|c| c.all.nis), |nis| value(nis, 0.1))
+}
+
+/// The verdict with the limit that decides it.
+fn verdict(of: Option<Verdict>, check: Option<&Check>) -> String {
+    let word = of.map_or(NONE, Verdict::name);
+    match (of, check) {
+        (Some(Verdict::Fail | Verdict::NotDecided), Some(check)) => {
+            format!(
+                "{word}: {}",
+                title(Quantity::Parameter(check.limit.parameter))
+            )
+        }
+        _ => word.to_owned(),
+    }
+}
+
+/// Mean and spread of every parameter.
+pub(super) fn parameters(lot: &Lot) -> Table {
+    let is_parameter = |of: &Statistics| matches!(of.quantity, Quantity::Parameter(_));
+    let sections = Sensor::ALL.map(|sensor| {
+        let of_sensor = move |of: &&Statistics| match of.quantity {
+            Quantity::Parameter(index) => Group::of(index).sensor() == sensor,
+            Quantity::Noise(..) => false,
+        };
+        lot.statistics.iter().filter(of_sensor).map(row)
+    });
+    statistics("Parameters of the lot")
+        .sections(sections.map(|rows| rows.filter(|_| lot.statistics.iter().any(is_parameter))))
+        .note("Mean: weighted by spread and own σ, ± its 1σ. Scatter: sample standard deviation as it stands.")
+        .note("χ²/n: of the scatter against the units' own σ; p: chance of as much if these explain it all.")
+        .note(format!(
+            "Spread: 1σ from unit to unit with the units' own σ taken out, ± its own, or its 95 % limit where it \
+             cannot be told from zero; real: not explained by their σ, at {} % false alarms for all rows together.",
+            100.0 * FALSE_ALARM
+        ))
+        .note("Outliers are left out.")
+}
+
+/// Noise at rest.
+pub(super) fn noise(lot: &Lot) -> Table {
+    let of_noise = |of: &&Statistics| matches!(of.quantity, Quantity::Noise(..));
+    let rows = lot.statistics.iter().filter(of_noise).map(row);
+    statistics("Noise at rest")
+        .section(rows)
+        .note("White-noise density that has the Allan variance of the dwells at a quarter of their length; scatter and spread of its logarithm.")
+}
+
+fn statistics(heading: &str) -> Table {
+    let mut table = Table::new(
+        heading,
+        [
+            "", "unit", "mean", "scatter", "χ²/n", "p", "spread", "unit", "real", "n", "outliers",
+        ],
+    );
+    table.optional = vec![3, 9];
+    table
+}
+
+fn row(of: &Statistics) -> Vec<String> {
+    let quantity = of.quantity;
+    let mean = Sample {
+        value: of.scatter.mean,
+        sigma: of.scatter.mean_sigma,
+    };
+    let scatter = shown_spread(quantity, of.scatter.deviation);
+    let chi2 = of.scatter.chi_square;
+    cells![
+        title(quantity),
+        symbol(quantity),
+        with_sigma(shown(quantity, mean)),
+        sigma(scatter),
+        or_dash(chi2.map(|c| c.value / c.freedom as f64), ratio),
+        or_dash(chi2.map(|c| c.p), chance),
+        spread(quantity, &of.scatter.spread),
+        spread_symbol(quantity),
+        if of.real { "yes" } else { "no" },
+        count(of.count),
+        match of.outliers.len() {
+            0 => NONE.to_owned(),
+            outliers => count(outliers),
+        },
+    ]
+}
+
+/// χ²/n, whose size means nothing where it is far beyond chance.
+fn ratio(of: f64) -> String {
+    const FAR: f64 = 1000.0;
+    match of > FAR {
+        true => format!("> {FAR}"),
+        false => three_digits(of),
+    }
+}
+
+/// Every parameter of every unit, a table for each group, and one of noise for each triad.
+pub(super) fn values(lot: &Lot) -> Vec<Table> {
+    let groups = Group::all().map(|group| {
+        let quantities: Vec<Quantity> = lot
+            .statistics
+            .iter()
+            .map(|of| of.quantity)
+            .filter(|q| matches!(q, Quantity::Parameter(index) if Group::of(*index) == group))
+            .collect();
+        let axes = quantities.iter().map(|q| match q {
+            Quantity::Parameter(index) => axis_name(InstallationForm::General, *index),
+            Quantity::Noise(..) => String::new(),
+        });
+        (group.titled(), axes.collect::<Vec<_>>(), quantities)
+    });
+    let noises = Sensor::ALL.map(|sensor| {
+        let all = lot.statistics.iter().map(|of| of.quantity);
+        let quantities: Vec<Quantity> = all
+            .filter(|q| matches!(q, Quantity::Noise(of, _) if *of == sensor))
+            .collect();
+        let unit = quantities.first().map_or("", |q| symbol(*q));
+        let axes = ["x", "y", "z"].map(str::to_owned).to_vec();
+        (
+            format!("{} noise at rest, {unit}", sensor.name()),
+            axes,
+            quantities,
+        )
+    });
+    let tables = groups
+        .chain(noises)
+        .filter(|(_, _, quantities)| !quantities.is_empty());
+    let table = |(heading, axes, quantities): (String, Vec<String>, Vec<Quantity>)| {
+        let row = |(place, row): (usize, &Row)| {
+            let mut cells = vec![row.unit.name.clone()];
+            cells.extend(quantities.iter().map(|&quantity| {
+                let Some(sample) = row.sample(quantity) else {
+                    return NONE.to_owned();
+                };
+                let apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
+                let fails = row.checks.iter().any(|check| {
+                    Quantity::Parameter(check.limit.parameter) == quantity
+                        && check.verdict == Verdict::Fail
+                });
+                let mark = if apart || fails { "! " } else { "" };
+                format!("{mark}{}", with_sigma(shown(quantity, sample)))
+            }));
+            cells
+        };
+        Table::new(heading, std::iter::once("unit".to_owned()).chain(axes))
+            .section(lot.rows.iter().enumerate().map(row))
+            .note("± 1σ; ! apart from the lot, or outside its limit.")
+    };
+    tables.map(table).collect()
+}
+
+/// Limits that are not kept, or of which that cannot be said.
+pub(super) fn undecided(lot: &Lot) -> Table {
+    let row = |row: &Row, check: &Check| {
+        let quantity = Quantity::Parameter(check.limit.parameter);
+        let in_unit = |x: f64| shown_spread(quantity, x);
+        let off = check
+            .off
+            .map(|(off, own)| with_sigma((in_unit(off), in_unit(own))));
+        cells![
+            row.unit.name.as_str(),
+            title(quantity),
+            symbol(quantity),
+            off.unwrap_or_else(|| NONE.to_owned()),
+            format!("±{}", in_unit(check.limit.within)),
+            or_dash(check.probability, |p| value(p, 0.01)),
+            check.verdict.name(),
+        ]
+    };
+    let rows = lot.rows.iter().flat_map(|of| {
+        let open = of.checks.iter().filter(|c| c.verdict != Verdict::Pass);
+        open.map(move |check| row(of, check))
+    });
+    Table::new(
+        "Limits that are not kept, or not certainly",
+        ["unit", "", "unit", "from nominal", "limit", "P(within)", "verdict"],
+    )
+    .section(rows)
+    .note("A unit passes a limit if its probability of being within is at least the stated confidence, and fails if that of being outside is.")
+}

@@ -1,0 +1,96 @@
+//! What is said of a drawn lot.
+
+use super::super::{svg, terminal};
+use super::*;
+use crate::lot::tests::{Draw, drawn};
+use crate::lot::{Limit, Specification};
+
+/// Twenty units, one of them apart and one that failed, against a limit on the first scale factor.
+fn lot() -> Lot {
+    let mut units = drawn(
+        20,
+        Draw {
+            spread: 30.0 * PPM,
+            sigma: 1.0 * PPM,
+            shared: 0.0,
+        },
+        5,
+    );
+    if let Ok(of) = &mut units[4].calibrated {
+        of.calibration.gyro.scale[0] *= 1.001;
+        of.nominal.gyro[2] *= 2.0;
+    }
+    units[7].calibrated = Err("no log".to_owned());
+    let limit = Limit {
+        parameter: 0,
+        nominal: 1.0,
+        within: 500.0 * PPM,
+    };
+    let specification = Specification {
+        confidence: 0.95,
+        limits: vec![limit],
+    };
+    Lot::new(units, Some(specification))
+}
+
+#[test]
+fn what_is_wrong_with_a_lot_is_said_with_the_names_of_its_units() {
+    let document = document(&lot());
+    let warnings = document.warnings.items.join("\n");
+    for expected in [
+        "unit-7: no log",
+        "Outside a limit with 95 % confidence: unit-4.",
+        "unit-4 is apart from the lot in gyro K x;",
+        "unit-4 states another nominal scale than the lot: gyro z",
+    ] {
+        assert!(warnings.contains(expected), "{expected}\n{warnings}");
+    }
+    assert!(!warnings.contains("Not decided"), "{warnings}");
+    let text = terminal::text(&document, Some(100));
+    assert!(text.contains("pass 18, not decided 1, fail 1"), "{text}");
+    assert!(text.contains("fail: gyro K x") && text.contains("not calibrated"));
+}
+
+#[test]
+fn every_figure_is_drawn_and_every_value_written() {
+    let document = document(&lot());
+    for plot in document.plots() {
+        let drawn = svg::draw(plot).unwrap();
+        assert!(!drawn.contains("NaN"), "{}", plot.file);
+    }
+    // Six scale factors of nineteen units, a row for the one without, and the header.
+    let (name, table) = &document.files[0];
+    assert_eq!(
+        (name.as_str(), table.lines().count()),
+        ("lot.csv", 6 * 19 + 2)
+    );
+    let of = |name: &str| {
+        let quantities = document.data["quantities"].as_array().unwrap();
+        quantities
+            .iter()
+            .find(|q| q["name"] == name)
+            .unwrap()
+            .clone()
+    };
+    let scale = of("gyro.scale.x");
+    assert_eq!(scale["outliers"][0], "unit-4");
+    let spread = scale["spread"].as_f64().unwrap();
+    assert!((spread - 30.0).abs() < 4.0 * scale["spread_sigma"].as_f64().unwrap());
+    assert_eq!(document.data["units"][4]["outside"][0], "gyro.scale.x");
+    let value = &document.data["units"][4]["values"]["gyro.scale.x"];
+    assert!(
+        (value["value"].as_f64().unwrap() - 1000.0).abs() < 200.0,
+        "{value}"
+    );
+    assert_eq!(
+        (&value["unit"], &value["verdict"]),
+        (&"ppm".into(), &"fail".into())
+    );
+}
+
+#[test]
+fn a_lot_without_units_limits_or_figures_is_still_a_document() {
+    let document = document(&Lot::new(Vec::new(), None));
+    assert!(document.plots().all(|plot| svg::draw(plot).is_ok()));
+    assert!(terminal::text(&document, Some(80)).contains("Lot of 0 units"));
+}

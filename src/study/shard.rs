@@ -1,0 +1,86 @@
+//! A part of a job of many runs, so that several machines can share it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// Part `index` of `of` of a job: every `of`-th run, the first being run `index - 1`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// From one.
+    index: u64,
+    /// How many parts there are.
+    of: u64,
+}
+
+/// Not a part of a job.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("expected two whole numbers i/M, i from 1 to M, such as 3/8 for the third part of eight")]
+pub struct ShardError;
+
+impl Shard {
+    /// All of a job.
+    pub const WHOLE: Self = Self { index: 1, of: 1 };
+
+    /// The numbers of its runs among `count`, from zero, in order.
+    pub fn runs(self, count: u64) -> Vec<u64> {
+        let mut runs = Vec::new();
+        let mut next = Some(self.index - 1);
+        while let Some(run) = next.filter(|run| *run < count) {
+            runs.push(run);
+            next = run.checked_add(self.of);
+        }
+        runs
+    }
+}
+
+impl FromStr for Shard {
+    type Err = ShardError;
+
+    fn from_str(text: &str) -> Result<Self, ShardError> {
+        let (index, of) = text.split_once('/').ok_or(ShardError)?;
+        let number = |text: &str| text.trim().parse::<u64>().map_err(|_| ShardError);
+        let (index, of) = (number(index)?, number(of)?);
+        if (1..=of).contains(&index) {
+            Ok(Self { index, of })
+        } else {
+            Err(ShardError)
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_hold_every_run_once() {
+        for (of, count) in [(1, 5), (2, 5), (7, 3), (3, 0)] {
+            let mut all: Vec<u64> = (1..=of)
+                .flat_map(|index| Shard { index, of }.runs(count))
+                .collect();
+            all.sort_unstable();
+            assert_eq!(all, (0..count).collect::<Vec<_>>());
+        }
+        let last = Shard {
+            index: u64::MAX,
+            of: u64::MAX,
+        };
+        assert_eq!(last.runs(9), [0; 0]);
+    }
+
+    #[test]
+    fn what_is_no_part_is_refused() {
+        assert_eq!("3/8".parse(), Ok(Shard { index: 3, of: 8 }));
+        for wrong in ["", "3", "0/8", "9/8", "-1/8", "1/0", "a/b", "1/2/3"] {
+            assert_eq!(wrong.parse::<Shard>(), Err(ShardError), "{wrong}");
+        }
+    }
+}
