@@ -79,7 +79,7 @@ impl Sensitivity {
     /// variance.
     pub fn update(
         &mut self,
-        [states, parameters]: [&[(usize, f64)]; 2],
+        [states, parameters]: [&[f64]; 2],
         gain: &[f64],
         ScalarInnovation {
             innovation,
@@ -87,11 +87,13 @@ impl Sensitivity {
         }: ScalarInnovation,
     ) {
         let mut sensed = DVector::zeros(self.of_states.nrows());
-        for &(state, weight) in states {
-            sensed.axpy(weight, &self.of_states.column(state), 1.0);
+        for (column, &weight) in self.of_states.column_iter().zip(states) {
+            if weight != 0.0 {
+                sensed.axpy(weight, &column, 1.0);
+            }
         }
-        for &(parameter, weight) in parameters {
-            sensed[parameter] += weight;
+        for (sensed, weight) in sensed.iter_mut().zip(parameters) {
+            *sensed += weight;
         }
         for (mut column, gain) in self.of_states.column_iter_mut().zip(gain) {
             column.axpy(-gain, &sensed, 1.0);

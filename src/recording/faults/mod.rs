@@ -11,6 +11,8 @@ mod stuck;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::imu::Sensor;
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
@@ -130,14 +132,14 @@ fn find(
     pulses: bool,
 ) -> Vec<Found> {
     let limit = Limit::of_rows(columns[0].len());
-    let mut found = Vec::new();
     let steps = std::array::from_fn(|k| facts[k].step.unwrap_or_else(|| last_digit(&columns[k])));
     let spikes = spikes(
         &std::array::from_fn(|k| columns[k].as_slice()),
         &steps,
         limit,
     );
-    for (column, (values, facts)) in columns.iter().zip(facts).enumerate() {
+    let of_column = |column: usize| {
+        let (values, facts) = (&columns[column], &facts[column]);
         let spikes = &spikes[column];
         let repeats = stuck::Column {
             values,
@@ -169,13 +171,12 @@ fn find(
         let saturated = saturated
             .into_iter()
             .map(|rows| (FaultKind::Saturated, rows));
-        found.extend(
-            saturated
-                .chain(kinds)
-                .map(|(kind, rows)| Found { kind, column, rows }),
-        );
-    }
-    found
+        let found = saturated.chain(kinds);
+        let found = found.map(|(kind, rows)| Found { kind, column, rows });
+        found.collect::<Vec<_>>()
+    };
+    let found: Vec<_> = (0..columns.len()).into_par_iter().map(of_column).collect();
+    found.into_iter().flatten().collect()
 }
 
 /// What a column of numbers with so many digits resolves at its largest values, by the smallest change

@@ -176,9 +176,13 @@ impl Column<'_> {
         }
         let level = 0.5 * (left.0 + right.0);
         let off = (value - level).abs() / self.step;
+        let (length, beside) = (run.len() as f64, half as f64);
+        let least = 1.0 / length + 1.0 / beside;
+        if off <= least {
+            return false;
+        }
         // Where a motion came to the value or left it, the rows next to the run are on their way.
         let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(|rows| moments(rows).0);
-        let beside = half as f64;
         let pairs = [
             (left.0, far_left.0, beside),
             (right.0, far_right.0, beside),
@@ -203,10 +207,9 @@ impl Column<'_> {
         let variance =
             halves.map(sums).iter().sum::<f64>() / (4.0 * SUM as f64 * self.step.powi(2));
         let variance = variance.max(self.of_grid() / SUM as f64);
-        let length = run.len() as f64;
         let noise = (variance * (1.0 / length + 0.5 / beside)).sqrt();
         let freedom = 4.0 * ((half / SUM) as f64 - 1.0);
-        off > change + 1.0 / length + 1.0 / beside + limit.of_student(freedom) * noise
+        off > change + least + limit.of_student(freedom) * noise
     }
 
     /// Whether a motion goes on across a run as if the run were not there, by the likelihood ratio of a

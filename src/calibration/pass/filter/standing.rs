@@ -6,6 +6,7 @@ use super::super::local::{Given, Local, Observed, Outcome, StepModel};
 use super::super::measurement::ScalarInnovation;
 use super::super::segment::{Seen, Segment, Standing};
 use super::Filter;
+use super::update::times;
 use crate::calibration::innovation::Observation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::navigation::Block;
@@ -200,22 +201,12 @@ impl Filter {
 
     /// What is known of `g` before.
     fn given<const G: usize>(&self, map: &Map) -> Given<G> {
-        let rows: Vec<Vec<(usize, f64)>> = (0..G).map(|row| map.row(row)).collect();
-        let (mut mean, mut covariance) = ([0.0; G], [[0.0; G]; G]);
-        let n = self.x.len();
-        for (i, row) in rows.iter().enumerate() {
-            mean[i] = super::update::times(row, self.x.as_slice());
-            let mut product = vec![0.0; n];
-            for &(state, weight) in row {
-                for (sum, p) in product.iter_mut().zip(self.p.column(state)) {
-                    *sum += weight * p;
-                }
-            }
-            for (j, other) in rows.iter().enumerate() {
-                covariance[i][j] = super::update::times(other, &product);
-            }
-        }
-        Given::new(mean, covariance)
+        let mean = &map.states * &self.x;
+        let covariance = &map.states * &self.p * map.states.transpose();
+        Given::new(
+            std::array::from_fn(|i| mean[i]),
+            std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        )
     }
 
     fn step_model<const M: usize>(&self, block: &Block, moving: &[usize]) -> StepModel<M> {
@@ -305,11 +296,11 @@ impl Filter {
         let mut phi = vec![[0.0; M]; n];
         let mut added = vec![[0.0; M]; map.tried.ncols()];
         for (place, row) in outcome.of_given.iter().enumerate() {
-            for (state, weight) in combined(row, &map.states) {
-                phi[state][place] = weight;
+            for (phi, weight) in phi.iter_mut().zip(combined(row, &map.states)) {
+                phi[place] = weight;
             }
-            for (parameter, weight) in combined(row, &map.tried) {
-                added[parameter][place] = weight;
+            for (added, weight) in added.iter_mut().zip(combined(row, &map.tried)) {
+                added[place] = weight;
             }
         }
         for axis in 0..3 {
@@ -325,14 +316,6 @@ impl Filter {
     }
 }
 
-impl Map {
-    fn row(&self, row: usize) -> Vec<(usize, f64)> {
-        let all = self.states.row(row);
-        let all = all.iter().copied().enumerate();
-        all.filter(|&(_, weight)| weight != 0.0).collect()
-    }
-}
-
 /// The moving states that are in `g`.
 fn given_at_begin(moving: &[usize]) -> impl Iterator<Item = &usize> {
     let position = POSITION..POSITION + 3;
@@ -340,14 +323,9 @@ fn given_at_begin(moving: &[usize]) -> impl Iterator<Item = &usize> {
 }
 
 /// A row of `g` by state or parameter.
-fn combined(row: &[f64], map: &DMatrix<f64>) -> Vec<(usize, f64)> {
-    let columns = map.column_iter().enumerate();
-    let sums = columns.map(|(index, column)| {
-        let sum = row.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
-        (index, sum)
-    });
-    sums.filter(|&(_, weight): &(usize, f64)| weight != 0.0)
-        .collect()
+fn combined(row: &[f64], map: &DMatrix<f64>) -> Vec<f64> {
+    let columns = map.as_slice().chunks_exact(row.len());
+    columns.map(|column| times(row, column)).collect()
 }
 
 /// Rate in rad/s and specific force in m/s² that make this of a block at rest.

@@ -286,18 +286,15 @@ impl Filter {
                         let errors = errors.chain(self.layout.table_base());
                         row.extend(errors.map(|first| (first + axis, -1.0)));
                     }
-                    let mut ph = vec![0.0; self.x.len()];
-                    for &(state, weight) in &row {
-                        for (sum, p) in ph.iter_mut().zip(self.p.column(state)) {
-                            *sum += weight * p;
-                        }
-                    }
+                    let mut h = vec![0.0; self.x.len()];
+                    row.iter().for_each(|&(state, weight)| h[state] = weight);
+                    let ph = &self.p * DVector::from_column_slice(&h);
                     let z = seen.residual[axis];
                     scalars.push(ScalarInnovation {
-                        innovation: z - update::times(&row, self.x.as_slice()),
-                        variance: update::times(&row, &ph) + open.variance(seen),
+                        innovation: z - update::times(&h, self.x.as_slice()),
+                        variance: update::times(&h, ph.as_slice()) + open.variance(seen),
                     });
-                    self.take_scalar([&row, &[]], z, open.variance(seen));
+                    self.take_scalar([&h, &[]], z, open.variance(seen));
                     self.mirror();
                 }
             }

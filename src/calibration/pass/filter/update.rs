@@ -8,7 +8,9 @@ impl Filter {
     pub fn update(&mut self, measurement: &Measurement) {
         let rows = measurement.rows.iter().zip(&measurement.residual);
         for (row, &z) in rows {
-            self.take_scalar([row, &[]], z, measurement.variance);
+            let mut h = vec![0.0; self.x.len()];
+            row.iter().for_each(|&(state, weight)| h[state] = weight);
+            self.take_scalar([&h, &[]], z, measurement.variance);
         }
         self.mirror();
     }
@@ -19,7 +21,7 @@ impl Filter {
     /// half of the covariance is right after it, and is all that it needs.
     pub(super) fn take_scalar(
         &mut self,
-        [row, tried]: [&[(usize, f64)]; 2],
+        [row, tried]: [&[f64]; 2],
         z: f64,
         variance_of_noise: f64,
     ) {
@@ -63,19 +65,16 @@ impl Filter {
     }
 
     /// `P hᵀ` from the upper half of P.
-    fn times_upper(&self, h: &[(usize, f64)], product: &mut [f64]) {
+    fn times_upper(&self, h: &[f64], product: &mut [f64]) {
         let n = self.x.len();
-        let p = self.p.as_slice();
         product.fill(0.0);
-        for &(state, weight) in h {
-            let (above, below) = product.split_at_mut(state);
-            for (sum, p) in above.iter_mut().zip(&p[n * state..]) {
-                *sum += weight * p;
+        for (j, column) in self.p.as_slice().chunks_exact(n).enumerate() {
+            let mut sum = h[j] * column[j];
+            for ((product, p), h_k) in product[..j].iter_mut().zip(column).zip(h) {
+                *product += h[j] * p;
+                sum += h_k * p;
             }
-            let of_row = p[state..].iter().step_by(n).skip(state);
-            for (sum, p) in below.iter_mut().zip(of_row) {
-                *sum += weight * p;
-            }
+            product[j] += sum;
         }
     }
 }
@@ -90,6 +89,6 @@ fn add_both(column: &mut [f64], (a, x): (f64, &[f64]), (b, y): (f64, &[f64])) {
 }
 
 /// `h v`
-pub(super) fn times(h: &[(usize, f64)], v: &[f64]) -> f64 {
-    h.iter().map(|&(state, weight)| weight * v[state]).sum()
+pub(super) fn times(h: &[f64], v: &[f64]) -> f64 {
+    h.iter().zip(v).map(|(h, v)| h * v).sum()
 }
