@@ -1,6 +1,7 @@
 //! What is observed when: a stretch of a recording cut into steps, each with what its end shows.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -27,7 +28,7 @@ pub(super) struct AtRest {
     /// Mean of the table's readings during the whole dwell, `C_b_n`; none without a table.
     pub attitude: Option<Matrix3<f64>>,
     /// How the table's attitude turns with errors of its axes, where their angles are known.
-    pub axes: Option<AxisResponse>,
+    pub axes: Option<Arc<AxisResponse>>,
     /// Mean output of the accelerometers during the whole dwell.
     pub accel: Vector3<f64>,
     /// Mean of the table's readings during the step, and how many they were.
@@ -66,7 +67,7 @@ pub(super) fn steps(
         let accel = dwell.mean(Sensor::Accel, run).output;
         let axes = table.zip(position);
         let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
-        let axes = axes.map(axis_response);
+        let axes = axes.map(|angles| Arc::new(axis_response(angles)));
         let mut first = true;
         for samples in cut(dwell.samples.clone(), longer * length) {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
@@ -81,7 +82,7 @@ pub(super) fn steps(
                     first,
                     attitude: position.map(|p| p.attitude),
                     accel,
-                    axes,
+                    axes: axes.clone(),
                     reading,
                 }),
             });

@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,7 +22,7 @@ pub(in crate::calibration) struct Segment {
     /// Computed state at its begin.
     pub begin: State,
     /// How the table's attitude turns with errors of its axes, where their angles are known.
-    pub axes: Option<AxisResponse>,
+    pub axes: Option<Arc<AxisResponse>>,
     /// Error models of its steps; one for all that are alike.
     pub models: Vec<Block>,
     pub steps: Vec<Standing>,
@@ -106,7 +107,7 @@ impl Segment {
         let begin = navigator.state;
         let mut segment = Self {
             begin,
-            axes: steps.first().and_then(|(_, at_rest)| at_rest.axes),
+            axes: steps.first().and_then(|(_, at_rest)| at_rest.axes.clone()),
             models: Vec::new(),
             steps: Vec::with_capacity(steps.len()),
         };

@@ -182,7 +182,7 @@ impl Filter {
                 map.states[(table + axis, error + axis)] = 1.0;
             }
         }
-        let response = segment.axes.as_ref();
+        let response = segment.axes.as_deref();
         for axis in 0..3 {
             if let Some(response) = response {
                 for (state, k) in self.layout.table_axes() {
