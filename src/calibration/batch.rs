@@ -159,7 +159,7 @@ impl<'a> Batch<'a> {
             self.information.observe(&[row]);
         }
         let end = samples.end;
-        self.navigator.stand(samples.clone());
+        self.navigator.stand(&at_rest.sums);
         let block = self.navigator.standing(&tied.attitude, samples);
         self.advance(&block, end)?;
         let state = &block.state;

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{self, exp, tilt};
 use crate::imu::{Sensor, Triad};
-use crate::navigation::{State, samples_of};
+use crate::navigation::{State, Sums, samples_of};
 use crate::recording::TableLog;
 use crate::run::{Dwell, Run};
 use crate::turntable::{AxisResponse, axis_response};
@@ -25,6 +25,8 @@ pub(super) struct Step {
 pub(super) struct AtRest {
     /// Whether it is the dwell's first.
     pub first: bool,
+    /// Its samples, summed.
+    pub sums: Sums,
     /// Mean of the table's readings during the whole dwell, `C_b_n`; none without a table.
     pub attitude: Option<Matrix3<f64>>,
     /// How the table's attitude turns with errors of its axes, where their angles are known.
@@ -77,14 +79,15 @@ pub(super) fn steps(
                 Some((mean, readings.len()))
             });
             steps.push(Step {
-                samples,
                 at_rest: Some(AtRest {
                     first,
+                    sums: Sums::new(imu, samples.clone()),
                     attitude: position.map(|p| p.attitude),
                     accel,
                     axes: axes.clone(),
                     reading,
                 }),
+                samples,
             });
             first = false;
         }

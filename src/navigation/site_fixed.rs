@@ -5,10 +5,11 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 
 use super::block::{Block, CorrectedResponse};
-use super::increments::Increments;
+use super::increments::{Increments, Motion};
 use super::moments::Moments;
 use super::passage::Passage;
 use super::state::State;
+use super::sums::Sums;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
 use crate::imu::{PerSensor, Sensed, Sensor, TermResponse, TermVector, Triad};
@@ -108,11 +109,21 @@ impl<'a> Navigator<'a> {
         if self.terms.on.is_empty() {
             return (of_triads, None);
         }
-        let period = self.imu.period;
+        let sensed = self.sensed(k, &of_triads, attitude);
+        let (increments, sensed) = self.without_terms(of_triads, sensed, self.imu.period);
+        (increments, Some(sensed))
+    }
+
+    /// Increments over a time without what error terms add to them, and what is then sensed.
+    fn without_terms(
+        &self,
+        of_triads: Increments,
+        mut sensed: Sensed,
+        period: f64,
+    ) -> (Increments, Sensed) {
         let mut increments = of_triads;
-        let mut sensed = self.sensed(k, &increments, attitude);
         if self.terms.values == TermVector::zeros() {
-            return (increments, Some(sensed));
+            return (increments, sensed);
         }
         // Triads see u + t(u), and u is what is looked for; the second round leaves the third order.
         for _ in 0..2 {
@@ -123,7 +134,7 @@ impl<'a> Navigator<'a> {
             };
             sensed.force = increments.velocity / period;
         }
-        (increments, Some(sensed))
+        (increments, sensed)
     }
 
     #[inline]
@@ -188,13 +199,32 @@ impl<'a> Navigator<'a> {
 
     /// The same where the table stands.
     pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
-        self.stand(samples.clone());
+        self.navigate(samples.clone(), |_, _| {});
         self.standing(&self.state.attitude, samples)
     }
 
-    /// Navigates through these samples without an error model.
-    pub fn stand(&mut self, samples: Range<usize>) {
-        self.navigate(samples, |_, _| {});
+    /// Navigates through samples of a body at rest, given their sums, without an error model.
+    pub fn stand(&mut self, sums: &Sums) {
+        let n = sums.samples as f64;
+        let period = n * self.imu.period;
+        let correction = PerSensor::from_fn(|sensor| self.instrument.get(sensor).correction);
+        let bias = PerSensor::from_fn(|sensor| self.instrument.get(sensor).bias * n);
+        let mut increments = sums.increments(&correction, &bias);
+        if !self.terms.on.is_empty() {
+            let rate = increments.angle / period;
+            let sensed = Sensed {
+                rate,
+                rate_over_earth: rate - self.state.attitude.tr_mul(&self.earth_rate),
+                angular_acceleration: Vector3::zeros(),
+                force: increments.velocity / period,
+            };
+            (increments, _) = self.without_terms(increments, sensed, period);
+        }
+        let motion = sums.motion(&increments, &correction);
+        let earth_turn = exp(-self.earth_rate * period);
+        let (mut state, _) = self.moved(&self.state, &motion, &earth_turn, period);
+        state.attitude = orthonormalised(&state.attitude);
+        self.state = state;
     }
 
     /// The block of these samples where the table stands in this attitude; its state is where navigation
@@ -231,33 +261,47 @@ impl<'a> Navigator<'a> {
             .map_or_else(Increments::default, |k| {
                 self.increments(k, &state.attitude).0
             });
-        let half_turn = self.earth_rate * (0.5 * period);
         for k in samples {
             let (increments, sensed) = self.increments(k, &state.attitude);
             let motion = increments.motion(&before);
             before = increments;
-
-            let in_start_frame = state.attitude * motion.velocity;
-            // The frame turns with the Earth while the sample lasts.
-            let change = in_start_frame - half_turn.cross(&in_start_frame);
-            let attitude = self.earth_turn * (state.attitude * exp(motion.rotation));
+            let (after, change) = self.moved(&state, &motion, &self.earth_turn, period);
             let step = Step {
                 before: state.attitude,
-                after: attitude,
+                after: after.attitude,
                 increments,
                 change,
                 sensed,
             };
             each(self, &step);
-
-            let coriolis = self.earth_rate.cross(&state.velocity) * 2.0;
-            let velocity = state.velocity + change + (self.gravity - coriolis) * period;
-            state.position += (state.velocity + velocity) * (0.5 * period);
-            state.velocity = velocity;
-            state.attitude = attitude;
+            state = after;
         }
         state.attitude = orthonormalised(&state.attitude);
         self.state = state;
+    }
+
+    /// The state after this motion over a time in which the Earth turns so, and the velocity change by
+    /// specific force.
+    #[inline]
+    fn moved(
+        &self,
+        from: &State,
+        motion: &Motion,
+        earth_turn: &Matrix3<f64>,
+        period: f64,
+    ) -> (State, Vector3<f64>) {
+        let in_start_frame = from.attitude * motion.velocity;
+        // The frame turns with the Earth meanwhile.
+        let half_turn = self.earth_rate * (0.5 * period);
+        let change = in_start_frame - half_turn.cross(&in_start_frame);
+        let coriolis = self.earth_rate.cross(&from.velocity) * 2.0;
+        let velocity = from.velocity + change + (self.gravity - coriolis) * period;
+        let state = State {
+            attitude: earth_turn * (from.attitude * exp(motion.rotation)),
+            velocity,
+            position: from.position + (from.velocity + velocity) * (0.5 * period),
+        };
+        (state, change)
     }
 
     fn block(&self, passage: Passage) -> Block {

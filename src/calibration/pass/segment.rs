@@ -128,12 +128,10 @@ impl Segment {
                     true => begin.attitude,
                     false => navigator.state.attitude,
                 };
-                segment
-                    .models
-                    .push(navigator.standing(&attitude, samples.clone()));
                 alike = (!bridged).then_some(samples.len());
+                segment.models.push(navigator.standing(&attitude, samples));
             }
-            navigator.stand(samples);
+            navigator.stand(&at_rest.sums);
             let computed = &navigator.state;
             let seen = problem.observed(step).filter_map(|kind| {
                 let (residual, readings) = match kind {

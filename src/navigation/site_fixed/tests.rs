@@ -272,3 +272,34 @@ fn an_interpolated_axis_adds_its_error_along_that_axis() {
         assert_relative_eq!(of_velocity, along(2, accel), epsilon = 0.33 * gyro + 1e-12);
     }
 }
+
+/// A body held by hand shakes about all axes out of step, and is shaken; its gyros have biases.
+#[test]
+fn sums_over_samples_at_rest_lead_where_the_samples_lead_but_for_higher_order() {
+    let attitude = start().attitude;
+    let wave = |k: usize, phase: f64| (0.7 * k as f64 + phase).sin();
+    let vector = |k: usize, p: f64| Vector3::new(wave(k, p), wave(k, p + 1.5), wave(k, p + 0.4));
+    let still = attitude.tr_mul(&-site().gravity_n()) * PERIOD;
+    let apart = |samples: Range<usize>, scale: f64| {
+        let mut triads = triads();
+        triads.gyro.bias *= scale;
+        let record = ImuSamples {
+            gyro: (0..24).map(|k| vector(k, 0.0) * (2e-4 * scale)).collect(),
+            accel: (0..24).map(|k| still + vector(k, 2.1) * 3e-3).collect(),
+            ..record()
+        };
+        let navigator = Navigator::new(&record, &site(), &triads, State::at_rest(attitude));
+        let (mut one, mut other) = (navigator.clone().unwrap(), navigator.unwrap());
+        one.advance(samples.clone());
+        other.stand(&crate::navigation::Sums::new(&record, samples));
+        let error = error(&other.state, &one.state);
+        [0, 3].map(|first| error.fixed_rows::<3>(first).norm())
+    };
+    for samples in [1..24, 5..15] {
+        let [whole, half] = [1.0, 0.5].map(|scale| apart(samples.clone(), scale));
+        // What second order moves: 3e-7 rad, and gravity on it 1e-4 m/s.
+        assert!(whole[0] < 1e-8 && whole[1] < 1e-5, "{whole:?}");
+        let orders = [0, 1].map(|k| (whole[k] / half[k]).log2());
+        assert!(orders[0] > 2.5 && orders[1] > 1.5, "{orders:?}");
+    }
+}
