@@ -37,9 +37,7 @@ impl Run {
     /// the files overlap. Samples, nominal scales and priors come back along right-front-up
     /// whatever `body_axes` says. A bias without a prior mean has the mean zero; no σ has a default.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            FileError::io(path, "read the run", &error, "Give the path of a run.toml.")
-        })?;
+        let text = text_of(path)?;
         let document = Document {
             file: path,
             text: &text,
@@ -113,9 +111,7 @@ impl Run {
     /// # Errors
     /// [`FileError`] if not even that can be read.
     pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            FileError::io(path, "read the run", &error, "Give the path of a run.toml.")
-        })?;
+        let text = text_of(path)?;
         let document = Document {
             file: path,
             text: &text,
@@ -128,6 +124,11 @@ impl Run {
         self.recording.notes.extend(notes);
         self
     }
+}
+
+fn text_of(path: &Path) -> Result<String, FileError> {
+    let advice = "Give the path of a run.toml.";
+    small_file::text(path).map_err(|error| FileError::io(path, "read the run", &error, advice))
 }
 
 /// What it means that stamps were taken and not `sample_period_s`.

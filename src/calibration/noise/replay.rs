@@ -1,8 +1,6 @@
 //! A pass with the linearisation held, of which navigation is done once and the filter as often as noise
 //! is tried.
 
-use nalgebra::Matrix3;
-
 use super::super::error::CalibrationError;
 use super::super::layout::Layout;
 use super::super::linearisation::{AttitudePrior, Linearisation};
@@ -13,9 +11,8 @@ use super::super::pass::{
     begin, moves, navigator, segments,
 };
 use super::super::problem::{Problem, Stretch};
-use super::super::schedule::{AtRest, Step};
-use crate::imu::{PerSensor, Sensor, Triad};
-use crate::navigation::{Block, Navigator, State};
+use crate::imu::{PerSensor, Sensor};
+use crate::navigation::{Block, State};
 
 /// What a pass does at one point of linearisation, whatever the noise.
 pub(super) struct Script<'a> {
@@ -93,16 +90,18 @@ impl<'a> Script<'a> {
                 for part in segments(&stretch.steps[begin..], true) {
                     next += part.len();
                     let of = (problem, stretch);
-                    let rest = Rest::new(
-                        &mut navigator,
-                        of,
-                        &part,
-                        &at.triads.accel,
-                        (first, &mut held),
-                    );
+                    let from = navigator.state;
+                    if let Some((_, at_rest)) = part.first() {
+                        navigator.state = at_rest.tied(&from, &at.triads.accel);
+                    }
+                    if first {
+                        held = navigator.state.attitude;
+                    }
                     events.push(Event::Rest(Box::new(Rest {
+                        first,
                         new_position: first && begin > 0,
-                        ..rest
+                        from,
+                        segment: Segment::navigate(&mut navigator, of, &part, true, &held),
                     })));
                     first = false;
                 }
@@ -161,30 +160,6 @@ impl<'a> Script<'a> {
             }
         }
         Ok(pass.replay)
-    }
-}
-
-impl Rest {
-    fn new(
-        navigator: &mut Navigator,
-        of: (&Problem, &Stretch),
-        steps: &[(&Step, &AtRest)],
-        accel: &Triad,
-        (first, held): (bool, &mut Matrix3<f64>),
-    ) -> Self {
-        let from = navigator.state;
-        if let Some((_, at_rest)) = steps.first() {
-            navigator.state = at_rest.tied(&from, accel);
-        }
-        if first {
-            *held = navigator.state.attitude;
-        }
-        Self {
-            first,
-            new_position: false,
-            from,
-            segment: Segment::navigate(navigator, of, steps, true, held),
-        }
     }
 }
 
