@@ -5,6 +5,7 @@ mod columns;
 mod motion;
 mod name;
 mod noise;
+mod streams;
 mod text;
 mod time;
 mod turns;
@@ -15,10 +16,11 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::formats::{FileError, Sheet};
-use crate::imu::PerSensor;
+use crate::imu::{PerSensor, Sensor};
 use crate::noise::NoiseFigures;
 use columns::Columns;
 use motion::Motion;
+use streams::Streams;
 use time::Clock;
 use units::Quantities;
 
@@ -30,6 +32,8 @@ const USUAL_PERIOD: f64 = 0.01;
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
+    /// Of a log of streams, and what they hold.
+    streams: Option<Streams>,
     /// The column that tells several instruments apart, with the number of the one that is taken.
     instance: Option<(usize, f64)>,
     columns: Columns,
@@ -51,8 +55,25 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if it cannot be read or has hardly any rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
-        let mut sheet = Sheet::read(path, FEWEST_ROWS)?;
-        let instance = columns::instance(&sheet);
+        Self::of_stream(path, None)
+    }
+
+    /// The same of one stream of a log of several.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read or has hardly any rows.
+    pub fn of_stream(path: &Path, stream: Option<&str>) -> Result<Self, FileError> {
+        match Streams::of_file(path, stream)? {
+            Some((streams, sheet)) => Ok(Self::of_sheet(sheet, Some(streams))),
+            None => Ok(Self::of_sheet(Sheet::read(path, FEWEST_ROWS)?, None)),
+        }
+    }
+
+    fn of_sheet(mut sheet: Sheet, streams: Option<Streams>) -> Self {
+        let instance = match streams {
+            Some(_) => None,
+            None => columns::instance(&sheet),
+        };
         if let Some((column, number)) = instance {
             sheet.retain(|columns, row| columns[column][row] == number);
         }
@@ -83,7 +104,11 @@ impl Draft {
             ))
         };
         let noise = triads.as_ref().and_then(noise).unwrap_or_default();
-        Ok(Self {
+        if let Some(streams) = streams.as_ref().filter(|streams| streams.accel.is_none()) {
+            columns.names = streams.columns(Sensor::Gyro);
+        }
+        Self {
+            streams,
             rest: motion.as_ref().map(|motion| motion.rest.amax()),
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
             instance,
@@ -92,7 +117,7 @@ impl Draft {
             quantities,
             offset,
             noise,
-        })
+        }
     }
 }
 
