@@ -7,6 +7,7 @@ mod calibrated;
 mod check;
 mod compare;
 mod completions;
+mod convert;
 mod demo;
 mod error_term;
 mod estimation;
@@ -66,6 +67,7 @@ enum Command {
     Study(study::Study),
     Merge(merge::Merge),
     Init(init::Init),
+    Convert(convert::Convert),
     Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
@@ -88,6 +90,7 @@ impl Cli {
             Command::Study(study) => study.run(),
             Command::Merge(merge) => merge.run(),
             Command::Init(init) => init.run(),
+            Command::Convert(convert) => convert.run(),
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),

@@ -59,14 +59,20 @@ impl Joined {
             Output::Rate => accel.clock.period,
             Output::Increment | Output::Pulse => 1.0,
         };
-        let courses = accel.courses(lag, seconds);
+        let courses = accel.courses(lag);
         let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
         let period = gyro.clock.period;
         let over = match output {
             Output::Rate => period,
             Output::Increment | Output::Pulse => 1.0,
         };
+        // Clocks that are one give values as they stand, to the last bit.
+        let factor = match (seconds / over - 1.0).abs() < 1e-9 {
+            true => 1.0,
+            false => seconds / over,
+        };
         let mut course = 0;
+        let mut weights = 0.0;
         for (k, &number) in gyro.clock.numbers.iter().enumerate() {
             let time = gyro.clock.first + number as f64 * period;
             let (begin, end) = (time - lag * period, time + (1.0 - lag) * period);
@@ -76,16 +82,15 @@ impl Joined {
             {
                 course += 1;
             }
-            let sums = courses
-                .get(course)
-                .and_then(|course| course.between(begin, end));
+            let course = courses.get(course);
             // Where one of both lacks samples, the row does.
-            let Some(sums) = sums else {
+            let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
                 continue;
             };
+            weights += weight;
             let mut row = vec![time];
             row.extend(gyro.columns.iter().map(|column| column[k]));
-            row.extend(sums.map(|sum| sum / over));
+            row.extend(sums.map(|sum| sum * factor));
             row.extend(gyro.temperature.get(k));
             rows.push(row);
         }
@@ -109,6 +114,7 @@ impl Joined {
         let mean = squares.fold([0.0; 3], |mean, of| {
             [0, 1, 2].map(|k| mean[k] + of[k] / count)
         });
+        let weight = weights / rows.len() as f64;
         let names = distinct(&PerSensor::from_fn(|sensor| parts.get(sensor).columns));
         let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
         let mut header = vec![TIME.to_owned()];
@@ -137,7 +143,7 @@ impl Joined {
             units,
             remarks,
             rows,
-            error: mean.map(f64::sqrt),
+            error: mean.map(|square| seconds * (weight * square).sqrt()),
             at: 0,
         })
     }
@@ -246,8 +252,8 @@ impl Track {
         })
     }
 
-    /// Samples that follow one another, as integrals; a value lasts so many seconds.
-    fn courses(&self, lag: f64, seconds: f64) -> Vec<Course> {
+    /// Samples that follow one another.
+    fn courses(&self, lag: f64) -> Vec<Course> {
         let Uniform {
             first,
             period,
@@ -266,7 +272,7 @@ impl Track {
             }
             if let Some(course) = courses.last_mut() {
                 for (sums, column) in course.sums.iter_mut().zip(&self.columns) {
-                    sums.push(column[k] * seconds);
+                    sums.push(column[k]);
                 }
             }
         }
@@ -274,7 +280,13 @@ impl Track {
     }
 }
 
-/// Integrals over samples without a gap.
+/// The product of the distances from the middle of two edges to the four of the cubic.
+const MIDWAY: f64 = 0.5625;
+
+/// Edges and periods nearer than this, in samples, are the same.
+const SAME: f64 = 1e-6;
+
+/// Samples without a gap, whose integrals are counted in values times samples.
 struct Course {
     begin: f64,
     period: f64,
@@ -290,31 +302,40 @@ impl Course {
         self.begin + self.len() as f64 * self.period
     }
 
-    /// The integrals between two times; none if they are not within.
-    fn between(&self, begin: f64, end: f64) -> Option<[f64; 3]> {
-        let place = |time: f64| (time - self.begin) / self.period;
+    /// The integrals between two times, and how much of the error midway between edges they have, squared; none if
+    /// the times are not within.
+    fn between(&self, begin: f64, end: f64) -> Option<([f64; 3], f64)> {
+        let place = |time: f64| {
+            let place = (time - self.begin) / self.period;
+            // Times are sums of many periods, which rounding leaves beside their edges.
+            match (place - place.round()).abs() < SAME {
+                true => place.round(),
+                false => place,
+            }
+        };
         let (from, to) = (place(begin), place(end));
-        // Times are sums of many periods, which rounding leaves at the last edge or beyond.
-        let slack = 1e-6;
         let last = self.len() as f64;
-        if from < -slack || to > last + slack {
+        if from < 0.0 || to > last {
             return None;
         }
-        let (from, to) = (from.clamp(0.0, last), to.clamp(0.0, last));
         let (first, behind) = (self.edge(from), self.edge(to));
-        Some(self.sums.each_ref().map(|sums| {
+        let sums = self.sums.each_ref().map(|sums| {
             let whole: f64 = sums[first..behind].iter().sum();
             whole + beyond(sums, behind, to - behind as f64)
                 - beyond(sums, first, from - first as f64)
-        }))
+        });
+        // What a cubic through the edges at −1, 0, 1 and 2 misses is as this product.
+        let u = to - behind as f64;
+        let weight = (1.0 + u) * u * (1.0 - u) * (2.0 - u) / MIDWAY;
+        Some((sums, weight * weight))
     }
 
     /// The edge at or before a place.
     fn edge(&self, place: f64) -> usize {
-        (place as usize).min(self.len() - 1)
+        (place as usize).min(self.len())
     }
 
-    /// Mean square error of the integral at an edge between two samples.
+    /// Mean square error of the integral midway between two edges.
     ///
     /// Every second edge is left out and interpolated from those beside it, and every fourth one from those two
     /// away. White noise alone, which the filter knows of, makes the square of what is missed grow as the distance

@@ -20,6 +20,7 @@ mod init;
 #[cfg(unix)]
 mod interrupted;
 mod learnt_noise;
+mod logs;
 mod lot;
 mod lot_slow;
 mod modules;
@@ -36,4 +37,5 @@ mod study;
 mod table1;
 mod terms;
 mod threads;
+mod two_clocks;
 mod velocity;

@@ -11,16 +11,20 @@ mod time;
 mod turns;
 mod units;
 
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::formats::{FileError, Sheet};
+use crate::formats::rows::Source;
+use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::NoiseFigures;
 use columns::Columns;
 use motion::Motion;
-use streams::Streams;
+use streams::{Streams, Written};
 use time::Clock;
 use units::Quantities;
 
@@ -67,6 +71,36 @@ impl Draft {
             Some((streams, sheet)) => Ok(Self::of_sheet(sheet, Some(streams))),
             None => Ok(Self::of_sheet(Sheet::read(path, FEWEST_ROWS)?, None)),
         }
+    }
+
+    /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory
+    /// that is there; a damaged log only if what is whole of it is to be used.
+    ///
+    /// # Errors
+    /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
+    pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
+        let Some(streams) = &mut self.streams else {
+            return Err(FileError::new(
+                log,
+                Place::File,
+                "rows of text",
+                "a log of another program",
+                "`turncal init` drafts a run.toml for it as it is.",
+            ));
+        };
+        let source = |stream| Source {
+            file: log.to_owned(),
+            stream: Some(stream),
+            salvage,
+        };
+        rows_as_text(&source(&streams.gyro), &directory.join(GYRO_FILE))?;
+        if let Some(accel) = &streams.accel {
+            rows_as_text(&source(accel), &directory.join(ACCEL_FILE))?;
+        }
+        let accel = streams.accel.is_some().then(|| ACCEL_FILE.to_owned());
+        streams.written = Some(Written { accel });
+        let path = directory.join("run.toml");
+        std::fs::write(&path, self.to_toml(GYRO_FILE)).map_err(|error| unwritten(&path, &error))
     }
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>) -> Self {
@@ -118,6 +152,53 @@ impl Draft {
             offset,
             noise,
         }
+    }
+}
+
+/// Of the gyros, and of accelerometers in the same stream.
+const GYRO_FILE: &str = "imu.csv.gz";
+const ACCEL_FILE: &str = "accelerometers.csv.gz";
+
+fn unwritten(path: &Path, error: &io::Error) -> FileError {
+    FileError::io(
+        path,
+        "write the file",
+        error,
+        "Make room or choose another place.",
+    )
+}
+
+/// Every column of a stream, with all digits.
+fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
+    let rows = RefCell::new(source.open()?);
+    let stopped = RefCell::new(None);
+    let content = |file: &mut dyn Write| -> io::Result<()> {
+        let mut rows = rows.borrow_mut();
+        let mut csv = csv::Writer::from_writer(file);
+        csv.write_record(rows.header())?;
+        let columns = rows.header().len();
+        loop {
+            match rows.advance() {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) => {
+                    *stopped.borrow_mut() = Some(error);
+                    break;
+                }
+            }
+            let field = |k| match rows.number(k) {
+                Ok(number) => number.to_string(),
+                Err(_) => String::new(),
+            };
+            csv.write_record((0..columns).map(field))?;
+        }
+        csv.flush()
+    };
+    let written = File::create(path).and_then(|file| write_rows(path, file, &content));
+    written.map_err(|error| unwritten(path, &error))?;
+    match stopped.into_inner() {
+        Some(error) => Err(error),
+        None => Ok(()),
     }
 }
 

@@ -26,6 +26,14 @@ pub(super) struct Streams {
     pub axes: Option<&'static str>,
     /// Where and why the file is damaged.
     pub damage: Option<String>,
+    /// The file of the accelerometers, where both triads were written as rows of text.
+    pub written: Option<Written>,
+}
+
+/// What rows of text a log was written as.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Written {
+    pub accel: Option<String>,
 }
 
 /// More columns of a stream are not listed.
@@ -61,6 +69,10 @@ impl Streams {
         };
         let with = |sensor: Sensor, other: bool| {
             let of = (0..found.len()).filter(is_meant).filter(|&k| {
+                // Streams are put together by their times.
+                if !other && places[k].time.is_none() {
+                    return false;
+                }
                 let triads = &places[k].triads;
                 let has_both = triads.gyro.is_some() && triads.accel.is_some();
                 triads.get(sensor).is_some() && (!other || has_both)
@@ -154,6 +166,7 @@ impl Streams {
             time: of_both,
             axes: found[gyro].stream.axes,
             damage: damage.map(|damage| damage.to_string()),
+            written: None,
             found,
         };
         Ok(Some((streams, sheet)))
@@ -173,39 +186,20 @@ impl Streams {
     /// What the log holds, and the keys that name what is taken of it.
     pub fn write(&self, text: &mut String) {
         // Writing to a string cannot fail.
-        let mut others = Vec::new();
-        for found in &self.found {
-            let Found { stream, samples } = found;
-            let Places { triads, .. } = Places::of(found);
-            if triads.gyro.is_none() && triads.accel.is_none() {
-                others.push(format!("{} ({samples})", one_line(&stream.name)));
-                continue;
-            }
-            let columns: Vec<&str> = stream.columns.iter().map(|column| &*column.name).collect();
-            let shown = columns
-                .iter()
-                .take(MOST_SHOWN)
-                .copied()
-                .collect::<Vec<_>>()
-                .join(", ");
-            let more = if columns.len() > MOST_SHOWN {
-                ", …"
-            } else {
-                ""
-            };
-            let _ = writeln!(
-                text,
-                "# {}: {samples} samples of {shown}{more}",
-                one_line(&stream.name)
-            );
+        if self.written.is_none() {
+            self.list(text);
+            let _ = writeln!(text, "stream = {}", quoted(&self.gyro));
         }
-        if !others.is_empty() {
-            let _ = writeln!(text, "# and samples of other kinds: {}", others.join(", "));
-        }
-        let _ = writeln!(text, "stream = {}", quoted(&self.gyro));
         if let Some(accel) = &self.accel {
             let (time, unit) = &self.time.accel;
-            let mut keys = format!("stream = {}, time = {}", quoted(accel), quoted(time));
+            let place = match &self.written {
+                None => format!("stream = {}", quoted(accel)),
+                Some(written) => format!(
+                    "file = {}",
+                    quoted(written.accel.as_deref().unwrap_or_default())
+                ),
+            };
+            let mut keys = format!("{place}, time = {}", quoted(time));
             if !unit.is_empty() {
                 let _ = write!(keys, ", time_unit = {}", quoted(unit));
             }
@@ -219,12 +213,37 @@ impl Streams {
                 let _ = writeln!(text, "# {}", one_line(remark));
             }
         }
-        if let Some(damage) = &self.damage {
+        if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
+            let damage = one_line(damage);
             let _ = writeln!(
                 text,
-                "# salvage = true  # TODO: take the # away to use what is whole. {}",
-                one_line(damage)
+                "# salvage = true  # TODO: take the # away to use what is whole. {damage}"
             );
+        }
+    }
+
+    /// What the log holds, a comment a stream.
+    fn list(&self, text: &mut String) {
+        let mut others = Vec::new();
+        for found in &self.found {
+            let Found { stream, samples } = found;
+            let Places { triads, .. } = Places::of(found);
+            if triads.gyro.is_none() && triads.accel.is_none() {
+                others.push(format!("{} ({samples})", one_line(&stream.name)));
+                continue;
+            }
+            let columns: Vec<&str> = stream.columns.iter().map(|column| &*column.name).collect();
+            let shown = &columns[..columns.len().min(MOST_SHOWN)];
+            let more = if columns.len() > MOST_SHOWN {
+                ", …"
+            } else {
+                ""
+            };
+            let (name, shown) = (one_line(&stream.name), one_line(&shown.join(", ")));
+            let _ = writeln!(text, "# {name}: {samples} samples of {shown}{more}");
+        }
+        if !others.is_empty() {
+            let _ = writeln!(text, "# and samples of other kinds: {}", others.join(", "));
         }
     }
 
