@@ -7,6 +7,7 @@
 mod catalogue;
 mod instrument;
 mod machine;
+mod thermal;
 mod trajectory;
 mod values;
 
@@ -17,6 +18,7 @@ use serde::de::DeserializeOwned;
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
+pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
 pub(crate) use values::{Finite, NonNegative, OneOrThree, Positive};
 
@@ -84,7 +86,9 @@ embed!(
     IMU,
     "imu",
     "industrial-mems",
+    "industrial-mems-warming",
     "navigation-fog",
+    "navigation-fog-warming",
     "paper",
     "paper-unsteady",
     "ring-laser",
@@ -125,6 +129,7 @@ embed!(
     "real-table",
     "single-axis",
     "two-axis",
+    "warming",
 );
 embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
 

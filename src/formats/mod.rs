@@ -25,6 +25,7 @@ mod sheet;
 mod small_file;
 mod specification;
 mod table_log;
+mod temperature;
 mod uniform;
 mod whole;
 mod write;
