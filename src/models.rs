@@ -35,14 +35,17 @@ pub enum Room {
     Path,
     /// Whole simulated runs.
     Scenario,
+    /// Recordings of one instrument, to be simulated.
+    Campaign,
     /// Trajectories to navigate along.
     Trajectory,
 }
 
 impl Room {
     /// All folders, those first that commands name most.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Scenario,
+        Self::Campaign,
         Self::Path,
         Self::Turntable,
         Self::Imu,
@@ -58,6 +61,7 @@ impl Room {
             Self::Turntable => "turntable",
             Self::Path => "path",
             Self::Scenario => "scenario",
+            Self::Campaign => "campaign",
             Self::Trajectory => "trajectory",
         }
     }
@@ -69,6 +73,7 @@ impl Room {
             Self::Turntable => TURNTABLE,
             Self::Path => PATH,
             Self::Scenario => SCENARIO,
+            Self::Campaign => CAMPAIGN,
             Self::Trajectory => TRAJECTORY,
         }
     }
@@ -116,6 +121,7 @@ embed!(
     "six-position",
     "three-axis",
     "three-axis-hour",
+    "three-axis-two-hours",
     "two-axis",
 );
 embed!(
@@ -130,7 +136,9 @@ embed!(
     "single-axis",
     "two-axis",
     "warming",
+    "warming-mems",
 );
+embed!(CAMPAIGN, "campaign", "days", "five-soaks", "ramp");
 embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
 
 /// Why a model cannot be had.

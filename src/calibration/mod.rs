@@ -48,6 +48,7 @@ mod schedule;
 mod solution;
 mod standstill;
 mod thermal;
+mod thermal_record;
 mod together;
 mod unexplained;
 
@@ -96,4 +97,8 @@ pub use result::{Calibration, Method, triads_of};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use solution::{Assessment, Solution};
 pub use thermal::{Coefficient, Thermal};
+pub use thermal_record::{
+    CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
+    TemperatureError, ThermalRecord, ValueRecord,
+};
 pub use together::{Alone, TemperatureOptions, Together};

@@ -2,11 +2,11 @@
 
 use crate::imu::{PerSensor, Sensor};
 
-/// Time between two knots, s: a hundred samples' noise averages out, and no instrument of more than a few
-/// grams changes by more than hundredths of a kelvin.
+/// Time between two knots, s.
 pub const SPACING: f64 = 1.0;
-/// Knots on each side that a rate is the slope of: half a minute, below the time constants of cases.
-const RATE_OVER: usize = 30;
+/// Knots on each side through which value and slope at a knot go: half a minute, below the time constants of
+/// cases, in which the noise of a sensor averages out.
+const OVER: usize = 30;
 
 /// Temperatures against time: one sensor for all axes, or several.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Temperature {
 /// One temperature sensor.
 #[derive(Debug, Clone, PartialEq)]
 struct Channel {
-    /// Means about the knots, °C.
+    /// At the knots, °C.
     values: Vec<f64>,
     /// Slopes at the knots, K/s.
     rates: Vec<f64>,
@@ -93,29 +93,25 @@ impl Temperature {
 
 impl Channel {
     fn new(values: Vec<f64>) -> Self {
-        let rates = (0..values.len()).map(|k| slope(&values, k));
-        Self {
-            rates: rates.collect(),
-            values,
-        }
+        let (values, rates) = (0..values.len()).map(|k| line(&values, k)).unzip();
+        Self { values, rates }
     }
 }
 
-/// Slope of the straight line through the knots about one, per s.
-fn slope(values: &[f64], knot: usize) -> f64 {
-    let over = knot.saturating_sub(RATE_OVER)..(knot + RATE_OVER + 1).min(values.len());
-    let middle = 0.5 * (over.start + over.end - 1) as f64;
-    let (mut sum, mut squares) = (0.0, 0.0);
+/// Value at a knot, and slope per s, of the straight line through the knots about it.
+fn line(values: &[f64], knot: usize) -> (f64, f64) {
+    let over = knot.saturating_sub(OVER)..(knot + OVER + 1).min(values.len());
+    let (count, middle) = (over.len() as f64, 0.5 * (over.start + over.end - 1) as f64);
+    let (mut sum, mut moment, mut squares) = (0.0, 0.0, 0.0);
     for k in over {
         let from = k as f64 - middle;
-        sum += from * values[k];
+        sum += values[k];
+        moment += from * values[k];
         squares += from * from;
     }
-    if squares > 0.0 {
-        sum / squares / SPACING
-    } else {
-        0.0
-    }
+    let slope = if squares > 0.0 { moment / squares } else { 0.0 };
+    let value = sum / count + slope * (knot as f64 - middle);
+    (value, slope / SPACING)
 }
 
 /// Between two knots on the straight line, beyond the ends as at the ends.

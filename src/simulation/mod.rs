@@ -3,6 +3,7 @@
 //! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its
 //! readings draw from generators of their own, so that changing one leaves the others as they were.
 
+mod campaign;
 mod increments;
 mod scenario;
 mod thermal;
@@ -12,11 +13,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+pub use campaign::SimulatedCampaign;
 pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::exp;
+use crate::calibration::ParameterVector;
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
 };
@@ -33,7 +36,8 @@ use crate::turntable::{Imperfection, Motion, Moves, TableError};
 pub struct Simulated {
     /// What a laboratory would have recorded.
     pub run: Run,
-    /// The instrument's true parameters.
+    /// The instrument's true parameters; where they change with temperature, those at the reference of
+    /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
     /// Those of its error terms.
     pub terms: TermVector,
@@ -43,6 +47,21 @@ pub struct Simulated {
     pub thermal: Option<ThermalTruth>,
     /// What a sample holds when the run is written to a file.
     pub output: Output,
+}
+
+impl Simulated {
+    /// The true triads at the mean temperature of the recording.
+    pub fn truth_here(&self) -> PerSensor<Triad> {
+        let imu = &self.run.recording.imu;
+        match (&self.thermal, &imu.temperature) {
+            (Some(thermal), Some(temperature)) => {
+                let middle = 0.5 * (imu.start() + imu.end());
+                let at = temperature.at(middle).gyro[0];
+                thermal.at(&self.truth, at, 0.0)
+            }
+            _ => self.truth,
+        }
+    }
 }
 
 /// What draws random numbers, each from a stream of its own.
@@ -91,10 +110,11 @@ impl Scenario {
     /// # Errors
     /// If the path is beyond the table.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
-        self.simulate_recording(seed, stream, stream)
+        self.simulate_recording(seed, stream, stream, &ParameterVector::zeros())
     }
 
-    /// The same of the instrument of one stream with all else from another, as of one of its recordings.
+    /// The same of the instrument of one stream with all else from another, as of one of its recordings, in which
+    /// its parameters differ by `own`.
     ///
     /// # Errors
     /// If the path is beyond the table.
@@ -103,6 +123,7 @@ impl Scenario {
         seed: u64,
         instrument: u64,
         stream: u64,
+        own: &ParameterVector,
     ) -> Result<Simulated, TableError> {
         let mut rng = Draws::Imperfection.generator(seed, stream);
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
@@ -118,6 +139,7 @@ impl Scenario {
             };
             self.draw_truth(sensor, &mut draws.generator(seed, instrument))
         });
+        let truth = campaign::changed(truth, own);
         let thermal = self.instrument.thermal.as_ref().map(|variation| {
             let mut rng = Draws::thermal(seed, instrument);
             let form = self.installation.form;

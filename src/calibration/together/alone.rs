@@ -36,6 +36,14 @@ pub struct Alone {
     pub(super) initial_attitudes: Vec<Matrix3<f64>>,
 }
 
+impl Alone {
+    /// Mean temperature of all axes over its dwells, °C.
+    pub fn mean_temperature(&self) -> Option<f64> {
+        let PerSensor { gyro, accel } = self.temperature?;
+        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
+    }
+}
+
 /// Each recording alone, on as many threads as there are.
 pub(super) fn each(problem: &Problem) -> Result<Vec<Alone>, CalibrationError> {
     let runs = problem.runs().count();
