@@ -7,11 +7,12 @@ use super::clock::{Clock, Stamp, Stamps};
 use super::error::FileError;
 use super::joined::{self, Joined, Part};
 use super::rows::{LogRows, Source};
+use super::temperature::{TemperatureColumns, Temperatures};
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
+use crate::recording::stretches_between;
 use crate::recording::{ColumnFacts, FileColumn, ImuSamples, LogFacts, NamedColumns};
-use crate::recording::{TemperatureFacts, stretches_between};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
@@ -51,7 +52,7 @@ pub(super) struct ImuLog<'a> {
     /// Of rows of several instruments those that have this number in this column.
     pub instance: Option<(&'a str, f64)>,
     pub triads: PerSensor<[&'a str; 3]>,
-    pub temperature: Option<&'a str>,
+    pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
     pub axes: BodyAxes,
     pub stamp: TimeStamp,
@@ -70,7 +71,7 @@ struct Content {
     columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     duplicates: Vec<(usize, u64)>,
-    temperature: Option<TemperatureFacts>,
+    temperature: Option<Temperatures>,
     clock: Uniform,
     /// Of the integrals of the accelerometers' columns, in their unit times s.
     integral_error: [f64; 3],
@@ -89,6 +90,8 @@ impl ImuLog<'_> {
             clock,
             integral_error,
         } = self.content(notes)?;
+        let mut temperature = temperature.map(|t| t.read(&self.source.file.display().to_string()));
+        notes.extend(temperature.iter_mut().flat_map(|t| t.notes.drain(..)));
         let samples = clock.numbers.last().map_or(0, |last| last + 1);
         notes.extend(stamps.lost_count(samples - clock.numbers.len()));
         let stamps = stamps.of_rows;
@@ -164,6 +167,7 @@ impl ImuLog<'_> {
             pulse,
             faults,
             bridges,
+            temperature: temperature.as_mut().and_then(|t| t.temperature.take()),
             log: Some(LogFacts {
                 rows: count,
                 jitter_rms: clock.jitter_rms,
@@ -173,10 +177,10 @@ impl ImuLog<'_> {
                 named: NamedColumns {
                     time: self.clock_of_rows().column.map(str::to_owned),
                     triads,
-                    temperature: self.temperature.map(str::to_owned),
+                    temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
                     axes: self.axes.order(),
                 },
-                temperature,
+                temperature: temperature.as_ref().and_then(|t| t.facts),
             }),
         })
     }
@@ -191,13 +195,16 @@ impl ImuLog<'_> {
                 source: &self.source,
                 clock: self.clock,
                 columns: self.triads.gyro,
-                temperature: self.temperature,
+                further: self
+                    .temperature
+                    .as_ref()
+                    .map_or(&[], |columns| columns.names()),
             },
             accel: Part {
                 source,
                 clock: *clock,
                 columns: self.triads.accel,
-                temperature: None,
+                further: &[],
             },
         };
         Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::joined)
@@ -229,7 +236,11 @@ impl ImuLog<'_> {
             accel: triad(&names.accel)?,
         };
         let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
-        let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
+        let temperature = self
+            .temperature
+            .as_ref()
+            .map(|columns| columns.start(&mut csv));
+        let mut temperature = temperature.transpose()?;
 
         let instance = match self.instance {
             Some((name, number)) => Some((csv.column(name)?, number)),
@@ -238,7 +249,6 @@ impl ImuLog<'_> {
         let mut blank = 0;
         let mut columns = [const { Vec::new() }; 6];
         let mut duplicates = Vec::new();
-        let mut temperatures = Vec::new();
         let mut before = [f64::NAN; 6];
         while csv.advance()? && !csv.may_be_cut() {
             if let Some((place, number)) = instance
@@ -268,8 +278,9 @@ impl ImuLog<'_> {
             for (column, value) in columns.iter_mut().zip(row) {
                 column.push(value);
             }
-            if let Some(place) = temperature {
-                temperatures.push(csv.number(place)?);
+            if let (Some(temperature), Some(&(time, _))) = (&mut temperature, stamps.of_rows.last())
+            {
+                temperature.take(&csv, time);
             }
         }
         notes.extend(csv.cut_off("It is left out"));
@@ -299,7 +310,7 @@ impl ImuLog<'_> {
             },
             columns,
             duplicates,
-            temperature: TemperatureFacts::of(&temperatures),
+            temperature,
         })
     }
 

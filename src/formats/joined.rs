@@ -21,7 +21,8 @@ pub(super) struct Part<'a> {
     pub source: &'a Source<'a>,
     pub clock: Clock<'a>,
     pub columns: [&'a str; 3],
-    pub temperature: Option<&'a str>,
+    /// Columns that are passed on as they are.
+    pub further: &'a [&'a str],
 }
 
 /// Both streams at one row of the gyros' clock.
@@ -30,7 +31,7 @@ pub(super) struct Joined {
     header: Vec<String>,
     units: Vec<String>,
     remarks: Vec<String>,
-    /// Time, gyros, accelerometers, temperature.
+    /// Time, gyros, accelerometers, further columns of the gyros' stream.
     rows: Vec<Vec<f64>>,
     error: [f64; 3],
     /// Rows given out, with this one.
@@ -91,7 +92,7 @@ impl Joined {
             let mut row = vec![time];
             row.extend(gyro.columns.iter().map(|column| column[k]));
             row.extend(sums.map(|sum| sum * factor));
-            row.extend(gyro.temperature.get(k));
+            row.extend(gyro.further.iter().map(|column| column[k]));
             rows.push(row);
         }
         let file = parts.gyro.source.file.clone();
@@ -119,7 +120,7 @@ impl Joined {
         let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
         let mut header = vec![TIME.to_owned()];
         header.extend(names.gyro.iter().chain(&names.accel).map(bare));
-        header.extend(parts.gyro.temperature.map(str::to_owned));
+        header.extend(parts.gyro.further.iter().map(|&name| name.to_owned()));
         let mut units = vec!["s".to_owned()];
         units.extend(gyro.units.iter().chain(&accel.units).cloned());
         units.resize(header.len(), String::new());
@@ -195,7 +196,7 @@ fn rounded(value: f64) -> f64 {
 struct Track {
     clock: Uniform,
     columns: [Vec<f64>; 3],
-    temperature: Vec<f64>,
+    further: Vec<Vec<f64>>,
     units: [String; 3],
     remarks: Vec<String>,
 }
@@ -208,10 +209,11 @@ impl Track {
         for (place, name) in places.iter_mut().zip(part.columns) {
             *place = rows.signed_column(name)?.0;
         }
-        let temperature = part.temperature.map(|name| rows.column(name)).transpose()?;
+        let further = part.further.iter().map(|name| rows.column(name));
+        let further: Vec<usize> = further.collect::<Result<_, FileError>>()?;
+        let mut others = vec![Vec::new(); further.len()];
         let units = places.map(|k| rows.units().map_or(String::new(), |units| units[k].clone()));
         let mut columns = [const { Vec::new() }; 3];
-        let mut temperatures = Vec::new();
         let mut before = [f64::NAN; 3];
         while rows.advance()? && !rows.may_be_cut() {
             if places.iter().all(|&place| rows.is_blank(place)) {
@@ -229,8 +231,8 @@ impl Track {
             for (column, value) in columns.iter_mut().zip(row) {
                 column.push(value);
             }
-            if let Some(place) = temperature {
-                temperatures.push(rows.number(place)?);
+            for (column, &place) in others.iter_mut().zip(&further) {
+                column.push(rows.number(place).unwrap_or(f64::NAN));
             }
         }
         if stamps.of_rows.len() < 2 {
@@ -246,7 +248,7 @@ impl Track {
         Ok(Self {
             clock: clock.map_err(|error| rows.placed(error))?,
             columns,
-            temperature: temperatures,
+            further: others,
             units,
             remarks,
         })

@@ -11,6 +11,7 @@ mod closed_form;
 mod compare;
 mod door;
 mod error_terms;
+mod exits;
 mod export;
 mod faults;
 mod features;

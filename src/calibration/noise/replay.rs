@@ -5,10 +5,9 @@ use super::super::error::CalibrationError;
 use super::super::layout::Layout;
 use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::model::Model;
-use super::super::parameters::to_vector;
 use super::super::pass::{
-    Filter, Innovations, Measurement, Observer, ScalarInnovation, Seen, Segment, Taken, Verdict,
-    begin, moves, navigator, segments,
+    Filter, Innovations, Measurement, Observer, PriorErrors, ScalarInnovation, Seen, Segment,
+    Taken, Verdict, begin, moves, navigator, segments,
 };
 use super::super::problem::{Problem, Stretch};
 use crate::imu::{PerSensor, Sensor};
@@ -72,7 +71,7 @@ impl<'a> Script<'a> {
         let layout = Layout::new(&problem.model);
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
         let events = stretches.map(|(stretch, initial)| {
-            let mut navigator = navigator(stretch, at, initial, &layout)?;
+            let mut navigator = navigator(stretch, at, initial, (&problem.model, &layout))?;
             let mut held = *initial;
             let mut events = Vec::new();
             let mut next = 0;
@@ -91,8 +90,9 @@ impl<'a> Script<'a> {
                     next += part.len();
                     let of = (problem, stretch);
                     let from = navigator.state;
-                    if let Some((_, at_rest)) = part.first() {
-                        navigator.state = at_rest.tied(&from, &at.triads.accel);
+                    if let (Some((begin, at_rest)), Some((end, _))) = (part.first(), part.last()) {
+                        navigator.warm(&(begin.samples.start..end.samples.end));
+                        navigator.state = at_rest.tied(&from, &navigator.triads().accel);
                     }
                     if first {
                         held = navigator.state.attitude;
@@ -135,11 +135,10 @@ impl<'a> Script<'a> {
     /// three components whether it is let in; those beyond its end are.
     pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
         let model = &problem.model;
-        let parameters = model.prior_mean - to_vector(&self.at.triads);
         let mut pass = Pass {
             model,
             accepted,
-            filter: Filter::new(model, &parameters, &-self.at.terms),
+            filter: Filter::new(model, &PriorErrors::at(model, self.at)),
             replay: Replay {
                 scalars: Vec::new(),
                 distances: Vec::new(),
@@ -150,7 +149,7 @@ impl<'a> Script<'a> {
         let of_each = self.events.iter().zip(&self.at.initial_attitudes);
         for ((stretch, prior), (events, initial)) in stretches.zip(of_each) {
             let start = stretch.start(prior, initial);
-            begin(&mut pass.filter, model, before, stretch, &start);
+            begin(&mut pass.filter, model, before, stretch, &start, self.at);
             before = Some(stretch);
             for event in events {
                 match event {

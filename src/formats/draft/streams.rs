@@ -143,7 +143,7 @@ impl Streams {
                             period: None,
                         },
                         columns: triad.map(|k_of| &*found[k].stream.columns[k_of].name),
-                        temperature: None,
+                        further: &[],
                     }
                 };
                 let parts = PerSensor::from_fn(part);
