@@ -127,6 +127,10 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         auxiliary: held.auxiliary,
         thermal: held.thermal,
         own: held.own,
+        warming: match problem.model.thermal {
+            Some(_) => problem.warming(),
+            None => Vec::new(),
+        },
         alone,
         gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
         linearised_at: held.at,

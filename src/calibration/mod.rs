@@ -101,4 +101,4 @@ pub use thermal_record::{
     CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
     TemperatureError, ThermalRecord, ValueRecord,
 };
-pub use together::{Alone, TemperatureOptions, Together};
+pub use together::{Alone, Repeatability, TemperatureOptions, Together};

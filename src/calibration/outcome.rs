@@ -47,6 +47,8 @@ pub struct Outcome {
     pub own: Vec<Own>,
     /// What each recording alone says, where something differs between recordings or temperatures.
     pub alone: Vec<Alone>,
+    /// Mean temperature of each dwell in °C and its rate in K/s; empty where nothing follows temperature.
+    pub warming: Vec<(f64, f64)>,
     /// Gravity and its 1σ after the run, m/s².
     pub gravity: (f64, f64),
     /// What the run showed of the parameters and what it left as it was.

@@ -172,6 +172,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         thermal: None,
         own: Vec::new(),
         alone: Vec::new(),
+        warming: Vec::new(),
         gravity: (run.site.gravity, 0.0),
         aiding: run.aiding(),
         prior_attitudes: vec![AttitudePrior {

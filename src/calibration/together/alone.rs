@@ -12,11 +12,14 @@ use super::super::model::Model;
 use super::super::parameters::{ParameterVector, parameter};
 use super::super::problem::Problem;
 use super::solved;
-use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalState};
+use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange, ThermalState};
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
 /// more.
 const BEYOND_NOISE: f64 = 10.0;
+
+/// A recording within this part of the range is at one temperature.
+const PART_OF_RANGE: f64 = 0.1;
 
 /// What a recording alone says.
 #[derive(Debug, Clone)]
@@ -94,8 +97,16 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
         priors,
         initial_attitudes,
     };
-    Ok(match from_coarse_start(&plain, &|_| {}) {
-        Ok(solved) => alone(
+    // What changes within a recording has no calibration without its change.
+    let range = thermal.as_ref().map(|thermal| thermal.range);
+    let whole = range.map_or(f64::INFINITY, |range| {
+        let span = |range: &ThermalRange| range.highest - range.lowest;
+        span(&range.gyro).max(span(&range.accel))
+    });
+    let stands = span < PART_OF_RANGE * whole;
+    let solved = stands.then(|| from_coarse_start(&plain, &|_| {}));
+    Ok(match solved {
+        Some(Ok(solved)) => alone(
             super::super::parameters::to_vector(&solved.iterated.held.estimate.triads),
             solved.priors,
             solved.iterated.held.estimate.initial_attitudes.clone(),
@@ -104,7 +115,7 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
                 covariance: solved.iterated.held.covariance,
             }),
         ),
-        Err(_) => {
+        _ => {
             let start = coarse_start(&plain)?;
             alone(
                 super::super::parameters::to_vector(&start.at.triads),

@@ -7,6 +7,7 @@
 
 mod alone;
 mod order;
+mod repeat;
 mod temperatures;
 
 use std::sync::Arc;
@@ -22,13 +23,14 @@ use super::options::Options;
 use super::outcome::Pass;
 use super::parameters::{ParameterVector, parameter};
 use super::pass::Gate;
-use super::problem::Problem;
+use super::problem::{Problem, Stretch};
 use crate::imu::{
     HIGHEST_ORDER, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, RATE, Sensor,
     ThermalCoefficients, ThermalModel, ThermalRange, Triad,
 };
 use crate::run::Run;
 pub use alone::Alone;
+pub use repeat::Repeatability;
 use temperatures::Temperatures;
 
 /// What recordings of one instrument have in common, and what not.
@@ -98,6 +100,26 @@ impl<'a> Problem<'a> {
             model.thermal = temperatures.model(&problem, options).map(Arc::new);
         }
         Ok(problem.with_model(model))
+    }
+
+    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known.
+    pub(super) fn warming(&self) -> Vec<(f64, f64)> {
+        let of_stretch = |stretch: &Stretch| {
+            let imu = &stretch.run.recording.imu;
+            let mean =
+                |all: PerSensor<[f64; 3]>| all.gyro.iter().chain(&all.accel).sum::<f64>() / 6.0;
+            let dwells = stretch.dwells.iter();
+            dwells
+                .map(|dwell| {
+                    let (from, to) = (imu.time(dwell.samples.start), imu.time(dwell.samples.end));
+                    let middle = 0.5 * (from + to);
+                    imu.temperature.as_ref().map_or((f64::NAN, f64::NAN), |t| {
+                        (mean(t.at(middle)), mean(t.rate(middle)))
+                    })
+                })
+                .collect::<Vec<_>>()
+        };
+        self.stretches().iter().flat_map(of_stretch).collect()
     }
 
     /// Whether anything in it differs between recordings or temperatures.

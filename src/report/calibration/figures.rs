@@ -27,12 +27,16 @@ impl Report<'_> {
             (None, &[(_, closed), (_, filter)]) => Some(methods::differences(closed, filter)),
             _ => None,
         });
-        if let Some(outcome) = self.outcome {
+        // Recordings have each their own time.
+        let one = |outcome: &&Outcome| outcome.alone.len() < 2;
+        if let Some(outcome) = self.outcome.filter(one) {
             plots.extend(self.sigma(outcome));
             plots.extend(self.estimates(outcome));
             plots.extend(self.innovations(outcome));
         }
-        plots.push(path::figure(self));
+        if self.outcome.as_ref().is_none_or(one) {
+            plots.push(path::figure(self));
+        }
         plots.extend(self.estimate().and_then(correlation));
         plots
     }

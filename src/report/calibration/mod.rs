@@ -6,6 +6,7 @@ mod methods;
 mod path;
 mod report;
 mod tables;
+mod temperature;
 #[cfg(test)]
 mod tests;
 
@@ -34,6 +35,7 @@ impl Report<'_> {
                 .map_or_else(Table::default, |of| tables::residuals(of, self.table())),
         );
         if let Some(outcome) = self.outcome {
+            temperature::add(&mut document, outcome);
             document.page(tables::consistency(outcome));
             document.page(tables::passes(outcome));
             document.both(effects::costs(self.effects));
@@ -59,12 +61,18 @@ impl Report<'_> {
     /// What ran on what.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
-        let mut run = format!(
-            "Run {}: {} s, {} samples at {} Hz, {} dwells; body frame: {}",
-            self.run.recording.name,
-            value(imu.duration(), 10.0),
-            count(imu.len()),
-            three_digits(1.0 / imu.period),
+        let mut run = match self.outcome.map_or(0, |outcome| outcome.alone.len()) {
+            0 | 1 => format!(
+                "Run {}: {} s, {} samples at {} Hz",
+                self.run.recording.name,
+                value(imu.duration(), 10.0),
+                count(imu.len()),
+                three_digits(1.0 / imu.period),
+            ),
+            recordings => format!("Campaign of {recordings} recordings of one instrument"),
+        };
+        run += &format!(
+            ", {} dwells; body frame: {}",
             self.dwells.len(),
             self.body_frame.words(),
         );
