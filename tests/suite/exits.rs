@@ -252,7 +252,8 @@ fn gazebo_makes_the_raw_output_but_for_what_its_file_states() {
     let (remarks, body) = text.split_once("-->").unwrap();
     assert!(!remarks[4..].contains("--"));
     let all = |key: &str| -> Vec<f64> {
-        let parts = body.split(&format!("<{key}>")).skip(1);
+        let mark = format!("<{key}>");
+        let parts = body.split(&mark).skip(1);
         parts
             .map(|part| part.split('<').next().unwrap().parse().unwrap())
             .collect()

@@ -295,7 +295,7 @@ fn kalibrs_equations_measure_the_raw_output_of_the_test_vectors() {
 #[test]
 fn kalibr_holds_g_sensitivity_and_names_the_terms_that_it_does_not_hold() {
     let record = with_terms(record());
-    let Exported { text, notes } = exported(&record, Format::Kalibr);
+    let Exported { text, notes, .. } = exported(&record, Format::Kalibr);
     let divisors = divisors(&text);
     let [rate, force] = halves(&INPUTS[2]);
     let sensed = rate + Vector3::new(3e-7 * force.y, 0.0, -2e-7 * force.z);
@@ -341,7 +341,7 @@ fn kf_gins_compensates(text: &str, n: [Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
 #[test]
 fn kf_gins_gives_the_test_vectors_but_for_the_misalignment_that_the_file_states() {
     let record = record();
-    let Exported { text, notes } = exported(&record, Format::KfGins);
+    let Exported { text, notes, .. } = exported(&record, Format::KfGins);
     // The largest off-diagonal entry, of gyro y.
     assert!(
         notes[0].contains(&format!("{:.1} arcsec", 1.3e-3 / ARCSEC)),

@@ -102,18 +102,46 @@ impl Input {
 pub(super) struct Slice<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where the first of them is in the file.
+    /// Where the first of them is in the file …
     base: u64,
+    /// … or all of them, where they were packed.
+    is_packed: bool,
 }
 
 impl<'a> Slice<'a> {
     pub fn new(bytes: &'a [u8], base: u64) -> Self {
-        Self { bytes, at: 0, base }
+        Self {
+            bytes,
+            at: 0,
+            base,
+            is_packed: false,
+        }
+    }
+
+    /// Bytes that were packed into something at this place of the file.
+    pub fn packed(bytes: &'a [u8], place: u64) -> Self {
+        Self {
+            is_packed: true,
+            ..Self::new(bytes, place)
+        }
+    }
+
+    /// Some of these bytes, which are at this place.
+    pub fn of(&self, bytes: &'a [u8], place: u64) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            base: place,
+            is_packed: self.is_packed,
+        }
     }
 
     /// Where the next byte is in the file.
     pub fn offset(&self) -> u64 {
-        self.base + self.at as u64
+        match self.is_packed {
+            true => self.base,
+            false => self.base + self.at as u64,
+        }
     }
 
     /// Bytes read so far.

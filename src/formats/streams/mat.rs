@@ -64,7 +64,7 @@ pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
             COMPRESSED => {
                 let unpacked = unpack(&bytes, offset, big_endian)?;
                 matrix(
-                    Bytes::new(&unpacked, offset + 8, big_endian),
+                    Bytes::packed(&unpacked, offset, big_endian),
                     "",
                     0,
                     &mut arrays,
@@ -129,6 +129,13 @@ impl<'a> Bytes<'a> {
     fn new(bytes: &'a [u8], offset: u64, big_endian: bool) -> Self {
         Self {
             slice: Slice::new(bytes, offset),
+            big_endian,
+        }
+    }
+
+    fn packed(bytes: &'a [u8], place: u64, big_endian: bool) -> Self {
+        Self {
+            slice: Slice::packed(bytes, place),
             big_endian,
         }
     }
@@ -252,7 +259,10 @@ fn matrix(
                 let field = format!("{name}.{}", String::from_utf8_lossy(&field[..end]));
                 let element = bytes.element("a field")?;
                 if element.kind == MATRIX {
-                    let content = Bytes::new(element.bytes, element.offset, big_endian);
+                    let content = Bytes {
+                        slice: bytes.slice.of(element.bytes, element.offset),
+                        big_endian,
+                    };
                     matrix(content, &field, depth + 1, arrays)?;
                 }
             }

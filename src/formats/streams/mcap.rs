@@ -102,7 +102,7 @@ impl Mcap {
     /// Takes the next record, from the chunk if one is open; its opcode, or none at the end of the data.
     fn next_record(&mut self) -> Result<Option<u8>, Broken> {
         if self.at < self.chunk.len() {
-            let mut chunk = Slice::new(&self.chunk[self.at..], self.offset);
+            let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             let kind = chunk.whole(1, "a record's kind")? as u8;
             let length = chunk.length(8, "a record's length")?;
             let content = chunk.take(length, "a record of a chunk")?;
@@ -163,7 +163,7 @@ impl Mcap {
     }
 
     fn schema(&mut self) -> Result<(), Broken> {
-        let mut record = Slice::new(&self.record, self.offset);
+        let mut record = Slice::packed(&self.record, self.offset);
         let number = record.whole(2, "a schema's number")? as u16;
         let length = record.length(4, "a length")?;
         let name = record.text(length, "a schema's name")?;
@@ -181,7 +181,7 @@ impl Mcap {
     }
 
     fn channel(&mut self) -> Result<(), Broken> {
-        let mut record = Slice::new(&self.record, self.offset);
+        let mut record = Slice::packed(&self.record, self.offset);
         let number = record.whole(2, "a channel's number")? as u16;
         let schema = record.whole(2, "a schema's number")? as u16;
         let length = record.length(4, "a length")?;
@@ -210,7 +210,7 @@ impl Mcap {
     }
 
     fn message(&mut self) -> Result<Option<usize>, Broken> {
-        let mut record = Slice::new(&self.record, self.offset);
+        let mut record = Slice::packed(&self.record, self.offset);
         let channel = record.whole(2, "a channel's number")? as u16;
         record.take(4, "a message's number")?;
         let time = record.whole(8, "a time")?;

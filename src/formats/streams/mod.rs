@@ -205,3 +205,6 @@ impl Broken {
         FileError::new(file, place, &self.found, &self.expected, advice)
     }
 }
+
+#[cfg(all(test, feature = "logs"))]
+mod tests;

@@ -110,7 +110,7 @@ impl Bag {
     /// Takes the next record, from the chunk if one is open; false at the end.
     fn next_record(&mut self) -> Result<bool, Broken> {
         if self.at < self.chunk.len() {
-            let mut chunk = Slice::new(&self.chunk[self.at..], self.offset);
+            let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             for part in [&mut self.head, &mut self.data] {
                 let length = chunk.length(4, "a length")?;
                 part.clear();
@@ -169,7 +169,7 @@ struct Head<'a> {
 
 impl<'a> Head<'a> {
     fn of(bytes: &'a [u8], offset: u64) -> Result<Self, Broken> {
-        let mut slice = Slice::new(bytes, offset);
+        let mut slice = Slice::packed(bytes, offset);
         let mut fields = Vec::new();
         while slice.left() > 0 {
             let length = slice.length(4, "the length of a field")?;

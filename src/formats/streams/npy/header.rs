@@ -29,7 +29,11 @@ struct Field {
 
 impl Header {
     pub fn read(bytes: &[u8], offset: u64) -> Result<Self, Broken> {
-        let mut file = Slice::new(bytes, offset);
+        // A member of an archive may be packed; a file by itself is not.
+        let mut file = match offset {
+            0 => Slice::new(bytes, 0),
+            _ => Slice::packed(bytes, offset),
+        };
         file.take(6, "an array's first bytes")?;
         let version = file.whole(1, "the version")?;
         file.take(1, "the version")?;
@@ -87,7 +91,7 @@ impl Header {
         let needed = all.and_then(|all| all.checked_mul(self.size));
         if needed.is_none_or(|needed| needed > data.len()) {
             return Err(Broken::new(
-                offset + bytes.len() as u64,
+                offset,
                 format_args!("{} bytes of the array `{name}`", data.len()),
                 format_args!("items of {} bytes by its shape {:?}", self.size, self.shape),
             ));
@@ -109,13 +113,7 @@ impl Header {
                     let at = item.checked_mul(self.size)?.checked_add(place)?;
                     kind.number(data.get(at..)?, big_endian)
                 };
-                let found = columns(
-                    &named,
-                    &self.shape,
-                    self.first_is_fastest,
-                    offset + self.begin as u64,
-                    number,
-                )?;
+                let found = columns(&named, &self.shape, self.first_is_fastest, offset, number)?;
                 arrays.extend(found);
             }
         }
