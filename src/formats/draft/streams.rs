@@ -3,13 +3,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::FEWEST_ROWS;
+use super::columns::Columns;
 use super::name::Name;
 use super::text::{line, quoted};
+use super::{FEWEST_ROWS, time};
 use crate::formats::clock::{Clock, TimeUnit};
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::{LogRows, Source};
-use crate::formats::streams::{self, Found};
+use crate::formats::streams::{self, Column, Found};
 use crate::formats::{FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
@@ -112,15 +113,23 @@ impl Streams {
             stream: Some(&found[k].stream.name),
             salvage,
         };
-        let time = |k: usize| {
+        let time_of = |k: usize| {
             let place = places[k].time.unwrap_or(0);
             let column = &found[k].stream.columns[place];
             (column.name.clone(), column.unit)
         };
-        let of_both = PerSensor {
-            gyro: time(gyro),
-            accel: time(accel.unwrap_or(gyro)),
+        let mut of_both = PerSensor {
+            gyro: time_of(gyro),
+            accel: time_of(accel.unwrap_or(gyro)),
         };
+        if let Some(accel) = accel {
+            for (k, sensor) in [(gyro, Sensor::Gyro), (accel, Sensor::Accel)] {
+                let (name, unit) = of_both.get_mut(sensor);
+                if unit.is_empty() {
+                    *unit = unit_of(&source(k), name)?;
+                }
+            }
+        }
         let mut sheet = match accel {
             None => Sheet::of(source(gyro).open()?, FEWEST_ROWS)?,
             Some(accel) => {
@@ -255,6 +264,14 @@ impl Streams {
     }
 }
 
+/// The word for the unit of a column of time, by its steps.
+fn unit_of(source: &Source, name: &str) -> Result<&'static str, FileError> {
+    let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
+    let mut columns = Columns::find(&sheet);
+    columns.time = sheet.names.iter().position(|known| known == name);
+    Ok(time::Clock::find(&sheet, &mut columns).unit)
+}
+
 /// One of two streams that are one record.
 pub(super) struct Member<'a> {
     pub source: &'a Source<'a>,
@@ -338,9 +355,15 @@ impl Places {
             })
         });
         let best = (0..all.len()).rev().max_by_key(|&k| all[k].is_time());
+        let named = best.filter(|&k| all[k].is_time() > 1);
+        // `t_gyro`, `imu.t`
+        let has_word = |column: &Column| {
+            let mut words = column.name.split(|c: char| !c.is_alphanumeric());
+            words.any(|word| ["t", "ts"].contains(&word))
+        };
         Self {
             triads,
-            time: best.filter(|&k| all[k].is_time() > 1),
+            time: named.or_else(|| found.stream.columns.iter().position(has_word)),
         }
     }
 }

@@ -96,12 +96,16 @@ fn look(file: &Path) -> Result<Looked, FileError> {
         }
     };
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    // As PX4's ulog2csv calls its files.
+    let is_of_px4 = ["sensor_gyro_", "sensor_accel_"]
+        .iter()
+        .any(|topic| stem.contains(topic));
     let stream = Stream {
         name: stem.into_owned(),
         columns: sheet.names.iter().zip(&sheet.units).map(column).collect(),
         remarks: Vec::new(),
         is_inertial: true,
-        axes: None,
+        axes: is_of_px4.then_some("frd"),
     };
     let samples = sheet.columns.first().map_or(0, Vec::len) as u64;
     Ok((Found { stream, samples }, time))

@@ -157,7 +157,7 @@ fn every_format_gives_the_calibration_of_the_text() {
         [of(&calibration.gyro), of(&calibration.accel)].concat()
     };
     let expected = calibrated(&record.join("run.toml"));
-    let sigma = expected.sigma.clone().unwrap();
+    let sigma = expected.sigma.as_ref().unwrap();
     let sigma = values(&Calibration::new(sigma.gyro, sigma.accel));
     for format in FORMATS {
         let path = directory.path().join(format!("imu.{format}"));
