@@ -56,7 +56,7 @@ pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
 pub use batch::batch_estimate;
-pub use bound::{Bound, bound};
+pub use bound::{Bound, bound, thermal_bound};
 pub use closed_form::{
     ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
 };

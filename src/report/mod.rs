@@ -33,6 +33,7 @@ pub mod terminal;
 pub mod accuracy;
 pub mod allan;
 pub mod calibration;
+pub mod campaign;
 pub mod check;
 pub mod comparison;
 pub mod conversion;

@@ -29,6 +29,15 @@ pub struct SimulatedCampaign {
 const STREAMS: u64 = 1 << 10;
 
 impl SimulatedCampaign {
+    /// Whether a campaign is meant: a file that lists recordings, else an embedded one.
+    pub fn is_named(name_or_path: &str) -> bool {
+        match models::text(Room::Campaign, name_or_path, &Place::CommandLine) {
+            Ok(text) if text.place == Place::Embedded => true,
+            Ok(text) => text.text.lines().any(|line| line.trim() == "[[recording]]"),
+            Err(_) => false,
+        }
+    }
+
     /// Finds and reads one, by embedded name or path, and what it names.
     ///
     /// # Errors
