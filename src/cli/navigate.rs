@@ -7,7 +7,6 @@ use clap::ValueEnum;
 use nalgebra::Vector3;
 use turncal::attitude::from_pitch_roll_heading;
 use turncal::calibration::Named;
-use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
@@ -15,7 +14,7 @@ use turncal::report::navigation::Navigation;
 use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
 use turncal::units::DEGREE;
 
-use super::input::{hours, latitude, number};
+use super::input::{at_temperature, hours, latitude, number};
 use super::names::short_names;
 use super::output::Delivery;
 use super::progress::Activity;
@@ -76,6 +75,9 @@ pub struct Navigate {
     /// Move instead of resting: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
+    /// At this temperature, °C; without, each calibration at its own reference
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
     #[command(flatten)]
     delivery: Delivery,
 }
@@ -109,8 +111,8 @@ impl Navigate {
         let paths = [self.calibration.as_path(), self.truth.as_path()];
         let names = short_names(&paths);
         let [calibration, truth] = [
-            Calibration::read(&self.calibration)?,
-            Calibration::read(&self.truth)?,
+            at_temperature(&self.calibration, self.temperature_degc)?,
+            at_temperature(&self.truth, self.temperature_degc)?,
         ];
         let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
             .map(|(name, record)| Named { name, record });
