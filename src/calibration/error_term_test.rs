@@ -46,6 +46,18 @@ pub struct ErrorTermTest {
     pub without: f64,
     /// … and with it.
     pub with: f64,
+    /// What leaving it off may have done to the estimate; none where it is on, or not constant.
+    #[serde(skip)]
+    pub left_off: Option<LeftOff>,
+}
+
+/// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOff {
+    /// Where its own parameters have their usual σ around zero.
+    pub usual: ParameterVector,
+    /// RMS where they are also as the record shows them.
+    pub shown: ParameterVector,
 }
 
 /// What an error term that is off is to a record.
@@ -155,6 +167,7 @@ fn tests(problem: &Problem, outcome: &Outcome) -> Result<Vec<ErrorTermTest>, Cal
         role: Role::None,
         without: without.cost / scalars,
         with: with.cost / scalars,
+        left_off: None,
     };
     let own = Fit::of(&joint.own);
     let of_constant = |term: ErrorTerm| {
@@ -168,6 +181,7 @@ fn tests(problem: &Problem, outcome: &Outcome) -> Result<Vec<ErrorTermTest>, Cal
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
+            left_off: joint.left_off(term).filter(|_| !model.has(term)),
             ..test(term, &with, &without)
         })
     };

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::budget::BudgetRecord;
 use super::dwell_scatter::DwellScatter;
 use super::noise::NoiseReport;
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
@@ -60,6 +61,9 @@ pub struct Calibration {
     /// Covariance of the estimated parameters, in their units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
+    /// What each source adds to their uncertainty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<BudgetRecord>,
     /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -350,6 +354,7 @@ impl Calibration {
             sigma: None,
             parameters: Vec::new(),
             covariance: Vec::new(),
+            budget: None,
             terms: BTreeMap::new(),
             gravity: None,
             passes: None,

@@ -1,5 +1,6 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
+use super::budget::Budget;
 use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
 use super::error_term_test::{ErrorTermTest, test_error_terms};
@@ -34,6 +35,8 @@ pub struct Assessment {
     pub error_terms: Vec<ErrorTermTest>,
     /// What is left of gravity and turns.
     pub quality: Quality,
+    /// Where its uncertainty comes from; none for the closed form.
+    pub budget: Option<Budget>,
 }
 
 impl Problem<'_> {
@@ -102,9 +105,9 @@ impl Solution {
     pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         match self {
             Self::Filter(outcome) => {
-                let (error_terms, quality) = rayon::join(
+                let (error_terms, (quality, budget)) = rayon::join(
                     || test_error_terms(problem, outcome),
-                    || outcome.quality(problem),
+                    || (outcome.quality(problem), Budget::new(problem, outcome)),
                 );
                 Ok(Assessment {
                     // Where the iterations ended without convergence there may be nothing to test.
@@ -113,11 +116,16 @@ impl Solution {
                         tests => tests?,
                     },
                     quality: quality?,
+                    budget: match budget {
+                        Err(_) if !outcome.converged => None,
+                        budget => Some(budget?),
+                    },
                 })
             }
             Self::ClosedForm(closed_form) => Ok(Assessment {
                 error_terms: Vec::new(),
                 quality: closed_form.quality(problem)?,
+                budget: None,
             }),
         }
     }
@@ -136,7 +144,16 @@ impl Solution {
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {
-                outcome.record(problem, &assessment.error_terms, &assessment.quality)
+                let Assessment {
+                    error_terms,
+                    quality,
+                    budget,
+                } = assessment;
+                let mut record = outcome.record(problem, error_terms, quality);
+                if let Some(budget) = budget {
+                    record.take_budget(problem.run(), outcome, budget, error_terms);
+                }
+                record
             }
             Self::ClosedForm(closed_form) => closed_form.record(problem, &assessment.quality),
         }

@@ -66,6 +66,7 @@ impl Calibrated {
             outcome: solution.outcome(),
             findings: &findings,
             effects: &assessment.error_terms,
+            budget: assessment.budget.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
             closed_form: solution

@@ -99,6 +99,7 @@ impl Demo {
             outcome: solution.outcome(),
             findings: &findings,
             effects: &assessment.error_terms,
+            budget: assessment.budget.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
             closed_form: Some(of_calibration::ClosedForm {

@@ -18,7 +18,9 @@ use super::model::Model;
 use super::parameters::{ParameterVector, to_vector};
 use super::problem::{Problem, Stretch};
 use crate::imu::TermVector;
-pub(super) use filter::{Filter, Innovations, Observer, Taken, Verdict};
+pub(super) use filter::{
+    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, Taken, Told, Verdict,
+};
 use initial_attitude::InitialAttitude;
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
