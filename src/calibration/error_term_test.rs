@@ -6,6 +6,7 @@
 
 mod evidence;
 mod joint;
+mod left_off;
 
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,7 @@ use super::pass::PassResult;
 use super::problem::Problem;
 use evidence::ln_survival;
 use joint::{Fit, Joint, once_more};
+pub use left_off::LeftOff;
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,15 +51,6 @@ pub struct ErrorTermTest {
     /// What leaving it off may have done to the estimate; none where it is on, or not constant.
     #[serde(skip)]
     pub left_off: Option<LeftOff>,
-}
-
-/// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeftOff {
-    /// Where its own parameters have their usual σ around zero.
-    pub usual: ParameterVector,
-    /// RMS where they are also as the record shows them.
-    pub shown: ParameterVector,
 }
 
 /// What an error term that is off is to a record.

@@ -47,83 +47,100 @@ fn parts_add_to_the_covariance_of_the_estimate() {
     }
 }
 
-/// With the filter's gains an optimal estimate's covariance does not change to first order when gains change,
-/// so what a source adds is the derivative of the covariance of whole passes by its variance, times that.
-#[test]
-fn each_part_is_what_passes_lose_when_its_source_is_taken_away() {
-    let run = simulated("real-table");
-    let mut options = Options::default().noise(NoisePolicy::Stated);
-    options = options.with(ErrorTerm::GaussMarkovBias);
-    options = options.with(ErrorTerm::Instrument(Term::AccelSecondOrder));
-    let problem = Problem::new(&run, &options);
+type Change = fn(&mut Model, f64);
+
+/// Factors on what states the size of a source.
+const CHANGES: [(BudgetSource, Change); 11] = [
+    (BudgetSource::GyroNoise, |m, f| {
+        m.noise.gyro.random_walk *= f
+    }),
+    (BudgetSource::AccelNoise, |m, f| {
+        m.noise.accel.random_walk *= f;
+    }),
+    (BudgetSource::TablePosition, |m, f| m.position_sigma *= f),
+    (BudgetSource::TableReading, |m, f| m.reading_sigma *= f),
+    (BudgetSource::Prior, |m, f| m.prior_sigma *= f),
+    (BudgetSource::GyroWander, |m, f| {
+        m.noise.gyro.gauss_markov.as_mut().unwrap().sigma *= f;
+    }),
+    (BudgetSource::AccelWander, |m, f| {
+        m.noise.accel.gauss_markov.as_mut().unwrap().sigma *= f;
+    }),
+    (BudgetSource::VelocityAtRest, |m, f| {
+        *m.stillness.accel.as_mut().unwrap() *= f;
+    }),
+    (BudgetSource::TableNorth, |m, f| m.geometry.base.z *= f),
+    (BudgetSource::TableLevel, |m, f| {
+        m.geometry.base.x *= f;
+        m.geometry.base.y *= f;
+    }),
+    (BudgetSource::AccelSecondOrder, |m, f| m.term_sigma *= f),
+];
+
+/// Where the gains are those of the least covariance it does not change to first order when they do: what a
+/// source adds with the gains as they are is the derivative of the covariance of whole passes by its
+/// variance, times that variance. Holds each part against passes; returns how many there were.
+fn held_against_passes(run: &Run, options: &Options) -> usize {
+    const STEP: f64 = 0.02;
+    let problem = Problem::new(run, &options.clone().noise(NoisePolicy::Stated));
     let outcome = estimate(&problem, &|_| {}).unwrap();
     let budget = Budget::new(&problem, &outcome).unwrap();
-    let sources = budget.parts.iter().map(|part| part.source);
-    let sources: Vec<BudgetSource> = sources.collect();
-    println!("{sources:?}");
     let mut model = outcome.model.clone();
-    // What dwells show of their own rest, said outright.
     let at_rest = problem.stretches()[0].stillness(&model, Sensor::Accel);
     model.stillness.accel = Some(at_rest);
-    type Change = fn(&mut Model, f64);
-    let changes: [(BudgetSource, Change); 11] = [
-        (BudgetSource::GyroNoise, |m, f| {
-            m.noise.gyro.random_walk *= f
-        }),
-        (BudgetSource::AccelNoise, |m, f| {
-            m.noise.accel.random_walk *= f
-        }),
-        (BudgetSource::GyroWander, |m, f| {
-            m.noise.gyro.gauss_markov.as_mut().unwrap().sigma *= f;
-        }),
-        (BudgetSource::AccelWander, |m, f| {
-            m.noise.accel.gauss_markov.as_mut().unwrap().sigma *= f;
-        }),
-        (BudgetSource::VelocityAtRest, |m, f| {
-            *m.stillness.accel.as_mut().unwrap() *= f;
-        }),
-        (BudgetSource::TablePosition, |m, f| m.position_sigma *= f),
-        (BudgetSource::TableReading, |m, f| m.reading_sigma *= f),
-        (BudgetSource::TableNorth, |m, f| m.geometry.base.z *= f),
-        (BudgetSource::TableLevel, |m, f| {
-            m.geometry.base.x *= f;
-            m.geometry.base.y *= f;
-        }),
-        (BudgetSource::AccelSecondOrder, |m, f| m.term_sigma *= f),
-        (BudgetSource::Prior, |m, f| m.prior_sigma *= f),
-    ];
-    const STEP: f64 = 0.02;
-    let mut checked = Vec::new();
-    for (source, change) in changes {
-        let Some(part) = budget.parts.iter().find(|part| part.source == source) else {
-            continue;
-        };
-        let covariance = |variance: f64| {
+    let sigma = outcome.estimate.sigma();
+    let parts = CHANGES.into_iter().filter_map(|(source, change)| {
+        let part = budget.parts.iter().find(|part| part.source == source)?;
+        Some((part, change))
+    });
+    let mut checked = 0;
+    for (part, change) in parts {
+        let covariance = |factor: f64| {
             let mut model = model.clone();
-            change(&mut model, variance.sqrt());
+            change(&mut model, factor.sqrt());
             once_more(&problem.with_model(model), &outcome).covariance
         };
         let lost = (covariance(1.0 + STEP) - covariance(1.0 - STEP)) / (2.0 * STEP);
-        let off = difference(&lost, &outcome.estimate.covariance);
-        let by = part
-            .covariance
-            .diagonal()
-            .component_div(&outcome.estimate.covariance.diagonal());
-        let apart = {
-            let sigma = outcome.estimate.sigma();
-            let apart = lost - part.covariance;
-            (0..PARAMETERS)
-                .map(|i| (apart[(i, i)] / sigma[i].powi(2)).abs())
-                .fold(0.0, f64::max)
-        };
-        println!(
-            "{:32} {:.4} of all, {off:.4}, apart {apart:.1e}",
-            source.name(),
-            by.max()
-        );
-        // Of third order in the step.
-        assert!(apart < STEP.powi(2), "{source:?}: {apart}");
-        checked.push(source);
+        let apart = lost - part.covariance;
+        let apart = (0..PARAMETERS)
+            .filter(|&i| sigma[i] > 0.0)
+            .map(|i| (apart[(i, i)] / sigma[i].powi(2)).abs())
+            .fold(0.0, f64::max);
+        println!("{}: {apart:.1e} of the variance", part.source.name());
+        // Of second order in the step.
+        assert!(apart < STEP.powi(2), "{:?}: {apart}", part.source);
+        checked += 1;
     }
-    assert!(checked.len() >= 9, "{checked:?}");
+    checked
+}
+
+#[test]
+fn each_part_is_what_passes_lose_when_its_source_is_taken_away() {
+    assert_eq!(
+        held_against_passes(&simulated("demo"), &Options::default()),
+        6
+    );
+}
+
+#[test]
+#[ignore = "slow: 22 passes with biases that vary"]
+fn each_part_is_what_passes_lose_of_a_table_with_errors_and_biases_that_vary() {
+    let order = ErrorTerm::Instrument(Term::AccelSecondOrder);
+    let options = Options::default()
+        .with(ErrorTerm::GaussMarkovBias)
+        .with(order);
+    assert_eq!(held_against_passes(&simulated("real-table"), &options), 11);
+}
+
+#[test]
+fn few_degrees_of_freedom_widen_the_interval() {
+    // JCGM 100, table G.2: t of 95.45 %.
+    for (freedom, t) in [
+        (1.0, 13.97),
+        (10.0, 2.28),
+        (100.0, 2.025),
+        (f64::INFINITY, 2.0),
+    ] {
+        assert!((coverage_factor(freedom) - t).abs() < 0.005, "{freedom}");
+    }
 }

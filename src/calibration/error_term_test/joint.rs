@@ -10,8 +10,8 @@ use super::super::outcome::Outcome;
 use super::super::parameters::{PARAMETERS, ParameterVector};
 use super::super::pass::{Gate, Mode, PassResult, Tried, pass_trying};
 use super::super::problem::Problem;
-use super::LeftOff;
 use super::evidence::Evidence;
+use super::left_off::LeftOff;
 
 /// How well a calibration fits, and variance of the parameters of both triads.
 pub(super) struct Fit {
