@@ -37,11 +37,8 @@ pub fn bound(
     let model = problem.model.in_form(problem.run(), truth.gyro.form);
     let problem = problem.with_model(model);
     let attitudes = initial_attitudes(&problem)?;
-    let at = Linearisation {
-        triads: *truth,
-        terms: *terms,
-        initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
-    };
+    let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
+    let at = Linearisation::new(*truth, *terms, initial);
     let result = pass(&problem, &attitudes, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {

@@ -48,6 +48,9 @@ mod scatter;
 mod schedule;
 mod solution;
 mod standstill;
+mod thermal;
+mod thermal_record;
+mod together;
 mod unexplained;
 
 pub use auxiliary::{
@@ -87,7 +90,7 @@ pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
     parameter, parameter_name, sensor_and_parameter, to_vector,
 };
-pub use pass::Epoch;
+pub use pass::{Epoch, Own};
 pub use prior_cause::PriorCause;
 pub use problem::Problem;
 pub use quality::{Measures, Quality, Spread};
@@ -95,3 +98,9 @@ pub use record::truth_record;
 pub use result::{Calibration, Method, triads_of};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use solution::{Assessment, Solution};
+pub use thermal::{Coefficient, Thermal};
+pub use thermal_record::{
+    CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
+    TemperatureError, ThermalRecord, ValueRecord,
+};
+pub use together::{Alone, TemperatureOptions, Together};

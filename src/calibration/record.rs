@@ -18,9 +18,10 @@ use super::problem::Problem;
 use super::quality::{Measures, Quality, Spread};
 use super::result::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FindingRecord, GravityRecord, MeasuresRecord, Method, NisRecord, NoiseRecord, QualityRecord,
-    SpreadRecord, TermRecord, TestVector, TriadRecord,
+    FORMAT, FORMAT_WITH_TEMPERATURE, FindingRecord, GravityRecord, MeasuresRecord, Method,
+    NisRecord, NoiseRecord, QualityRecord, SpreadRecord, TermRecord, TestVector, TriadRecord,
 };
+use super::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
 };
@@ -66,6 +67,12 @@ impl Outcome {
             }),
             observability: direction_records(self),
             noise: Some(noise_record(self)),
+            format: match self.thermal {
+                Some(_) => FORMAT_WITH_TEMPERATURE.to_owned(),
+                None => FORMAT.to_owned(),
+            },
+            temperature: ThermalRecord::of(self, problem.run()),
+            recordings: RecordingRecord::all(self, problem.run()),
             warnings: texts(&findings),
             findings: findings.iter().map(FindingRecord::from).collect(),
             ..self
@@ -228,6 +235,11 @@ fn triad_record(triad: &Triad, nominal: &Nominal) -> TriadRecord {
     }
 }
 
+/// σ of a triad's parameters where they stand in its record, in their own units.
+pub(super) fn sigma_rows(form: InstallationForm, sigma: &crate::imu::TriadVector) -> TriadRecord {
+    sigma_record(form, sigma, &Nominal(Vector3::repeat(1.0)))
+}
+
 fn sigma_record(
     form: InstallationForm,
     sigma: &crate::imu::TriadVector,
@@ -248,7 +260,7 @@ fn sigma_record(
     }
 }
 
-fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+pub(super) fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
 }
 

@@ -13,11 +13,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::dwell_scatter::DwellScatter;
 use super::noise::NoiseReport;
+use super::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-calibration/1";
+/// The version of one that changes with temperature.
+pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 
 /// The equation of a record.
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
@@ -31,7 +34,7 @@ pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bi
 /// Only the two triads are always there. Unknown fields are ignored when reading.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Always [`FORMAT`].
+    /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
     pub format: String,
     /// How it was found; none for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -68,6 +71,12 @@ pub struct Calibration {
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
+    /// How it changes with temperature; the values are those at its reference. None where it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ThermalRecord>,
+    /// What each of several recordings says.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<RecordingRecord>,
     /// Gravity at the site.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<GravityRecord>,
@@ -356,6 +365,8 @@ impl Calibration {
             covariance: Vec::new(),
             budget: None,
             terms: BTreeMap::new(),
+            temperature: None,
+            recordings: Vec::new(),
             gravity: None,
             passes: None,
             converged: None,

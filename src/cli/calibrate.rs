@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{self, Problem, Solution};
+use turncal::calibration::{self, Problem, Solution, Together};
+use turncal::formats::Campaign;
 use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::study::Shard;
@@ -21,6 +22,9 @@ use super::progress::Activity;
 /// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
 /// failure.
 ///
+/// A campaign.toml names several recordings of one instrument, which are calibrated as one: its parameters may
+/// follow temperature, and differ from day to day.
+///
 /// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
 /// index.html say what they are together. A unit that cannot be calibrated is a row with its reason, and the
 /// command fails after all is written. Begun again, it goes on with what is missing or has changed.
@@ -31,11 +35,13 @@ use super::progress::Activity;
   turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale
+  turncal calibrate my-run/run.toml --temperature
+  turncal calibrate campaign.toml -o mine
   turncal calibrate lot/*/run.toml -o lot-result \\
       --specification specification.toml
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
-    /// The run's run.toml; several are the units of a lot
+    /// The run's run.toml; several are the units of a lot; a campaign.toml names recordings of one instrument
     #[arg(required = true, value_name = "RUN.toml", value_parser = run_file)]
     runs: Vec<PathBuf>,
     /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method,
@@ -44,6 +50,9 @@ pub struct Calibrate {
     output: Option<PathBuf>,
     #[command(flatten)]
     estimation: Estimation,
+    /// Let the parameters follow the temperature column of the run; a campaign does where it is known
+    #[arg(long, conflicts_with_all = ["specification", "shard"])]
+    temperature: bool,
     /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -64,7 +73,12 @@ impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
         self.estimation.check();
         match self.runs.as_slice() {
-            [run] if self.specification.is_none() && self.shard.is_none() => self.one(run),
+            [file] if self.specification.is_none() && self.shard.is_none() => {
+                match Campaign::is_at(file) {
+                    true => self.campaign(file),
+                    false => self.one(file),
+                }
+            }
             _ => self.lot(),
         }
     }
@@ -91,18 +105,49 @@ impl Calibrate {
     fn one(&self, path: &Path) -> anyhow::Result<()> {
         let activity = Activity::new(format!("reading {}", path.display()));
         let run = Run::read(path)?;
-        let problem = self.estimation.problem(&run, path)?;
+        let problem = match self.temperature {
+            true => {
+                let together = Together::default();
+                let problem = self.estimation.together(&[&run], &together);
+                problem.inspect_err(|_| say(&run.recording.notes))?
+            }
+            false => self.estimation.problem(&run, path)?,
+        };
+        self.solved(&problem, &run.recording.name, path, activity)
+    }
+
+    fn campaign(&self, path: &Path) -> anyhow::Result<()> {
+        let activity = Activity::new(format!("reading {}", path.display()));
+        let campaign = Campaign::read(path)?;
+        let runs: Vec<&Run> = campaign.runs.iter().collect();
+        let problem = self.estimation.together(&runs, &campaign.together);
+        let problem = problem.inspect_err(|_| {
+            runs.iter().for_each(|run| say(&run.recording.notes));
+        });
+        let problem = problem.with_context(|| path.display().to_string())?;
+        self.solved(&problem, &campaign.name, path, activity)
+    }
+
+    /// Solves a problem, writes and shows what came of it.
+    fn solved(
+        &self,
+        problem: &Problem,
+        name: &str,
+        path: &Path,
+        activity: Activity,
+    ) -> anyhow::Result<()> {
+        let run = problem.run();
         let truth = self
             .truth
             .as_deref()
-            .map(|path| read_truth(path, &run, problem.model.aiding.body_frame()))
+            .map(|path| read_truth(path, run, problem.model.aiding.body_frame()))
             .transpose()?;
         let target = match (&self.output, self.json) {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
             (None, false) => Some(PathBuf::from(match self.estimation.method {
-                Method::Ekf => format!("{}-calibration", run.recording.name),
-                Method::SixPosition => format!("{}-calibration-six-position", run.recording.name),
+                Method::Ekf => format!("{name}-calibration"),
+                Method::SixPosition => format!("{name}-calibration-six-position"),
             })),
         };
         let directory = target
@@ -115,13 +160,18 @@ impl Calibrate {
             .transpose()?;
 
         // What was found in the files may be why.
-        let solution = solve(&problem, self.estimation.method.into(), &activity)
+        let solution = solve(problem, self.estimation.method.into(), &activity)
             .inspect_err(|_| say(&run.recording.notes))?;
         let Calibrated {
             calibration,
             document,
             converged,
-        } = Calibrated::new(&problem, &solution, self.estimation.method, truth.as_ref())?;
+        } = Calibrated::new(
+            (problem, name),
+            &solution,
+            self.estimation.method,
+            truth.as_ref(),
+        )?;
         activity.next("writing");
         if let Some(directory) = directory {
             calibration.write(&directory.path().join("calibration.json"), false)?;
@@ -139,15 +189,11 @@ impl Calibrate {
             eprintln!("\nreport: {}", printable(&page.display().to_string()));
         }
         if !converged {
-            bail!(
-                "{}: not converged; values and σ may not be used, see the findings",
-                run.recording.name
-            );
+            bail!("{name}: not converged; values and σ may not be used, see the findings");
         }
         if !solution.is_usable() {
             bail!(
-                "{}: no noise explains what the calibration leaves; values may not be used, see the findings",
-                run.recording.name
+                "{name}: no noise explains what the calibration leaves; values may not be used, see the findings"
             );
         }
         Ok(())

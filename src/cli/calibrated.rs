@@ -34,7 +34,7 @@ pub struct Calibrated {
 impl Calibrated {
     /// Judges a solution and says what it is worth.
     pub fn new(
-        problem: &Problem,
+        (problem, name): (&Problem, &str),
         solution: &Solution,
         method: Method,
         truth: Option<&Truth>,
@@ -59,7 +59,7 @@ impl Calibrated {
             triads.map(|truth| PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form)));
         let no_terms = BTreeMap::new();
         let report = Report {
-            title: &run.recording.name,
+            title: name,
             run,
             aiding: problem.model.aiding,
             body_frame: calibration.body_frame,

@@ -169,6 +169,35 @@ impl<'a> Fields<'a> {
         })
     }
 
+    /// An array of tables that must be there and not be empty.
+    pub fn need_tables(
+        &self,
+        name: &str,
+        known: &[&str],
+        meaning: &str,
+    ) -> Result<Vec<Self>, FileError> {
+        let field = self.need(name, meaning)?;
+        let of = |value: &'a Spanned<DeValue<'a>>| match value.get_ref() {
+            DeValue::Table(entries) => Some(Self {
+                document: self.document,
+                name: self.full_name(name),
+                span: Some(value.span()),
+                entries,
+            }),
+            _ => None,
+        };
+        let tables = match field.value.get_ref() {
+            DeValue::Array(values) => values.iter().map(of).collect::<Option<Vec<_>>>(),
+            _ => None,
+        };
+        let tables = tables.filter(|tables| !tables.is_empty());
+        let tables = tables.ok_or_else(|| field.wrong_kind(meaning))?;
+        tables
+            .into_iter()
+            .map(|table| table.with_only(known))
+            .collect()
+    }
+
     /// The names of all fields here, each with its value.
     pub fn all(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> + '_ {
         self.entries.iter().map(|(key, value)| {

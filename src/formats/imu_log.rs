@@ -8,11 +8,12 @@ use super::axes::BodyAxes;
 use super::clock::{Clock, Stamp, Stamps};
 use super::csv_file::CsvFile;
 use super::error::FileError;
+use super::temperature::{TemperatureColumns, Temperatures};
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
+use crate::recording::stretches_between;
 use crate::recording::{ColumnFacts, FileColumn, ImuSamples, LogFacts, NamedColumns};
-use crate::recording::{TemperatureFacts, stretches_between};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
@@ -50,7 +51,7 @@ pub(super) struct ImuLog<'a> {
     /// Of rows of several instruments those that have this number in this column.
     pub instance: Option<(&'a str, f64)>,
     pub triads: PerSensor<[&'a str; 3]>,
-    pub temperature: Option<&'a str>,
+    pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
     pub axes: BodyAxes,
     pub stamp: TimeStamp,
@@ -69,7 +70,7 @@ struct Content {
     columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     duplicates: Vec<(usize, u64)>,
-    temperature: Option<TemperatureFacts>,
+    temperature: Option<Temperatures>,
 }
 
 impl ImuLog<'_> {
@@ -83,6 +84,8 @@ impl ImuLog<'_> {
             duplicates,
             temperature,
         } = self.content(notes)?;
+        let mut temperature = temperature.map(|t| t.read(&self.file.display().to_string()));
+        notes.extend(temperature.iter_mut().flat_map(|t| t.notes.drain(..)));
         let clock = Uniform::new(&self.file, &stamps.of_rows, self.clock.period)?;
         let samples = clock.numbers.last().map_or(0, |last| last + 1);
         notes.extend(stamps.lost_count(samples - clock.numbers.len()));
@@ -153,6 +156,7 @@ impl ImuLog<'_> {
             pulse,
             faults,
             bridges,
+            temperature: temperature.as_mut().and_then(|t| t.temperature.take()),
             log: Some(LogFacts {
                 rows: count,
                 jitter_rms: clock.jitter_rms,
@@ -162,10 +166,10 @@ impl ImuLog<'_> {
                 named: NamedColumns {
                     time: self.clock.column.map(str::to_owned),
                     triads,
-                    temperature: self.temperature.map(str::to_owned),
+                    temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
                     axes: self.axes.order(),
                 },
-                temperature,
+                temperature: temperature.as_ref().and_then(|t| t.facts),
             }),
         })
     }
@@ -185,7 +189,11 @@ impl ImuLog<'_> {
             accel: triad(self.triads.accel)?,
         };
         let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
-        let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
+        let temperature = self
+            .temperature
+            .as_ref()
+            .map(|columns| columns.start(&mut csv));
+        let mut temperature = temperature.transpose()?;
 
         let instance = match self.instance {
             Some((name, number)) => Some((csv.column(name)?, number)),
@@ -194,7 +202,6 @@ impl ImuLog<'_> {
         let mut blank = 0;
         let mut columns = [const { Vec::new() }; 6];
         let mut duplicates = Vec::new();
-        let mut temperatures = Vec::new();
         let mut before = [f64::NAN; 6];
         while csv.advance()? && !csv.may_be_cut() {
             if let Some((place, number)) = instance
@@ -222,8 +229,9 @@ impl ImuLog<'_> {
             for (column, value) in columns.iter_mut().zip(row) {
                 column.push(value);
             }
-            if let Some(place) = temperature {
-                temperatures.push(csv.number(place)?);
+            if let (Some(temperature), Some(&(time, _))) = (&mut temperature, stamps.of_rows.last())
+            {
+                temperature.take(&csv, time);
             }
         }
         notes.extend(csv.cut_off("It is left out"));
@@ -249,7 +257,7 @@ impl ImuLog<'_> {
             },
             columns,
             duplicates,
-            temperature: TemperatureFacts::of(&temperatures),
+            temperature,
         })
     }
 

@@ -10,6 +10,7 @@ use super::error::FileError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
 use super::quantity::{OUTPUTS, units};
+use super::temperature::TemperatureColumns;
 use crate::imu::NoiseKeys;
 use crate::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
@@ -51,6 +52,7 @@ impl<'a> InstrumentFields<'a> {
                 "time_stamp",
                 "continuous",
                 "instance",
+                "temperature_unit",
                 "body_axes",
                 "columns",
                 "noise",
@@ -71,13 +73,7 @@ impl<'a> InstrumentFields<'a> {
             &["time", "gyro", "accel", "temperature"],
             "the names of the columns",
         )?;
-        let temperature = match columns.get("temperature") {
-            Some(field) => {
-                notes.push("The temperature column is read but has no effect yet.".to_owned());
-                Some(field.text()?)
-            }
-            None => None,
-        };
+        let temperature = TemperatureColumns::of_fields(&fields, &columns)?;
 
         let instance = match fields.table("instance", &["column", "number"])? {
             Some(of) => Some((

@@ -5,6 +5,7 @@
 
 mod axes;
 mod calibration_file;
+mod campaign;
 mod clock;
 mod csv_file;
 mod digest;
@@ -25,11 +26,13 @@ mod sheet;
 mod small_file;
 mod specification;
 mod table_log;
+mod temperature;
 mod uniform;
 mod whole;
 mod write;
 
 pub use crate::imu::NoiseKeys;
+pub use campaign::{Campaign, campaign_text};
 pub use digest::{digest_of_bytes, input_digests};
 pub use error::{FileError, Place};
 pub use job::{JOB_FILE, Job, JobKind, Part};

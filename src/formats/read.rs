@@ -162,7 +162,7 @@ fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String>
 }
 
 /// The name of the directory of a `run.toml`, else the file's own.
-fn name(path: &Path) -> String {
+pub(super) fn name(path: &Path) -> String {
     let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let named = match full.file_name() {
         Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),

@@ -93,7 +93,7 @@ pub struct ColumnFacts {
     pub unit: f64,
 }
 
-/// A column of temperatures.
+/// A column of temperatures, °C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureFacts {
     /// The smallest value.
@@ -121,17 +121,6 @@ impl ColumnFacts {
             step: grid_step(values),
             unit,
         }
-    }
-}
-
-impl TemperatureFacts {
-    /// Of a column; none if it is empty.
-    pub(crate) fn of(values: &[f64]) -> Option<Self> {
-        (!values.is_empty()).then(|| Self {
-            smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
-            mean: values.iter().sum::<f64>() / values.len() as f64,
-            largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        })
     }
 }
 

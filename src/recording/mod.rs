@@ -6,12 +6,14 @@ pub(crate) mod faults;
 mod log_facts;
 mod samples;
 mod segment;
+mod temperature;
 
 pub use faults::{Bridge, Fault, FaultKind};
 pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
 pub(crate) use samples::stretches_between;
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
+pub use temperature::{SPACING as TEMPERATURE_SPACING, Temperature};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::{Bridge, Fault, LogFacts};
+use super::{Bridge, Fault, LogFacts, Temperature};
 use crate::imu::{PerSensor, Sensor};
 
 /// The samples of both triads, at one period, in one stretch or several.
@@ -29,6 +29,8 @@ pub struct ImuSamples {
     pub faults: Vec<Fault>,
     /// Interpolated samples, in order of triad, axis and time; those of one axis do not overlap.
     pub bridges: Vec<Bridge>,
+    /// The instrument's temperature meanwhile, where it is known.
+    pub temperature: Option<Temperature>,
     /// The file that the samples are from; none if they were made.
     pub log: Option<LogFacts>,
 }
@@ -129,6 +131,7 @@ impl ImuSamples {
             pulse: PerSensor::default(),
             faults: Vec::new(),
             bridges: Vec::new(),
+            temperature: None,
             log: None,
         }
     }

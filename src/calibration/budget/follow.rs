@@ -44,7 +44,7 @@ pub(super) fn forward(
     filter.keep();
     let (mut done, mut before, mut seen) = (Vec::new(), None, 0);
     for (stretch, start, events) in script.stretches(problem) {
-        begin(&mut filter, model, before, stretch, &start);
+        begin(&mut filter, model, before, stretch, &start, script.at());
         before = Some(stretch);
         let begun = filter.kept();
         let mut of_events = Vec::with_capacity(events.len());

@@ -61,6 +61,10 @@ pub enum BudgetSource {
     InitialAttitude,
     /// What was known of the parameters.
     Prior,
+    /// What was known of how parameters change with temperature.
+    Temperature,
+    /// By how much the instrument differs between recordings.
+    Recording,
     /// What was known of second order of the accelerometers, which is estimated.
     AccelSecondOrder,
     /// Of their asymmetry.
@@ -113,6 +117,8 @@ impl BudgetSource {
             Self::Gravity => "gravity",
             Self::InitialAttitude => "initial attitude",
             Self::Prior => "prior",
+            Self::Temperature => "prior of temperature coefficients",
+            Self::Recording => "differences between recordings",
             Self::AccelSecondOrder => "prior of accel-second-order",
             Self::AccelAsymmetry => "prior of accel-asymmetry",
             Self::SizeEffect => "prior of size-effect",
@@ -170,6 +176,12 @@ impl BudgetSource {
         }
         if let Some((_, index)) = layout.terms().find(|&(term, _)| term == state) {
             return Term::of(index).map_or(Self::Prior, Self::of_term);
+        }
+        if layout.thermal().any(|(thermal, _)| thermal == state) {
+            return Self::Temperature;
+        }
+        if layout.own().any(|(own, _)| own == state) {
+            return Self::Recording;
         }
         match layout.parameters().any(|(parameter, _)| parameter == state) {
             true => Self::Prior,

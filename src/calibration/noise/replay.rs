@@ -5,10 +5,9 @@ use super::super::error::CalibrationError;
 use super::super::layout::Layout;
 use super::super::linearisation::{AttitudePrior, Linearisation, Start};
 use super::super::model::Model;
-use super::super::parameters::to_vector;
 use super::super::pass::{
-    Filter, Innovations, Measurement, Observer, ScalarInnovation, Seen, Segment, Taken, Verdict,
-    begin, moves, navigator, segments,
+    Filter, Innovations, Measurement, Observer, PriorErrors, ScalarInnovation, Seen, Segment,
+    Taken, Verdict, begin, moves, navigator, segments,
 };
 use super::super::problem::{Problem, Stretch};
 use crate::imu::{PerSensor, Sensor};
@@ -87,20 +86,10 @@ impl<'a> Script<'a> {
         priors: &'a [AttitudePrior],
         at: &'a Linearisation,
     ) -> Result<Self, CalibrationError> {
-        Self::trying(problem, priors, at, &[])
-    }
-
-    /// The same with what auxiliary parameters do that are tried.
-    pub fn trying(
-        problem: &'a Problem<'a>,
-        priors: &'a [AttitudePrior],
-        at: &'a Linearisation,
-        tried: &[usize],
-    ) -> Result<Self, CalibrationError> {
-        let layout = Layout::new(&problem.model).trying(tried);
+        let layout = Layout::new(&problem.model);
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
         let events = stretches.map(|(stretch, initial)| {
-            let mut navigator = navigator(stretch, at, initial, &layout)?;
+            let mut navigator = navigator(stretch, at, initial, (&problem.model, &layout))?;
             let mut held = *initial;
             let mut events = Vec::new();
             let mut next = 0;
@@ -119,8 +108,9 @@ impl<'a> Script<'a> {
                     next += part.len();
                     let of = (problem, stretch);
                     let from = navigator.state;
-                    if let Some((_, at_rest)) = part.first() {
-                        navigator.state = at_rest.tied(&from, &at.triads.accel);
+                    if let (Some((begin, at_rest)), Some((end, _))) = (part.first(), part.last()) {
+                        navigator.warm(&(begin.samples.start..end.samples.end));
+                        navigator.state = at_rest.tied(&from, &navigator.triads().accel);
                     }
                     if first {
                         held = navigator.state.attitude;
@@ -145,8 +135,12 @@ impl<'a> Script<'a> {
 
     /// A filter of a model before the first stretch.
     pub fn filter(&self, model: &Model) -> Filter {
-        let parameters = model.prior_mean - to_vector(&self.at.triads);
-        Filter::new(model, &parameters, &-self.at.terms)
+        Filter::new(model, &PriorErrors::at(model, self.at))
+    }
+
+    /// Where it linearises.
+    pub fn at(&self) -> &'a Linearisation {
+        self.at
     }
 
     /// Each stretch of the problem with what happens in it and how it starts.
@@ -194,7 +188,7 @@ impl<'a> Script<'a> {
         };
         let mut before = None;
         for (stretch, start, events) in self.stretches(problem) {
-            begin(&mut pass.filter, model, before, stretch, &start);
+            begin(&mut pass.filter, model, before, stretch, &start, self.at);
             before = Some(stretch);
             for event in events {
                 match event {

@@ -128,14 +128,26 @@ impl Filter {
         let terms = block.terms.iter().take(on);
         let terms = terms.map(|term| term.column.column(0));
         let gravity = self.layout.gravity().map(|_| block.gravity.column(0));
+        let thermal = self.layout.thermal().map(|(_, coefficient)| {
+            let weight = block.thermal.as_ref();
+            let weight = weight.map_or(0.0, |state| coefficient.weight(state));
+            of_triad(coefficient.sensor, coefficient.parameter) * weight
+        });
         // A bias does the same whether it varies or stays.
         let varying = self.layout.varying_biases();
         let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        let driving = navigation.chain(parameters).chain(terms);
-        let driving = driving.chain(gravity).chain(varying);
-        driving
-            .map(|column| std::array::from_fn(|row| column[row]))
-            .collect()
+        let own = self.layout.own().map(|(_, index)| {
+            let (sensor, parameter) = sensor_and_parameter(index);
+            of_triad(sensor, parameter)
+        });
+        let mut columns: Vec<[f64; NAVIGATION]> = Vec::new();
+        let of = |column: &dyn Fn(usize) -> f64| std::array::from_fn(column);
+        let constants = navigation.chain(parameters).chain(terms);
+        columns.extend(constants.map(|column| of(&|row| column[row])));
+        columns.extend(thermal.map(|column| of(&|row| column[row])));
+        let rest = gravity.into_iter().chain(varying).chain(own);
+        columns.extend(rest.map(|column| of(&|row| column[row])));
+        columns
     }
 
     /// Varying biases forget as time goes by, and are driven.

@@ -114,6 +114,7 @@ impl Filter {
             noise,
             turning,
             varying,
+            own_sigma: self.own_sigma,
             sensitivity: None,
             tape: None,
         })
