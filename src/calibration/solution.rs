@@ -11,8 +11,10 @@ use super::mounting::Mounting;
 use super::outcome::Outcome;
 use super::problem::Problem;
 use super::quality::Quality;
-use super::result::{Calibration, Method};
+use super::result::{Calibration, Method, Provenance};
+use crate::imu::PerSensor;
 use crate::room;
+use crate::units::DEGREE;
 
 /// Bytes of the passes, their history and innovations for each sample: 200 to 235, as measured.
 const BYTES_A_SAMPLE: usize = 256;
@@ -60,6 +62,24 @@ impl Problem<'_> {
             Method::Ekf => Solution::Filter(Box::new(estimate(self, progress)?)),
             Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),
         })
+    }
+}
+
+impl Problem<'_> {
+    /// What a calibration of it is made of, but for the files.
+    pub fn provenance(&self) -> Provenance {
+        let run = self.run();
+        let imu = &run.recording.imu;
+        Provenance {
+            program: concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned(),
+            inputs: Vec::new(),
+            nominal: PerSensor::from_fn(|sensor| run.instrument.nominal.get(sensor).0.into()),
+            latitude_deg: run.site.latitude / DEGREE,
+            height_m: run.site.height,
+            duration_s: self.runs().map(|run| run.recording.imu.duration()).sum(),
+            rate_hz: 1.0 / imu.period,
+            dwells: self.dwells().count(),
+        }
     }
 }
 
@@ -142,7 +162,7 @@ impl Solution {
 
     /// The calibration, in the file's quantity.
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
-        match self {
+        let mut record = match self {
             Self::Filter(outcome) => {
                 let Assessment {
                     error_terms,
@@ -156,6 +176,8 @@ impl Solution {
                 record
             }
             Self::ClosedForm(closed_form) => closed_form.record(problem, &assessment.quality),
-        }
+        };
+        record.provenance = Some(problem.provenance());
+        record
     }
 }

@@ -15,7 +15,7 @@ use turncal::simulation::{Scenario, Simulated};
 use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 
 use super::calibrate::solve;
-use super::calibrated::{dwell_times, navigate, note, write_report};
+use super::calibrated::{dwell_times, navigate, note, stamp, write_report};
 use super::input::seed;
 use super::output::{Overwrite, show};
 use super::progress::Activity;
@@ -123,7 +123,8 @@ impl Demo {
         };
         let (filtered, closed) = (method("ekf")?, method("six-position")?);
         write(&standing, &closed)?;
-        let record = solution.calibration(&problem, &assessment);
+        let mut record = solution.calibration(&problem, &assessment);
+        stamp(&mut record, &root.join("run.toml"));
         record.write(&filtered.join("calibration.json"), false)?;
         let record = whole.record(&still, &whole.quality(&still)?);
         record.write(&closed.join("calibration.json"), false)?;
