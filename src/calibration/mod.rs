@@ -7,6 +7,7 @@
 mod auxiliary;
 mod batch;
 mod bound;
+mod budget;
 mod closed_form;
 mod coarse;
 mod comparison;
@@ -57,6 +58,7 @@ pub use auxiliary::{
 };
 pub use batch::batch_estimate;
 pub use bound::{Bound, bound, thermal_bound};
+pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use closed_form::{
     ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
 };
@@ -66,7 +68,7 @@ pub use correction::{Calibrated, Correction, CorrectionError};
 pub use dwell_scatter::DwellScatter;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
-pub use error_term_test::{ErrorTermTest, Role, test_error_terms};
+pub use error_term_test::{ErrorTermTest, LeftOff, Role, test_error_terms};
 pub use estimate::Estimate;
 pub use finding::Finding;
 pub use form::FormTest;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::auxiliary::{Auxiliary, auxiliary_name};
+use super::budget::Budget;
 use super::closed_form::ClosedForm;
 use super::error_term_test::ErrorTermTest;
 use super::estimate::Estimate;
@@ -81,6 +82,35 @@ impl Outcome {
     }
 }
 
+impl Calibration {
+    /// With what each source adds to its uncertainty, and with the covariance that is the sum of that: the
+    /// same as the filter's, but for the rounding of passes in which variances fall by ten orders of magnitude.
+    pub(super) fn take_budget(
+        &mut self,
+        run: &Run,
+        outcome: &Outcome,
+        budget: &Budget,
+        tests: &[ErrorTermTest],
+    ) {
+        let estimate = Estimate {
+            triads: outcome.estimate.triads,
+            covariance: budget.covariance(),
+        };
+        let estimated: Vec<usize> = estimate.estimated().collect();
+        self.budget = Some(budget.record(&estimated, |index| factor(run, index), tests));
+        let Self {
+            sigma, covariance, ..
+        } = estimate.record(run, self.body_frame);
+        (self.sigma, self.covariance) = (sigma, covariance);
+    }
+}
+
+/// What brings a parameter to the file's unit.
+fn factor(run: &Run, index: usize) -> f64 {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    run.instrument.nominal.get(sensor).factor(of_triad)
+}
+
 impl ClosedForm {
     /// This calibration of a problem, with what it leaves of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
@@ -127,10 +157,6 @@ impl Estimate {
                 .filter_map(|i| parameter_name(form, i))
                 .collect()
         };
-        let factor = |index: usize| {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            run.instrument.nominal.get(sensor).factor(of_triad)
-        };
         let of = |sensor| triad_record(self.triads.get(sensor), run.instrument.nominal.get(sensor));
         let correction = |sensor| {
             let sensitivity = run
@@ -158,7 +184,7 @@ impl Estimate {
                 .map(|&i| {
                     estimated
                         .iter()
-                        .map(|&j| self.covariance[(i, j)] * factor(i) * factor(j))
+                        .map(|&j| self.covariance[(i, j)] * factor(run, i) * factor(run, j))
                         .collect()
                 })
                 .collect(),

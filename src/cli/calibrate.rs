@@ -171,7 +171,8 @@ impl Calibrate {
             &solution,
             self.estimation.method,
             truth.as_ref(),
-        )?;
+        )?
+        .of_files(path);
         activity.next("writing");
         if let Some(directory) = directory {
             calibration.write(&directory.path().join("calibration.json"), false)?;

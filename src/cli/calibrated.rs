@@ -6,10 +6,11 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use rayon::prelude::*;
-use turncal::calibration::result::TermRecord;
+use turncal::calibration::result::{InputFile, TermRecord};
 use turncal::calibration::{
     Calibration, ClosedForm, Estimate, Problem, Reference, Solution, in_body_frame, triads_of,
 };
+use turncal::formats::input_digests;
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
 use turncal::report::calibration::{self as of_calibration, Navigated, Report};
@@ -66,6 +67,7 @@ impl Calibrated {
             outcome: solution.outcome(),
             findings: &findings,
             effects: &assessment.error_terms,
+            budget: assessment.budget.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
             closed_form: solution
@@ -83,6 +85,24 @@ impl Calibrated {
             converged: solution.converged(),
             calibration,
         })
+    }
+}
+
+impl Calibrated {
+    /// With the files that a run.toml or campaign.toml names.
+    pub fn of_files(mut self, path: &Path) -> Self {
+        stamp(&mut self.calibration, path);
+        self
+    }
+}
+
+/// Says in a calibration of which files it was made.
+pub fn stamp(calibration: &mut Calibration, path: &Path) {
+    if let Some(provenance) = &mut calibration.provenance {
+        let inputs = input_digests(path).into_iter();
+        provenance.inputs = inputs
+            .map(|(name, sha256)| InputFile { name, sha256 })
+            .collect();
     }
 }
 

@@ -16,6 +16,8 @@ mod fields;
 mod imu_log;
 mod instrument;
 mod job;
+#[cfg(feature = "certificate")]
+mod laboratory;
 mod lot_directory;
 mod parts;
 mod plausible;

@@ -1,5 +1,6 @@
 //! The report of a calibration, and of both methods side by side.
 
+mod budget;
 mod facts;
 mod figures;
 mod methods;
@@ -38,6 +39,11 @@ impl Report<'_> {
             temperature::add(&mut document, outcome);
             document.page(tables::consistency(outcome));
             document.page(tables::passes(outcome));
+            if let (Some(of), Some(estimate)) = (self.budget, self.estimate()) {
+                document.page(budget::table(of, estimate));
+                document.page(budget::figure(of, estimate));
+                document.page(budget::left_off(self.effects, estimate));
+            }
             document.both(effects::costs(self.effects));
             document.both(effects::explained(self.effects));
         }
