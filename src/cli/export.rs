@@ -53,6 +53,26 @@ enum Format {
     Octave,
     /// Every value with its name, σ and unit
     Text,
+    /// Parameters of PX4: CAL_GYRO0, CAL_ACC0
+    Px4,
+    /// Parameters of ArduPilot: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL
+    Ardupilot,
+    /// IMU intrinsics of OpenVINS, model kalibr
+    OpenVinsKalibr,
+    /// IMU intrinsics of OpenVINS, model rpng
+    OpenVinsRpng,
+    /// IMU intrinsics of iKalibr
+    Ikalibr,
+    /// The accelerometers' calibration of the ROS package imu_calib
+    ImuCalib,
+    /// Covariances of ROS sensor_msgs/Imu; needs --run
+    RosCovariance,
+    /// Noise of an IMU in Gazebo
+    Gazebo,
+    /// A structure for MATLAB, a MAT file
+    Mat,
+    /// Zeros of accelerometers for Betaflight
+    Betaflight,
 }
 
 impl From<Format> for export::Format {
@@ -63,6 +83,16 @@ impl From<Format> for export::Format {
             Format::C => Self::C,
             Format::Octave => Self::Octave,
             Format::Text => Self::Text,
+            Format::Px4 => Self::Px4,
+            Format::Ardupilot => Self::ArduPilot,
+            Format::OpenVinsKalibr => Self::OpenVinsKalibr,
+            Format::OpenVinsRpng => Self::OpenVinsRpng,
+            Format::Ikalibr => Self::IKalibr,
+            Format::ImuCalib => Self::ImuCalib,
+            Format::RosCovariance => Self::RosCovariance,
+            Format::Gazebo => Self::Gazebo,
+            Format::Mat => Self::Mat,
+            Format::Betaflight => Self::Betaflight,
         }
     }
 }
@@ -73,7 +103,7 @@ impl Export {
         let run = self.run.as_deref().map(Run::read).transpose()?;
         let exported = export::write(&record, self.format.into(), run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;
-        let text = exported.text.as_bytes();
+        let text = exported.bytes();
         match &self.output {
             Some(output) => {
                 let files = run.iter().flat_map(|run| &run.recording.files);

@@ -16,12 +16,16 @@ use super::progress::Activity;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal init imu.csv
-  turncal init imu.csv.gz -o run.toml")]
+  turncal init imu.csv.gz -o run.toml
+  turncal init flight.ulg")]
 pub struct Init {
     /// Rows of numbers below a line of names, or without one: `.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also
-    /// with `.gz`
+    /// with `.gz`; or MCAP, a ROS 1 bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
+    /// The stream that holds the instrument [default: the one with the most samples]
+    #[arg(long, value_name = "NAME")]
+    stream: Option<String>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -33,7 +37,7 @@ pub struct Init {
 impl Init {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
-        let draft = Draft::of_file(&self.log)?;
+        let draft = Draft::of_stream(&self.log, self.stream.as_deref())?;
         drop(activity);
         let text = draft.to_toml(&self.name());
         let Some(output) = &self.output else {

@@ -9,6 +9,7 @@ mod certificate;
 mod check;
 mod compare;
 mod completions;
+mod convert;
 mod demo;
 mod error_term;
 mod estimation;
@@ -70,6 +71,7 @@ enum Command {
     Study(study::Study),
     Merge(merge::Merge),
     Init(init::Init),
+    Convert(convert::Convert),
     Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
@@ -94,6 +96,7 @@ impl Cli {
             Command::Study(study) => study.run(),
             Command::Merge(merge) => merge.run(),
             Command::Init(init) => init.run(),
+            Command::Convert(convert) => convert.run(),
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),

@@ -1,13 +1,12 @@
 //! The instrument's samples.
 
-use std::path::PathBuf;
-
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
 use super::clock::{Clock, Stamp, Stamps};
-use super::csv_file::CsvFile;
 use super::error::FileError;
+use super::joined::{self, Joined, Part};
+use super::rows::{LogRows, Source};
 use super::temperature::{TemperatureColumns, Temperatures};
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
@@ -46,8 +45,10 @@ impl TimeStamp {
 
 /// What `run.toml` says of the file.
 pub(super) struct ImuLog<'a> {
-    pub file: PathBuf,
+    pub source: Source<'a>,
     pub clock: Clock<'a>,
+    /// Where the accelerometers are, if not in the rows of the gyros.
+    pub accel_from: Option<(Source<'a>, Clock<'a>)>,
     /// Of rows of several instruments those that have this number in this column.
     pub instance: Option<(&'a str, f64)>,
     pub triads: PerSensor<[&'a str; 3]>,
@@ -71,6 +72,9 @@ struct Content {
     /// Rows before each duplicate, and its line.
     duplicates: Vec<(usize, u64)>,
     temperature: Option<Temperatures>,
+    clock: Uniform,
+    /// Of the integrals of the accelerometers' columns, in their unit times s.
+    integral_error: [f64; 3],
 }
 
 impl ImuLog<'_> {
@@ -83,10 +87,11 @@ impl ImuLog<'_> {
             columns,
             duplicates,
             temperature,
+            clock,
+            integral_error,
         } = self.content(notes)?;
-        let mut temperature = temperature.map(|t| t.read(&self.file.display().to_string()));
+        let mut temperature = temperature.map(|t| t.read(&self.source.file.display().to_string()));
         notes.extend(temperature.iter_mut().flat_map(|t| t.notes.drain(..)));
-        let clock = Uniform::new(&self.file, &stamps.of_rows, self.clock.period)?;
         let samples = clock.numbers.last().map_or(0, |last| last + 1);
         notes.extend(stamps.lost_count(samples - clock.numbers.len()));
         let stamps = stamps.of_rows;
@@ -134,10 +139,16 @@ impl ImuLog<'_> {
             };
             rows.map(sample).collect::<Vec<_>>()
         });
-        let pulse = PerSensor::from_fn(|sensor| match self.output {
+        let mut pulse = PerSensor::from_fn(|sensor| match self.output {
             Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
             Output::Increment | Output::Rate => 0.0,
         });
+        // As bounded as the error of whole pulses, and as independent of how long it is summed over.
+        let error = self
+            .axes
+            .each(Vector3::from(integral_error))
+            .component_div(&self.nominal.accel.0);
+        pulse.accel = pulse.accel.hypot(12f64.sqrt() * error.norm() / 3f64.sqrt());
         let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
         for (k, facts) in facts.into_iter().enumerate() {
             of_axes.get_mut(sensor(k))[body_axes[k]] = facts;
@@ -164,7 +175,7 @@ impl ImuLog<'_> {
                 off_stated_period: clock.off_given,
                 columns: of_axes,
                 named: NamedColumns {
-                    time: self.clock.column.map(str::to_owned),
+                    time: self.clock_of_rows().column.map(str::to_owned),
                     triads,
                     temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
                     axes: self.axes.order(),
@@ -174,10 +185,46 @@ impl ImuLog<'_> {
         })
     }
 
+    /// The rows of both triads.
+    fn open(&self) -> Result<LogRows, FileError> {
+        let Some((source, clock)) = &self.accel_from else {
+            return self.source.open();
+        };
+        let parts = PerSensor {
+            gyro: Part {
+                source: &self.source,
+                clock: self.clock,
+                columns: self.triads.gyro,
+                further: self
+                    .temperature
+                    .as_ref()
+                    .map_or(&[], |columns| columns.names()),
+            },
+            accel: Part {
+                source,
+                clock: *clock,
+                columns: self.triads.accel,
+                further: &[],
+            },
+        };
+        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::joined)
+    }
+
+    fn clock_of_rows(&self) -> Clock<'_> {
+        match self.accel_from {
+            Some(_) => joined::clock(self.clock.period),
+            None => self.clock,
+        }
+    }
+
     fn content(&self, notes: &mut Vec<String>) -> Result<Content, FileError> {
-        let mut csv = CsvFile::open(&self.file)?;
-        let mut stamps = self.clock.start(&mut csv)?;
-        let mut triad = |[x, y, z]: [&str; 3]| -> Result<_, FileError> {
+        let mut csv = self.open()?;
+        let names = match self.accel_from {
+            Some(_) => joined::distinct(&self.triads),
+            None => PerSensor::from_fn(|sensor| self.triads.get(sensor).map(str::to_owned)),
+        };
+        let mut stamps = self.clock_of_rows().start(&mut csv)?;
+        let mut triad = |[x, y, z]: &[String; 3]| -> Result<_, FileError> {
             Ok([
                 csv.signed_column(x)?,
                 csv.signed_column(y)?,
@@ -185,8 +232,8 @@ impl ImuLog<'_> {
             ])
         };
         let found = PerSensor {
-            gyro: triad(self.triads.gyro)?,
-            accel: triad(self.triads.accel)?,
+            gyro: triad(&names.gyro)?,
+            accel: triad(&names.accel)?,
         };
         let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
         let temperature = self
@@ -210,7 +257,9 @@ impl ImuLog<'_> {
                 continue;
             }
             // Rows that another sensor wrote; without a time they would be missing.
-            if self.clock.column.is_some() && places.iter().all(|&place| csv.is_blank(place)) {
+            if self.clock_of_rows().column.is_some()
+                && places.iter().all(|&place| csv.is_blank(place))
+            {
                 blank += 1;
                 continue;
             }
@@ -235,10 +284,11 @@ impl ImuLog<'_> {
             }
         }
         notes.extend(csv.cut_off("It is left out"));
+        notes.extend_from_slice(csv.remarks());
         if blank > 0 {
             notes.push(format!(
                 "{blank} row(s) of {} have nothing in the columns of both triads and are passed over.",
-                self.file.display()
+                self.source.file.display()
             ));
         }
         if stamps.of_rows.len() < FEWEST_SAMPLES {
@@ -249,7 +299,10 @@ impl ImuLog<'_> {
             ));
         }
         let PerSensor { gyro, accel } = found;
+        let clock = Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period);
         Ok(Content {
+            clock: clock.map_err(|error| csv.placed(error))?,
+            integral_error: csv.integral_error(),
             stamps,
             triads: PerSensor {
                 gyro: gyro.map(|(_, column)| column),
@@ -262,7 +315,7 @@ impl ImuLog<'_> {
     }
 
     /// A number of a row as it stands.
-    fn value(&self, csv: &CsvFile, column: usize) -> Result<f64, FileError> {
+    fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let value = csv.number(column)?;
         if self.output == Output::Pulse && value.fract() != 0.0 {
             return Err(csv.not(

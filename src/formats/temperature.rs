@@ -1,8 +1,8 @@
 //! Temperature columns of a log.
 
-use super::csv_file::CsvFile;
 use super::error::FileError;
 use super::fields::{Field, Fields};
+use super::rows::LogRows;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
@@ -102,13 +102,18 @@ impl<'a> TemperatureColumns<'a> {
         }))
     }
 
+    /// The columns, each once.
+    pub fn names(&self) -> &[&'a str] {
+        &self.names
+    }
+
     /// The column of the first axis, as it is named.
     pub fn first(&self) -> &'a str {
         self.names[0]
     }
 
     /// Ready to read a file.
-    pub fn start(&self, csv: &mut CsvFile) -> Result<Temperatures, FileError> {
+    pub fn start(&self, csv: &mut LogRows) -> Result<Temperatures, FileError> {
         let places = self.names.iter().map(|name| csv.column(name));
         let names = self.names.iter().map(|name| (*name).to_owned());
         Ok(Temperatures {
@@ -157,7 +162,7 @@ pub(super) struct Read {
 
 impl Temperatures {
     /// Takes a row with this stamp, s.
-    pub fn take(&mut self, csv: &CsvFile, time: f64) {
+    pub fn take(&mut self, csv: &LogRows, time: f64) {
         let first = *self.first.get_or_insert(time);
         let span = (time - first) / TEMPERATURE_SPACING;
         if !(0.0..MOST_SPANS).contains(&span) {
@@ -212,7 +217,7 @@ impl Channel {
         }
     }
 
-    fn take(&mut self, csv: &CsvFile, span: usize, unit: TemperatureUnit) {
+    fn take(&mut self, csv: &LogRows, span: usize, unit: TemperatureUnit) {
         let value = csv
             .number(self.place)
             .ok()

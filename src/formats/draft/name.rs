@@ -130,7 +130,8 @@ impl Name {
         let whole = self.whole();
         let is = |all: &[&str]| all.contains(&whole.as_str());
         // The instrument's own time before that of whoever received it.
-        if whole.ends_with("headerstamp") {
+        let ends = ["headerstamp", "timestampsample", "sampleus"];
+        if ends.iter().any(|end| whole.ends_with(end)) {
             4
         } else if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
             3
