@@ -12,8 +12,8 @@ use super::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
 use super::record::{rows, sigma_rows};
 use super::result::{Calibration, TriadRecord};
 use crate::imu::{
-    InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalRange, ThermalState, ThermalValues,
-    Triad, TriadVector, powers,
+    InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalRange,
+    ThermalState, ThermalValues, Triad, TriadVector, powers,
 };
 use crate::run::Run;
 
@@ -197,6 +197,43 @@ impl ThermalRecord {
                 .collect(),
             powers: by_powers,
         })
+    }
+
+    /// Of a known truth, in the file's quantity.
+    pub fn of_truth(
+        range: &PerSensor<ThermalRange>,
+        coefficients: &PerSensor<ThermalCoefficients>,
+        run: &Run,
+    ) -> Self {
+        let form = InstallationForm::General;
+        let mut all = Vec::new();
+        let mut by_powers = BTreeMap::new();
+        for index in 0..PARAMETERS {
+            let (sensor, of_triad) = sensor_and_parameter(index);
+            let factor = run.instrument.nominal.get(sensor).factor(of_triad);
+            let row: ThermalValues = coefficients.get(sensor).row(of_triad).transpose();
+            let Some(name) = parameter_name(form, index) else {
+                continue;
+            };
+            for function in (0..row.len()).filter(|&function| row[function] != 0.0) {
+                all.push(CoefficientRecord {
+                    parameter: name.clone(),
+                    order: (function != RATE).then_some(function + 1),
+                    value: row[function] * factor,
+                    sigma: None,
+                });
+            }
+            let of_powers = powers(range.get(sensor), &row).map(|a| a * factor);
+            by_powers.insert(name, of_powers.to_vec());
+        }
+        Self {
+            equation: EQUATION.to_owned(),
+            range: PerSensor::from_fn(|sensor| range.get(sensor).into()),
+            coefficients: all,
+            covariance: Vec::new(),
+            cross: Vec::new(),
+            powers: by_powers,
+        }
     }
 
     /// Whether all temperatures lie in their ranges.
