@@ -11,6 +11,7 @@ use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
 use super::record::{rows, sigma_rows};
 use super::result::{Calibration, TriadRecord};
+use super::thermal::Thermal;
 use crate::imu::{
     InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalRange,
     ThermalState, ThermalValues, Triad, TriadVector, powers,
@@ -147,10 +148,9 @@ impl From<&RangeRecord> for ThermalRange {
 }
 
 impl ThermalRecord {
-    /// Of an outcome, in the file's quantity.
-    pub(super) fn of(outcome: &Outcome, run: &Run) -> Option<Self> {
-        let thermal = outcome.thermal.as_ref()?;
-        let form = outcome.estimate.form();
+    /// Of estimates at the reference and of coefficients, in the file's quantity.
+    pub(super) fn of(thermal: &Thermal, estimate: &Estimate, run: &Run) -> Self {
+        let form = estimate.form();
         let factor = |index: usize| {
             let (sensor, of_triad) = sensor_and_parameter(index);
             run.instrument.nominal.get(sensor).factor(of_triad)
@@ -178,8 +178,8 @@ impl ThermalRecord {
                 by_powers.insert(name, of_powers[..order].to_vec());
             }
         }
-        let estimated = outcome.estimate.estimated();
-        Some(Self {
+        let estimated = estimate.estimated();
+        Self {
             equation: EQUATION.to_owned(),
             range: PerSensor::from_fn(|sensor| thermal.model.range.get(sensor).into()),
             coefficients: coefficients.collect(),
@@ -196,7 +196,7 @@ impl ThermalRecord {
                 })
                 .collect(),
             powers: by_powers,
-        })
+        }
     }
 
     /// Of a known truth, in the file's quantity.
