@@ -16,9 +16,9 @@ mod fields;
 mod imu_log;
 mod instrument;
 mod job;
+mod joined;
 #[cfg(feature = "certificate")]
 mod laboratory;
-mod joined;
 mod lot_directory;
 mod names;
 mod parts;

@@ -52,8 +52,10 @@ pub enum Motion {
 pub struct Mission {
     /// How it moves.
     pub motion: Motion,
-    /// How many intervals of [`INTERVAL`] it lasts.
+    /// How many intervals it lasts.
     pub intervals: u32,
+    /// Time between two moments of the result, s; [`INTERVAL`] but for what lasts minutes or less.
+    pub interval: f64,
 }
 
 /// A calibration and the truth, in one body frame and one installation form.
@@ -200,6 +202,7 @@ impl Mission {
                 height: site.height,
             }),
             intervals,
+            interval: INTERVAL,
         }
     }
 
@@ -239,7 +242,7 @@ impl Mission {
             Motion::Standing(_) => STANDING_STEPS,
             Motion::Moving(_) => MOVING_STEPS,
         };
-        let period = INTERVAL / f64::from(steps);
+        let period = self.interval / f64::from(steps);
         let mut course = Course::new(&self.motion, period);
         let mut navigation = Strapdown::new(course.truth().with_errors(start), period)?;
         let mut moments = vec![moment(0.0, &navigation, course.truth())];
@@ -257,7 +260,7 @@ impl Mission {
                 };
                 navigation.advance(&increments, held)?;
             }
-            let time = f64::from(interval) * INTERVAL;
+            let time = f64::from(interval) * self.interval;
             moments.push(moment(time, &navigation, course.truth()));
         }
         Ok(moments)
@@ -288,7 +291,7 @@ impl Mission {
             Motion::Standing(_) => 1,
             Motion::Moving(_) => LINEAR_STEPS,
         };
-        let step = INTERVAL / f64::from(steps);
+        let step = self.interval / f64::from(steps);
         // Each step is linearised in its middle.
         let mut course = Course::new(&self.motion, 0.5 * step);
         let mut sensitivity = start;
@@ -309,7 +312,7 @@ impl Mission {
                 sensitivity.advance(&linear.transition, &linear.sensed);
                 steady = is_steady.then_some(linear);
             }
-            let time = f64::from(interval) * INTERVAL;
+            let time = f64::from(interval) * self.interval;
             exposures.push(exposure(time, &sensitivity, course.truth())?);
         }
         Ok(exposures)
