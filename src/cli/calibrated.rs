@@ -15,7 +15,7 @@ use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
 use turncal::report::calibration::{self as of_calibration, Navigated, Report};
 use turncal::run::Run;
-use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
+use turncal::study::navigation::{Mission, NavigationStudyError};
 
 use super::estimation::Method;
 
@@ -124,13 +124,14 @@ pub fn note(closed_form: &ClosedForm) -> String {
     format!("{from}, {minutes:.digits$} min at rest")
 }
 
-/// Navigates 40 h standing level at the run's site by the calibration of each method.
+/// Navigates standing level at the run's site by the calibration of each method, for as long as suits them.
 pub fn navigate(
     run: &Run,
     methods: &[(&'static str, &Estimate)],
     truth: Option<&PerSensor<Triad>>,
 ) -> std::result::Result<Vec<Navigated>, NavigationStudyError> {
-    let mission = Mission::standing_level(&run.site, FORTY_HOURS);
+    let estimates: Vec<&Estimate> = methods.iter().map(|(_, estimate)| *estimate).collect();
+    let mission = Mission::suited(&run.site, &estimates)?;
     let all = methods.par_iter().map(|&(method, estimate)| {
         let outlook = mission.outlook(estimate, truth)?;
         Ok(Navigated { method, outlook })

@@ -67,7 +67,11 @@ impl Certificate {
         let name = self
             .as_found
             .as_deref()
-            .map(|path| path.display().to_string());
+            .map(|path| -> anyhow::Result<String> {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                Ok(format!("{name}, SHA-256 {}", digest_of_bytes(&read(path)?)))
+            });
+        let name = name.transpose()?;
         let digest = digest_of_bytes(&bytes);
         let earlier = name.as_deref().zip(earlier.as_ref());
         let content = Content::new(

@@ -137,6 +137,7 @@ impl Navigate {
         let mission = Mission {
             motion,
             intervals: (self.hours * HOUR / INTERVAL).round() as u32,
+            interval: INTERVAL,
         };
         let inputs: Vec<&Path> = paths
             .into_iter()

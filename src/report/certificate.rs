@@ -150,7 +150,7 @@ fn method(certificate: &Certificate) -> Facts {
             value(provenance.duration_s, 10.0),
             value(provenance.rate_hz, 10.0),
             count(provenance.dwells),
-            value(provenance.latitude_deg, 1e-3),
+            value(provenance.latitude_deg, 0.1),
             value(provenance.height_m, 10.0),
         ),
     );
@@ -161,13 +161,14 @@ fn method(certificate: &Certificate) -> Facts {
     );
     facts.push("body frame", calibration.body_frame.words());
     if let Some(gravity) = calibration.gravity {
+        let accuracy = match gravity.sigma_m_s2 > 0.0 {
+            true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
+            false => "taken as exact".to_owned(),
+        };
+        let digits = gravity.sigma_m_s2.max(1e-6);
         facts.push(
             "gravity",
-            format!(
-                "{} m/s², U = {} m/s² (k = 2)",
-                value(gravity.m_s2, gravity.sigma_m_s2.max(1e-6)),
-                sigma(2.0 * gravity.sigma_m_s2),
-            ),
+            format!("{} m/s², {accuracy}", value(gravity.m_s2, digits)),
         );
     }
     for input in &provenance.inputs {
@@ -241,7 +242,12 @@ fn results(certificate: &Certificate) -> Table {
             .nominal
             .get(sensor)
             .map(|scale| scale.to_string());
-        format!("{} {unit} per second for 1 {input}", of.join(", "))
+        // What is no rate is told per second.
+        let per = match unit.contains('/') || unit == "g" {
+            true => "",
+            false => " per second",
+        };
+        format!("{} {unit}{per} for 1 {input}", of.join(", "))
     };
     Table::new("Results", ["parameter", "value", "U", "unit", "k", "ν"])
         .sections(groups)

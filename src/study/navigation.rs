@@ -54,8 +54,10 @@ pub enum Motion {
 pub struct Mission {
     /// How it moves.
     pub motion: Motion,
-    /// How many intervals of [`INTERVAL`] it lasts.
+    /// How many intervals it lasts.
     pub intervals: u32,
+    /// Time between two moments of the result, s; [`INTERVAL`] but for what lasts minutes or less.
+    pub interval: f64,
 }
 
 /// A calibration and the truth, in one body frame and one installation form.
@@ -205,6 +207,7 @@ impl Mission {
                 height: site.height,
             }),
             intervals,
+            interval: INTERVAL,
         }
     }
 
@@ -252,7 +255,7 @@ impl Mission {
             Motion::Standing(_) => STANDING_STEPS,
             Motion::Moving(_) => MOVING_STEPS,
         };
-        let period = INTERVAL / f64::from(steps);
+        let period = self.interval / f64::from(steps);
         let mut course = Course::new(&self.motion, period);
         let mut navigation = Strapdown::new(course.truth().with_errors(start), period)?;
         let mut moments = vec![moment(0.0, &navigation, course.truth())];
@@ -271,7 +274,7 @@ impl Mission {
                 };
                 navigation.advance(&increments, held)?;
             }
-            let time = f64::from(interval) * INTERVAL;
+            let time = f64::from(interval) * self.interval;
             moments.push(moment(time, &navigation, course.truth()));
         }
         Ok(moments)
@@ -302,7 +305,7 @@ impl Mission {
             Motion::Standing(_) => 1,
             Motion::Moving(_) => LINEAR_STEPS,
         };
-        let step = INTERVAL / f64::from(steps);
+        let step = self.interval / f64::from(steps);
         // Each step is linearised in its middle.
         let mut course = Course::new(&self.motion, 0.5 * step);
         let mut sensitivity = start;
@@ -323,7 +326,7 @@ impl Mission {
                 sensitivity.advance(&linear.transition, &linear.sensed);
                 steady = is_steady.then_some(linear);
             }
-            let time = f64::from(interval) * INTERVAL;
+            let time = f64::from(interval) * self.interval;
             exposures.push(exposure(time, &sensitivity, course.truth())?);
         }
         Ok(exposures)

@@ -95,12 +95,12 @@ impl BudgetSource {
     /// What an engineer calls it.
     pub fn name(self) -> &'static str {
         match self {
-            Self::GyroNoise => "white noise of the gyros",
-            Self::AccelNoise => "white noise of the accelerometers",
+            Self::GyroNoise => "gyro white noise",
+            Self::AccelNoise => "accel white noise",
             Self::GyroMoves => "gyro noise of moves",
-            Self::AccelMoves => "accelerometer noise of moves",
-            Self::GyroWander => "bias variation of the gyros",
-            Self::AccelWander => "bias variation of the accelerometers",
+            Self::AccelMoves => "accel noise of moves",
+            Self::GyroWander => "gyro bias variation",
+            Self::AccelWander => "accel bias variation",
             Self::Interpolated => "interpolated samples",
             Self::Pulses => "pulses",
             Self::VelocityAtRest => "velocity at standstill",

@@ -133,6 +133,26 @@ fn each_part_is_what_passes_lose_of_a_table_with_errors_and_biases_that_vary() {
 }
 
 #[test]
+#[ignore = "slow: two real records"]
+fn each_part_is_what_passes_lose_of_records_without_a_table() {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
+    for name in ["real-mems-lot-0", "nineteen-position-velocity"] {
+        let path = std::path::Path::new(data).join(name).join("run.toml");
+        let Ok(run) = Run::read(&path) else {
+            println!("no {}", path.display());
+            continue;
+        };
+        assert!(held_against_passes(&run, &Options::default()) >= 4);
+        let problem = Problem::new(&run, &Options::default());
+        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let budget = Budget::new(&problem, &outcome).unwrap();
+        let off = difference(&budget.covariance(), &outcome.estimate.covariance);
+        println!("{name}: {off:.1e}");
+        assert!(off < ROUNDING, "{off}");
+    }
+}
+
+#[test]
 fn few_degrees_of_freedom_widen_the_interval() {
     // JCGM 100, table G.2: t of 95.45 %.
     for (freedom, t) in [

@@ -100,7 +100,7 @@ pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
         };
         let mut floor = vec![0.0; indices.len()];
         let mut panel = Panel::new(
-            format!("{}: share of the variance, %", sensor.name()),
+            format!("{}, %", sensor.name()),
             Axis::places(indices.iter().map(name)).room(0.5, 0.5),
             Axis::linear("").between(0.0, 100.0),
         );

@@ -126,7 +126,7 @@ impl<'a> Layout<'a> {
                 self.heading(heading, 3.0 * BODY)?;
                 self.paragraph(text, PLAIN)
             }
-            Block::Plot(_) => Ok(()),
+            Block::Plot(_) | Block::Fold(_) => Ok(()),
         }
     }
 
@@ -191,16 +191,12 @@ impl<'a> Layout<'a> {
 
     fn table(&mut self, table: &Table) -> Result<(), PdfError> {
         let rows = || table.sections.iter().flatten();
-        let size = |column: usize, text: &str, bold: bool| {
-            let style = if bold { STRONG } else { PLAIN };
-            let _ = column;
-            self.width(text, style)
-        };
+        let size = |text: &str, style: Style| self.width(text, style);
         let widths: Vec<f32> = (0..table.columns.len())
             .map(|k| {
                 let cells = rows().filter_map(|row| row.get(k));
-                let widest = cells.map(|cell| size(k, cell, false)).fold(0.0, f32::max);
-                widest.max(size(k, &table.columns[k], true))
+                let widest = cells.map(|cell| size(cell, PLAIN)).fold(0.0, f32::max);
+                widest.max(size(&table.columns[k], STRONG))
             })
             .collect();
         let all = widths.iter().sum::<f32>() + GAP * (widths.len().max(1) - 1) as f32;
@@ -220,8 +216,12 @@ impl<'a> Layout<'a> {
             })
             .collect();
         let right = rights.last().copied().unwrap_or(MARGIN);
-        let first = table.sections.first().map_or(1, Vec::len).min(4) as f32;
-        self.heading(&table.heading, leading * (first + 1.5))?;
+        let rules = 2.0 * table.sections.len() as f32;
+        let whole = leading * (rows().count() + 1) as f32 + rules;
+        let first = leading * (table.sections.first().map_or(1, Vec::len).min(4) as f32 + 1.5);
+        // A table that fits on a page stands on one.
+        let together = whole + HEADING * LEADING < BOTTOM - TOP;
+        self.heading(&table.heading, if together { whole } else { first })?;
         let mut header = true;
         for section in &table.sections {
             for row in section {
