@@ -301,9 +301,9 @@ mod tests {
             Room::Installation => InstallationModel::load(path, place).unwrap_err(),
             Room::Turntable => turntable(path, place).unwrap_err(),
             Room::Path => machine::path(path, place, &site).unwrap_err(),
+            Room::Campaign => crate::simulation::SimulatedCampaign::load(path).unwrap_err(),
             Room::Scenario => crate::simulation::Scenario::load(path).unwrap_err(),
             Room::Trajectory => trajectory(path, place).unwrap_err(),
-            Room::Campaign => crate::simulation::SimulatedCampaign::load(path).unwrap_err(),
         };
         let message = error.to_string();
         assert!(message.contains("mine.toml"), "{message}");

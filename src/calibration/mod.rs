@@ -4,9 +4,11 @@
 //! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] says what
 //! could be had. Nothing here prints, reads files or draws.
 
+mod at_rest;
 mod auxiliary;
 mod batch;
 mod bound;
+mod budget;
 mod closed_form;
 mod coarse;
 mod comparison;
@@ -52,11 +54,13 @@ mod thermal_record;
 mod together;
 mod unexplained;
 
+pub use at_rest::{AtRest, AxisAtRest, Second};
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
 pub use batch::batch_estimate;
-pub use bound::{Bound, bound};
+pub use bound::{Bound, bound, thermal_bound};
+pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use closed_form::{
     ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
 };
@@ -66,7 +70,7 @@ pub use correction::{Calibrated, Correction, CorrectionError};
 pub use dwell_scatter::DwellScatter;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
-pub use error_term_test::{ErrorTermTest, Role, test_error_terms};
+pub use error_term_test::{ErrorTermTest, LeftOff, Role, test_error_terms};
 pub use estimate::Estimate;
 pub use finding::Finding;
 pub use form::FormTest;

@@ -4,6 +4,8 @@ mod allan;
 mod apply;
 mod calibrate;
 mod calibrated;
+#[cfg(feature = "certificate")]
+mod certificate;
 mod check;
 mod compare;
 mod completions;
@@ -64,6 +66,8 @@ enum Command {
     Navigate(navigate::Navigate),
     Apply(apply::Apply),
     Export(export::Export),
+    #[cfg(feature = "certificate")]
+    Certificate(certificate::Certificate),
     Study(study::Study),
     Merge(merge::Merge),
     Init(init::Init),
@@ -87,6 +91,8 @@ impl Cli {
             Command::Navigate(navigate) => navigate.run(),
             Command::Apply(apply) => apply.run(),
             Command::Export(export) => export.run(),
+            #[cfg(feature = "certificate")]
+            Command::Certificate(certificate) => certificate.run(),
             Command::Study(study) => study.run(),
             Command::Merge(merge) => merge.run(),
             Command::Init(init) => init.run(),

@@ -9,7 +9,6 @@ use turncal::calibration::result::TermRecord;
 use turncal::calibration::truth_record;
 use turncal::formats::{campaign_text, write_run};
 use turncal::imu::{TERM_PARAMETERS, Term};
-use turncal::models::{self, Room};
 use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 
 use super::input::seed;
@@ -40,7 +39,7 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> anyhow::Result<()> {
-        if self.is_campaign() {
+        if SimulatedCampaign::is_named(&self.scenario) {
             return self.campaign();
         }
         let scenario = Scenario::load(&self.scenario)?;
@@ -71,16 +70,6 @@ impl Simulate {
 }
 
 impl Simulate {
-    /// Whether a campaign is meant: an embedded one, or a file that lists recordings.
-    fn is_campaign(&self) -> bool {
-        let path = Path::new(&self.scenario);
-        if path.is_file() {
-            let text = std::fs::read_to_string(path).unwrap_or_default();
-            return text.lines().any(|line| line.trim() == "[[recording]]");
-        }
-        models::names(Room::Campaign).any(|name| name == self.scenario)
-    }
-
     fn campaign(&self) -> anyhow::Result<()> {
         let campaign = SimulatedCampaign::load(&self.scenario)?;
         let directory = self
@@ -100,6 +89,9 @@ impl Simulate {
                 .with_context(|| format!("cannot create {}", of_recording.display()))?;
             write(recording, &of_recording)?;
             paths.push(format!("{name}/run.toml"));
+        }
+        if let Some(truth) = SimulatedCampaign::truth(&simulated) {
+            truth.write(&directory.path().join("truth.json"), false)?;
         }
         let text = campaign_text(&paths, &campaign.day_to_day);
         let path = directory.path().join("campaign.toml");

@@ -360,6 +360,16 @@ impl<'a> Field<'a> {
             .ok_or_else(|| self.wrong_kind("a list of texts in quotes"))
     }
 
+    /// Lists of texts in a list; none if it is anything else.
+    pub fn rows_of_texts(&self) -> Option<Vec<Vec<&'a str>>> {
+        let rows = self.value.get_ref().as_array()?.iter();
+        let row = |row: &'a Spanned<DeValue<'a>>| -> Option<Vec<&'a str>> {
+            let texts = row.get_ref().as_array()?.iter();
+            texts.map(|text| text.get_ref().as_str()).collect()
+        };
+        rows.map(row).collect()
+    }
+
     /// Three texts.
     pub fn three_texts(&self) -> Result<[&'a str; 3], FileError> {
         self.texts()?

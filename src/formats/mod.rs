@@ -17,6 +17,8 @@ mod imu_log;
 mod instrument;
 mod job;
 mod joined;
+#[cfg(feature = "certificate")]
+mod laboratory;
 mod lot_directory;
 mod names;
 mod parts;

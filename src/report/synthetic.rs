@@ -40,6 +40,7 @@ impl Synthetic {
             outcome: Some(&self.outcome),
             findings: &self.outcome.findings,
             effects: &[],
+            budget: None,
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {

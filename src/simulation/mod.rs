@@ -39,6 +39,8 @@ pub struct Simulated {
     /// The instrument's true parameters; where they change with temperature, those at the reference of
     /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
+    /// The same but for what is this recording's own.
+    pub common: PerSensor<Triad>,
     /// Those of its error terms.
     pub terms: TermVector,
     /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
@@ -139,6 +141,7 @@ impl Scenario {
             };
             self.draw_truth(sensor, &mut draws.generator(seed, instrument))
         });
+        let common = truth;
         let truth = campaign::changed(truth, own);
         let thermal = self.instrument.thermal.as_ref().map(|variation| {
             let mut rng = Draws::thermal(seed, instrument);
@@ -234,6 +237,7 @@ impl Scenario {
         Ok(Simulated {
             run,
             truth,
+            common,
             terms,
             geometry: self.geometry(&imperfection),
             thermal,

@@ -17,6 +17,7 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
         "terminal_size",
     ];
     let of_logs = ["bzip2-rs", "lz4_flex", "ruzstd"];
+    let of_certificates = ["krilla", "ttf-parser"];
     let tree = |features: &[&str]| {
         let output = Command::new(env!("CARGO"))
             .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
@@ -39,6 +40,11 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
     let found = |names: Vec<String>| count(&of_interface, &names);
     assert_eq!(count(&of_logs, &tree(&["--no-default-features"])), 0);
     assert_eq!(count(&of_logs, &tree(&[])), of_logs.len());
+    assert_eq!(
+        count(&of_certificates, &tree(&["--no-default-features"])),
+        0
+    );
+    assert_eq!(count(&of_certificates, &tree(&[])), of_certificates.len());
     assert_eq!(found(tree(&["--no-default-features"])), 0);
     assert_eq!(
         found(tree(&["--no-default-features", "--features", "report"])),

@@ -1,10 +1,14 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
+mod back;
 mod propagation;
 mod standing;
+mod tape;
 mod update;
 
+pub(in crate::calibration) use back::{Effect, Followed, Told};
 pub(in crate::calibration) use standing::{Innovations, Observer, Taken, Verdict};
+pub(in crate::calibration) use tape::{Driver, Operation};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -34,6 +38,8 @@ pub(in crate::calibration) struct Filter {
     own_sigma: ParameterVector,
     /// What auxiliary parameters that are tried would do.
     pub sensitivity: Option<Sensitivity>,
+    /// What was done to the errors, where that is kept.
+    tape: Option<Vec<Operation>>,
 }
 
 impl Filter {
@@ -78,6 +84,7 @@ impl Filter {
             varying,
             own_sigma: model.own_sigma,
             sensitivity: None,
+            tape: None,
         }
     }
 
@@ -116,6 +123,12 @@ impl Filter {
             let variance = start.attitude_sigma[axis].powi(2);
             self.p[(ATTITUDE + axis, initial + axis)] = variance;
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Drawn {
+                    states: vec![ATTITUDE + axis, initial + axis],
+                    sigma: start.attitude_sigma[axis],
+                });
+            }
         }
         self.redraw_table(table_sigma);
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
@@ -137,6 +150,10 @@ impl Filter {
         self.x[state] = mean;
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.redraw(state);
+        }
+        if let Some(tape) = &mut self.tape {
+            let states = vec![state];
+            tape.push(Operation::Drawn { states, sigma });
         }
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
@@ -168,6 +185,9 @@ impl Filter {
     pub fn come_to_rest(&mut self, computed: &State) {
         for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
             let turn = skew(-computed);
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Turned { first, by: turn });
+            }
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;

@@ -16,7 +16,10 @@ use super::linearisation::{AttitudePrior, Linearisation, Start};
 use super::model::Model;
 use super::problem::{Problem, Stretch};
 use earlier::Earlier;
-pub(super) use filter::{Filter, Innovations, Observer, PriorErrors, Taken, Verdict};
+pub(super) use filter::{
+    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Taken, Told,
+    Verdict,
+};
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
 use result::Sums;

@@ -2,7 +2,6 @@
 
 use super::super::group::{Group, axis_name, short_name};
 use super::super::number::{count, value};
-use super::super::outlook;
 use super::super::plot::{Axis, Color, Mark, Matrix, Panel, Plot, Series};
 use super::report::Report;
 use super::{methods, path};
@@ -21,7 +20,6 @@ impl Report<'_> {
     /// Every figure that there is something to show in.
     pub(super) fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
-        plots.extend(outlook::figure(self.navigation.unwrap_or_default()));
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
             (Some(truth), methods @ [_, ..]) => Some(methods::errors(methods, &truth)),
             (None, &[(_, closed), (_, filter)]) => Some(methods::differences(closed, filter)),

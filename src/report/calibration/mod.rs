@@ -1,5 +1,6 @@
 //! The report of a calibration, and of both methods side by side.
 
+mod budget;
 mod facts;
 mod figures;
 mod methods;
@@ -9,6 +10,7 @@ mod tables;
 mod temperature;
 #[cfg(test)]
 mod tests;
+mod verdict;
 
 use super::document::{Document, Table};
 use super::number::{count, three_digits, value};
@@ -21,15 +23,17 @@ impl Report<'_> {
     /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
-        document.lead = self.lead();
+        document.lead = vec![self.verdict()];
+        document.lead.extend(self.lead());
         document.warnings.items = self.warnings();
-        if document.warnings.items.is_empty() && self.outcome.is_some() {
-            document.lead.push("No warnings.".to_owned());
-        }
+        document.page(facts::item(self));
+        document.both(self.groups());
+        outlook::in_a_line(&mut document, self.navigation);
+        document.fold("Every parameter");
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }
-        document.both(self.groups());
+        document.fold("Residuals, consistency, error terms");
         document.both(
             self.quality
                 .map_or_else(Table::default, |of| tables::residuals(of, self.table())),
@@ -41,10 +45,22 @@ impl Report<'_> {
             document.both(effects::costs(self.effects));
             document.both(effects::explained(self.effects));
         }
+        if let (Some(of), Some(estimate)) = (self.budget, self.estimate()) {
+            document.fold("Uncertainty budget");
+            document.page(budget::table(of, estimate));
+            document.page(budget::figure(of, estimate));
+            document.page(budget::left_off(self.effects, estimate));
+        }
+        document.fold("Navigation");
         outlook::add(&mut document, self.navigation);
+        if let Some(plot) = outlook::figure(self.navigation.unwrap_or_default()) {
+            document.page(plot);
+        }
+        document.fold("Figures");
         for plot in self.figures() {
             document.page(plot);
         }
+        document.fold("Observability, model, method and run");
         if let Some(outcome) = self.outcome {
             document.page(tables::weakest(outcome));
         }

@@ -1,6 +1,9 @@
 //! The covariance over a block of navigation.
 
+use nalgebra::DMatrix;
+
 use super::Filter;
+use super::tape::Operation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::imu::{PerSensor, Sensor};
@@ -21,21 +24,12 @@ impl Filter {
         let turn = self.layout.turn_at_rest();
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
         let moving: Vec<usize> = (0..NAVIGATION).chain(turn).collect();
-        // The turn has the noise of the attitude, and its own.
+        // The turn does what the attitude does.
         let own = |place: usize| match place.checked_sub(NAVIGATION) {
             Some(axis) => ATTITUDE + axis,
             None => place,
         };
-        let of_navigation = block.noise.covariance(&self.noise);
-        let mut noise = [[0.0; MOVING]; MOVING];
-        for (row, of_row) in noise.iter_mut().enumerate() {
-            for (column, noise) in of_row.iter_mut().enumerate() {
-                *noise = of_navigation[(own(row), own(column))];
-            }
-            if row >= NAVIGATION {
-                of_row[row] += self.turning.powi(2) * block.duration;
-            }
-        }
+        let noise = self.noise_of_move::<MOVING>(block);
         let phi = self.moving_rows::<MOVING>(block);
         let on = self.layout.terms().count();
         let tried = self.layout.tried_terms().zip(&block.terms[on..]);
@@ -89,6 +83,12 @@ impl Filter {
             for (row, &at_row) in moving.iter().enumerate() {
                 self.p[(at_row, at_column)] = corner[column][row];
             }
+        }
+        if let Some(tape) = &mut self.tape {
+            tape.push(Operation::Carried {
+                moving: moving.to_vec(),
+                transition: DMatrix::from_fn(MOVING, phi.len(), |row, k| phi[k][row]),
+            });
         }
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.propagate(phi, |place| moving[place], tried);
@@ -155,6 +155,13 @@ impl Filter {
         for &(state, sigma, correlation_time) in &self.varying {
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Varied {
+                    state,
+                    keep,
+                    variance: sigma.powi(2) * (1.0 - keep * keep),
+                });
+            }
             if let Some(sensitivity) = &mut self.sensitivity {
                 sensitivity.scale(state, keep);
             }
