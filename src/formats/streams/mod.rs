@@ -2,10 +2,14 @@
 //!
 //! A format is told by the file's first bytes, never by its name. Each is a feature of the crate.
 
+#[cfg(any(feature = "mat", feature = "npy"))]
 mod arrays;
+// A build that reads no logs only tells what they are.
+#[cfg_attr(not(feature = "logs"), allow(dead_code))]
 mod bytes;
 #[cfg(any(feature = "mcap", feature = "rosbag"))]
 mod channel;
+#[cfg(any(feature = "dataflash", feature = "ulog"))]
 mod corrections;
 #[cfg(feature = "dataflash")]
 mod dataflash;
@@ -45,6 +49,7 @@ pub(super) struct Column {
     pub unit: &'static str,
 }
 
+#[cfg_attr(not(feature = "logs"), allow(dead_code))]
 impl Column {
     fn new(name: impl Into<String>, unit: &'static str) -> Self {
         Self {
