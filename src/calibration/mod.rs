@@ -4,6 +4,7 @@
 //! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] says what
 //! could be had. Nothing here prints, reads files or draws.
 
+mod at_rest;
 mod auxiliary;
 mod batch;
 mod bound;
@@ -53,6 +54,7 @@ mod thermal_record;
 mod together;
 mod unexplained;
 
+pub use at_rest::{AtRest, AxisAtRest, Second};
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };

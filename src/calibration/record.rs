@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::at_rest::AtRest;
 use super::auxiliary::{Auxiliary, auxiliary_name};
 use super::budget::Budget;
 use super::closed_form::ClosedForm;
@@ -13,7 +14,9 @@ use super::finding::Finding;
 use super::innovation::{Consistency, Nis};
 use super::observability::Direction;
 use super::outcome::Outcome;
-use super::parameters::{PARAMETERS, parameter, parameter_name, sensor_and_parameter};
+use super::parameters::{
+    PARAMETERS, ParameterMatrix, parameter, parameter_name, sensor_and_parameter,
+};
 use super::problem::Problem;
 use super::quality::{Measures, Quality, Spread};
 use super::result::{
@@ -71,7 +74,10 @@ impl Outcome {
                 Some(_) => FORMAT_WITH_TEMPERATURE.to_owned(),
                 None => FORMAT.to_owned(),
             },
-            temperature: ThermalRecord::of(self, problem.run()),
+            temperature: self
+                .thermal
+                .as_ref()
+                .map(|thermal| ThermalRecord::of(thermal, &self.estimate, problem.run())),
             recordings: RecordingRecord::all(self, problem.run()),
             warnings: texts(&findings),
             findings: findings.iter().map(FindingRecord::from).collect(),
@@ -126,6 +132,30 @@ impl ClosedForm {
             ..self
                 .estimate
                 .record(problem.run(), self.reference.body_frame())
+        }
+    }
+}
+
+impl AtRest {
+    /// What of a calibration it says: biases of the gyros within Earth rate, and how all biases change; the rest is as
+    /// it was known before.
+    pub fn record(&self, run: &Run) -> Calibration {
+        let (triads, sigma) = self.triads(run);
+        let mut covariance = ParameterMatrix::zeros();
+        for sensor in Sensor::ALL {
+            for (of_triad, sigma) in sigma.get(sensor).iter().enumerate() {
+                let index = parameter(sensor, of_triad);
+                covariance[(index, index)] = sigma * sigma;
+            }
+        }
+        let estimate = Estimate { triads, covariance };
+        let findings = self.findings(&estimate);
+        Calibration {
+            format: FORMAT_WITH_TEMPERATURE.to_owned(),
+            temperature: Some(ThermalRecord::of(&self.thermal(), &estimate, run)),
+            warnings: texts(&findings),
+            findings: findings.iter().map(FindingRecord::from).collect(),
+            ..estimate.record(run, BodyFrame::Accelerometer)
         }
     }
 }

@@ -11,9 +11,10 @@ use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
 use super::record::{rows, sigma_rows};
 use super::result::{Calibration, TriadRecord};
+use super::thermal::Thermal;
 use crate::imu::{
-    InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalRange, ThermalState, ThermalValues,
-    Triad, TriadVector, powers,
+    InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalRange,
+    ThermalState, ThermalValues, Triad, TriadVector, powers,
 };
 use crate::run::Run;
 
@@ -147,10 +148,9 @@ impl From<&RangeRecord> for ThermalRange {
 }
 
 impl ThermalRecord {
-    /// Of an outcome, in the file's quantity.
-    pub(super) fn of(outcome: &Outcome, run: &Run) -> Option<Self> {
-        let thermal = outcome.thermal.as_ref()?;
-        let form = outcome.estimate.form();
+    /// Of estimates at the reference and of coefficients, in the file's quantity.
+    pub(super) fn of(thermal: &Thermal, estimate: &Estimate, run: &Run) -> Self {
+        let form = estimate.form();
         let factor = |index: usize| {
             let (sensor, of_triad) = sensor_and_parameter(index);
             run.instrument.nominal.get(sensor).factor(of_triad)
@@ -178,8 +178,8 @@ impl ThermalRecord {
                 by_powers.insert(name, of_powers[..order].to_vec());
             }
         }
-        let estimated = outcome.estimate.estimated();
-        Some(Self {
+        let estimated = estimate.estimated();
+        Self {
             equation: EQUATION.to_owned(),
             range: PerSensor::from_fn(|sensor| thermal.model.range.get(sensor).into()),
             coefficients: coefficients.collect(),
@@ -196,7 +196,44 @@ impl ThermalRecord {
                 })
                 .collect(),
             powers: by_powers,
-        })
+        }
+    }
+
+    /// Of a known truth, in the file's quantity.
+    pub fn of_truth(
+        range: &PerSensor<ThermalRange>,
+        coefficients: &PerSensor<ThermalCoefficients>,
+        run: &Run,
+    ) -> Self {
+        let form = InstallationForm::General;
+        let mut all = Vec::new();
+        let mut by_powers = BTreeMap::new();
+        for index in 0..PARAMETERS {
+            let (sensor, of_triad) = sensor_and_parameter(index);
+            let factor = run.instrument.nominal.get(sensor).factor(of_triad);
+            let row: ThermalValues = coefficients.get(sensor).row(of_triad).transpose();
+            let Some(name) = parameter_name(form, index) else {
+                continue;
+            };
+            for function in (0..row.len()).filter(|&function| row[function] != 0.0) {
+                all.push(CoefficientRecord {
+                    parameter: name.clone(),
+                    order: (function != RATE).then_some(function + 1),
+                    value: row[function] * factor,
+                    sigma: None,
+                });
+            }
+            let of_powers = powers(range.get(sensor), &row).map(|a| a * factor);
+            by_powers.insert(name, of_powers.to_vec());
+        }
+        Self {
+            equation: EQUATION.to_owned(),
+            range: PerSensor::from_fn(|sensor| range.get(sensor).into()),
+            coefficients: all,
+            covariance: Vec::new(),
+            cross: Vec::new(),
+            powers: by_powers,
+        }
     }
 
     /// Whether all temperatures lie in their ranges.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{self, Problem, Solution, Together};
+use turncal::calibration::{self, AtRest, Problem, Solution, Together};
 use turncal::formats::Campaign;
+use turncal::report;
 use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::study::Shard;
@@ -17,10 +18,16 @@ use super::lot;
 use super::output::{Overwrite, print, show};
 use super::progress::Activity;
 
+/// Highest order of the polynomials of outputs at rest.
+const HIGHEST_ORDER_AT_REST: usize = 5;
+
 /// Estimates scale factors, installation and biases of a run
 ///
 /// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
 /// failure.
+///
+/// With --temperature parameters follow the temperature column; of an instrument that stands in one attitude only
+/// biases do.
 ///
 /// A campaign.toml names several recordings of one instrument, which are calibrated as one: its parameters may
 /// follow temperature, and differ from day to day.
@@ -109,11 +116,41 @@ impl Calibrate {
             true => {
                 let together = Together::default();
                 let problem = self.estimation.together(&[&run], &together);
-                problem.inspect_err(|_| say(&run.recording.notes))?
+                let problem = problem.inspect_err(|_| say(&run.recording.notes))?;
+                // Without a turn, only what is at rest against temperature can be had.
+                if problem.dwells().nth(1).is_none()
+                    && let Some(at_rest) = AtRest::new(&run, HIGHEST_ORDER_AT_REST)
+                {
+                    return self.at_rest(&at_rest, &run, path);
+                }
+                problem
             }
             false => self.estimation.problem(&run, path)?,
         };
         self.solved(&problem, &run.recording.name, path, activity)
+    }
+
+    /// Outputs of an instrument that stands against its temperature.
+    fn at_rest(&self, at_rest: &AtRest, run: &Run, path: &Path) -> anyhow::Result<()> {
+        let calibration = at_rest.record(run);
+        let document = report::at_rest::document(at_rest, run, &calibration);
+        let target = match (&self.output, self.json) {
+            (Some(directory), _) => Some(directory.clone()),
+            (None, true) => None,
+            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.recording.name))),
+        };
+        if let Some(target) = &target {
+            let directory = self.overwrite.directory(target, &[path])?;
+            calibration.write(&directory.path().join("calibration.json"), false)?;
+            write_report(&document, &directory.path().join("report"))?;
+            directory.commit()?;
+        }
+        match self.json {
+            true => print(&calibration.to_json(Path::new("standard output"))?),
+            false => show(&document, false),
+        }?;
+        say(&run.recording.notes);
+        Ok(())
     }
 
     fn campaign(&self, path: &Path) -> anyhow::Result<()> {

@@ -16,7 +16,10 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     if inside.is_file() {
         return Err(format!("this is a directory; give {}", inside.display()));
     }
-    let log = [".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".log"];
+    let log = [
+        ".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".log", ".bag", ".bin", ".mat", ".mcap", ".npy",
+        ".npz", ".ulg",
+    ];
     if path.is_file() && log.iter().any(|end| text.ends_with(end)) {
         return Err(format!(
             "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"

@@ -90,6 +90,9 @@ impl Simulate {
             write(recording, &of_recording)?;
             paths.push(format!("{name}/run.toml"));
         }
+        if let Some(truth) = SimulatedCampaign::truth(&simulated) {
+            truth.write(&directory.path().join("truth.json"), false)?;
+        }
         let text = campaign_text(&paths, &campaign.day_to_day);
         let path = directory.path().join("campaign.toml");
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;

@@ -72,11 +72,14 @@ impl Joined {
             true => 1.0,
             false => seconds / over,
         };
+        let ahead = gyro.clock.first - accel.clock.first;
         let mut course = 0;
         let mut weights = 0.0;
         for (k, &number) in gyro.clock.numbers.iter().enumerate() {
             let time = gyro.clock.first + number as f64 * period;
-            let (begin, end) = (time - lag * period, time + (1.0 - lag) * period);
+            // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
+            let begin = ahead + (number as f64 - lag) * period;
+            let end = begin + period;
             while courses
                 .get(course)
                 .is_some_and(|course| course.end() < begin)
@@ -257,17 +260,14 @@ impl Track {
     /// Samples that follow one another.
     fn courses(&self, lag: f64) -> Vec<Course> {
         let Uniform {
-            first,
-            period,
-            numbers,
-            ..
+            period, numbers, ..
         } = &self.clock;
         let mut courses: Vec<Course> = Vec::new();
         for (k, &number) in numbers.iter().enumerate() {
             let follows = k > 0 && number == numbers[k - 1] + 1;
             if !follows {
                 courses.push(Course {
-                    begin: first + (number as f64 - lag) * period,
+                    begin: (number as f64 - lag) * period,
                     period: *period,
                     sums: [const { Vec::new() }; 3],
                 });
@@ -290,6 +290,7 @@ const SAME: f64 = 1e-6;
 
 /// Samples without a gap, whose integrals are counted in values times samples.
 struct Course {
+    /// From the stream's first stamp, s.
     begin: f64,
     period: f64,
     sums: [Vec<f64>; 3],

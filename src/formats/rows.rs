@@ -56,7 +56,7 @@ pub(super) struct LogRows {
 }
 
 enum Kind {
-    Text(CsvFile),
+    Text(Box<CsvFile>),
     Stream(StreamRows),
     Joined(Joined),
 }
@@ -64,7 +64,7 @@ enum Kind {
 impl LogRows {
     fn text(csv: CsvFile) -> Self {
         Self {
-            kind: Kind::Text(csv),
+            kind: Kind::Text(Box::new(csv)),
             names: Names::default(),
         }
     }

@@ -18,6 +18,7 @@ pub struct ThermalVariation {
 }
 
 impl ThermalVariation {
+    /// Of no grade.
     #[cfg(test)]
     pub fn for_test() -> Self {
         Self {

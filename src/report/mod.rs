@@ -34,6 +34,7 @@ pub mod terminal;
 
 pub mod accuracy;
 pub mod allan;
+pub mod at_rest;
 pub mod calibration;
 pub mod campaign;
 #[cfg(feature = "certificate")]

@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::scenario::ChamberFile;
 use super::{Chamber, Draws, Scenario, Simulated};
-use crate::calibration::{Group, ParameterVector, TemperatureOptions, Together};
-use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
+use crate::calibration::result::{Calibration, FORMAT_WITH_TEMPERATURE};
+use crate::calibration::{
+    Group, ParameterVector, TemperatureOptions, ThermalRecord, Together, truth_record,
+};
+use crate::imu::{ParameterKind, PerSensor, Sensor, ThermalRange, Triad};
 use crate::models::{self, ModelError, NonNegative, Place, Room};
 use crate::turntable::TableError;
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
@@ -95,6 +98,40 @@ impl SimulatedCampaign {
             scenario.simulate_recording(seed, stream, of, &own)
         })
         .collect()
+    }
+
+    /// The truth that simulated recordings have in common, in the file's quantity: it changes with temperature
+    /// within what they saw.
+    pub fn truth(simulated: &[Simulated]) -> Option<Calibration> {
+        let first = simulated.first()?;
+        let run = &first.run;
+        let Some(thermal) = &first.thermal else {
+            return Some(truth_record(&first.common, run));
+        };
+        let range = PerSensor::from_fn(|sensor| {
+            let all = simulated.iter();
+            let known = all.filter_map(|one| one.run.recording.imu.temperature.as_ref());
+            let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut largest_rate = 0.0f64;
+            for temperature in known {
+                let [low, high] = temperature.range(sensor);
+                (lowest, highest) = (lowest.min(low), highest.max(high));
+                largest_rate = largest_rate.max(temperature.largest_rate(sensor));
+            }
+            ThermalRange {
+                lowest,
+                highest,
+                reference: 0.5 * (lowest + highest),
+                largest_rate,
+            }
+        });
+        let at = thermal.at(&first.common, range.gyro.reference, 0.0);
+        let coefficients = thermal.coefficients(&range);
+        Some(Calibration {
+            format: FORMAT_WITH_TEMPERATURE.to_owned(),
+            temperature: Some(ThermalRecord::of_truth(&range, &coefficients, run)),
+            ..truth_record(&at, run)
+        })
     }
 
     /// What its recordings have in common, as an engineer would say of it.

@@ -3,6 +3,7 @@
 
 mod course;
 mod outlook;
+mod warming;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
@@ -21,6 +22,7 @@ use crate::navigation::{
 use course::Course;
 
 pub use outlook::Outlook;
+pub use warming::{Warming, WarmingError, WarmingPair};
 
 /// Time in s between two moments of a result.
 pub const INTERVAL: f64 = 60.0;
@@ -110,6 +112,9 @@ pub enum NavigationStudyError {
         /// Which triad.
         sensor: Sensor,
     },
+    /// Calibrations that cannot be navigated with while they warm up.
+    #[error(transparent)]
+    Warming(#[from] WarmingError),
     /// Roll and heading are one.
     #[error("at a pitch of ±90° roll and heading are not apart: give a pitch within ±89°")]
     Upright,
@@ -237,7 +242,15 @@ impl Mission {
         start: &ErrorVector,
         pair: &Pair,
     ) -> Result<Vec<Epoch>, NavigationStudyError> {
-        let sensed = pair.sensed()?;
+        self.errors_by(start, |_| pair.sensed())
+    }
+
+    /// The same where what is sensed is new in each interval, told by number.
+    fn errors_by(
+        &self,
+        start: &ErrorVector,
+        sensed: impl Fn(u32) -> Result<PerSensor<Sensed>, NavigationStudyError>,
+    ) -> Result<Vec<Epoch>, NavigationStudyError> {
         let steps = match &self.motion {
             Motion::Standing(_) => STANDING_STEPS,
             Motion::Moving(_) => MOVING_STEPS,
@@ -247,6 +260,7 @@ impl Mission {
         let mut navigation = Strapdown::new(course.truth().with_errors(start), period)?;
         let mut moments = vec![moment(0.0, &navigation, course.truth())];
         for interval in 1..=self.intervals {
+            let sensed = sensed(interval)?;
             for _ in 0..steps {
                 let ideal = course.advance();
                 let truth = course.truth();

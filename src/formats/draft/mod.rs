@@ -9,6 +9,7 @@ mod streams;
 mod text;
 mod time;
 mod turns;
+mod two_files;
 mod units;
 
 use std::cell::RefCell;
@@ -71,6 +72,15 @@ impl Draft {
             Some((streams, sheet)) => Ok(Self::of_sheet(sheet, Some(streams))),
             None => Ok(Self::of_sheet(Sheet::read(path, FEWEST_ROWS)?, None)),
         }
+    }
+
+    /// Looks at two files of rows, of gyros and of accelerometers; how the latter is to be called in the draft.
+    ///
+    /// # Errors
+    /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
+    pub fn of_two_files(gyro: &Path, accel: &Path, accel_name: &str) -> Result<Self, FileError> {
+        let (streams, sheet) = Streams::of_two_files(gyro, accel, accel_name)?;
+        Ok(Self::of_sheet(sheet, Some(streams)))
     }
 
     /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory

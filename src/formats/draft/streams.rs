@@ -3,13 +3,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::FEWEST_ROWS;
+use super::columns::Columns;
 use super::name::Name;
 use super::text::{line, quoted};
+use super::{FEWEST_ROWS, time};
 use crate::formats::clock::{Clock, TimeUnit};
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::{LogRows, Source};
-use crate::formats::streams::{self, Found};
+use crate::formats::streams::{self, Column, Found};
 use crate::formats::{FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
@@ -45,8 +46,8 @@ fn one_line(text: &str) -> String {
 }
 
 /// The place of each triad and of time in a stream.
-struct Places {
-    triads: PerSensor<Option<[usize; 3]>>,
+pub(super) struct Places {
+    pub triads: PerSensor<Option<[usize; 3]>>,
     time: Option<usize>,
 }
 
@@ -112,15 +113,23 @@ impl Streams {
             stream: Some(&found[k].stream.name),
             salvage,
         };
-        let time = |k: usize| {
+        let time_of = |k: usize| {
             let place = places[k].time.unwrap_or(0);
             let column = &found[k].stream.columns[place];
             (column.name.clone(), column.unit)
         };
-        let of_both = PerSensor {
-            gyro: time(gyro),
-            accel: time(accel.unwrap_or(gyro)),
+        let mut of_both = PerSensor {
+            gyro: time_of(gyro),
+            accel: time_of(accel.unwrap_or(gyro)),
         };
+        if let Some(accel) = accel {
+            for (k, sensor) in [(gyro, Sensor::Gyro), (accel, Sensor::Accel)] {
+                let (name, unit) = of_both.get_mut(sensor);
+                if unit.is_empty() {
+                    *unit = unit_of(&source(k), name)?;
+                }
+            }
+        }
         let mut sheet = match accel {
             None => Sheet::of(source(gyro).open()?, FEWEST_ROWS)?,
             Some(accel) => {
@@ -129,35 +138,19 @@ impl Streams {
                     accel: source(accel),
                 };
                 let numbers = PerSensor { gyro, accel };
-                let part = |sensor: Sensor| {
+                joined(&PerSensor::from_fn(|sensor| {
                     let k = *numbers.get(sensor);
-                    let (name, unit) = of_both.get(sensor);
-                    let unit = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
-                    let triad = places[k].triads.get(sensor).unwrap_or_default();
-                    Part {
+                    Member {
                         source: sources.get(sensor),
-                        clock: Clock {
-                            column: Some(name),
-                            nanoseconds: None,
-                            unit: unit.map_or(TimeUnit::PerSecond(1.0), |&(_, unit)| unit),
-                            period: None,
-                        },
-                        columns: triad.map(|k_of| &*found[k].stream.columns[k_of].name),
-                        further: &[],
+                        found: &found[k],
+                        triad: places[k].triads.get(sensor).unwrap_or_default(),
+                        time: of_both.get(sensor).clone(),
                     }
-                };
-                let parts = PerSensor::from_fn(part);
-                let joined = Joined::read(&parts, Output::Rate, 1.0)?;
-                Sheet::of(LogRows::joined(joined), FEWEST_ROWS)?
+                }))?
             }
         };
         if accel.is_none() {
             sheet.names = names(&found[gyro]);
-        } else {
-            let triads = Sensor::ALL
-                .map(|sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name())));
-            let all = triads.as_flattened().iter().cloned();
-            sheet.names = std::iter::once("time".to_owned()).chain(all).collect();
         }
         let name = |k: usize| found[k].stream.name.clone();
         let streams = Self {
@@ -271,6 +264,55 @@ impl Streams {
     }
 }
 
+/// The word for the unit of a column of time, by its steps.
+fn unit_of(source: &Source, name: &str) -> Result<&'static str, FileError> {
+    let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
+    let mut columns = Columns::find(&sheet);
+    columns.time = sheet.names.iter().position(|known| known == name);
+    Ok(time::Clock::find(&sheet, &mut columns).unit)
+}
+
+/// One of two streams that are one record.
+pub(super) struct Member<'a> {
+    pub source: &'a Source<'a>,
+    pub found: &'a Found,
+    pub triad: [usize; 3],
+    /// The column of its time and the word for its unit.
+    pub time: (String, &'static str),
+}
+
+/// Both triads on one clock, as columns whose names say what they are.
+pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
+    let part = |sensor: Sensor| {
+        let Member {
+            source,
+            found,
+            triad,
+            time: (name, unit),
+        } = members.get(sensor);
+        let unit = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
+        Part {
+            source,
+            clock: Clock {
+                column: Some(name),
+                nanoseconds: None,
+                unit: unit.map_or(TimeUnit::PerSecond(1.0), |&(_, unit)| unit),
+                period: None,
+            },
+            columns: triad.map(|column| &*found.stream.columns[column].name),
+            further: &[],
+        }
+    };
+    let joined = Joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
+    let mut sheet = Sheet::of(LogRows::joined(joined), FEWEST_ROWS)?;
+    let of = |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));
+    let triads = Sensor::ALL.map(of);
+    sheet.names = std::iter::once("time".to_owned())
+        .chain(triads.as_flattened().iter().cloned())
+        .collect();
+    Ok(sheet)
+}
+
 /// The names of a stream's columns, with the stream's before them where they do not say what they are.
 fn names(found: &Found) -> Vec<String> {
     let bare = || {
@@ -289,7 +331,7 @@ fn names(found: &Found) -> Vec<String> {
 }
 
 impl Places {
-    fn of(found: &Found) -> Self {
+    pub fn of(found: &Found) -> Self {
         let all: Vec<Name> = names(found).iter().map(|name| Name::of(name)).collect();
         let triads = PerSensor::from_fn(|sensor| {
             let of = |k: &usize| all[*k].sensor() == Some(sensor);
@@ -313,9 +355,15 @@ impl Places {
             })
         });
         let best = (0..all.len()).rev().max_by_key(|&k| all[k].is_time());
+        let named = best.filter(|&k| all[k].is_time() > 1);
+        // `t_gyro`, `imu.t`
+        let has_word = |column: &Column| {
+            let mut words = column.name.split(|c: char| !c.is_alphanumeric());
+            words.any(|word| ["t", "ts"].contains(&word))
+        };
         Self {
             triads,
-            time: best.filter(|&k| all[k].is_time() > 1),
+            time: named.or_else(|| found.stream.columns.iter().position(has_word)),
         }
     }
 }

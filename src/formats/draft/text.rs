@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::Draft;
+use super::name::axes_of_program;
 use super::units::short;
 use crate::imu::{NoiseKeys, Output, Sensor};
 use crate::noise::NoiseFigures;
@@ -153,7 +154,8 @@ impl Draft {
         } else {
             line(text, "continuous", "true", &self.gaps());
         }
-        match self.streams.as_ref().and_then(|streams| streams.axes) {
+        let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
+        match of_streams.or_else(|| axes_of_program(&self.columns.names)) {
             Some(axes) => line(
                 text,
                 "body_axes",

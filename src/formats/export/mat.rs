@@ -107,7 +107,7 @@ fn numbers(name: &str, rows: usize, values: &[f64]) -> Vec<u8> {
         .iter()
         .flat_map(|value| value.to_le_bytes())
         .collect();
-    let columns = if rows == 0 { 0 } else { values.len() / rows };
+    let columns = values.len().checked_div(rows).unwrap_or(0);
     array(NUMBERS, name, rows, columns, &element(DOUBLE, &bytes))
 }
 

@@ -80,6 +80,11 @@ impl Input {
 
     /// Goes to another place.
     pub fn go_to(&mut self, offset: u64) -> Result<(), Broken> {
+        if offset > self.length {
+            let found = format!("a part at byte {offset}");
+            let expected = format!("one within the file of {} bytes", self.length);
+            return Err(Broken::new(self.offset, found, expected));
+        }
         let sought = self.source.seek(SeekFrom::Start(offset));
         sought.map_err(|error| Broken::new(offset, error, "a place in the file"))?;
         self.offset = offset;

@@ -43,6 +43,13 @@ impl Corrected {
     }
 }
 
+/// What was applied while parameters had changed so often, and to which device.
+struct Known {
+    changes: u64,
+    device: Option<f64>,
+    applied: Option<Applied>,
+}
+
 /// What is taken out of the samples of a stream.
 pub(super) struct Undo {
     /// Who applied it.
@@ -50,7 +57,7 @@ pub(super) struct Undo {
     pub corrected: PerSensor<Option<Corrected>>,
     said: PerSensor<Option<String>>,
     /// What was applied, as long as parameters and device stay.
-    found: PerSensor<Option<(u64, Option<f64>, Option<Applied>)>>,
+    found: PerSensor<Option<Known>>,
 }
 
 impl Undo {
@@ -78,11 +85,15 @@ impl Undo {
             let known = self.found.get_mut(sensor);
             if !known
                 .as_ref()
-                .is_some_and(|known| known.0 == changes && known.1 == device)
+                .is_some_and(|known| known.changes == changes && known.device == device)
             {
-                *known = Some((changes, device, applied(sensor, device)));
+                *known = Some(Known {
+                    changes,
+                    device,
+                    applied: applied(sensor, device),
+                });
             }
-            let found = known.as_ref().and_then(|known| known.2.as_ref());
+            let found = known.as_ref().and_then(|known| known.applied.as_ref());
             if let Some(applied) = found.filter(|applied| !applied.is_more) {
                 let seconds = of.interval.map_or(1.0, |place| 1e-6 * row[place]);
                 for (axis, &place) in of.values.iter().enumerate() {

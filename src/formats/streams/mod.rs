@@ -161,8 +161,8 @@ pub(super) fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
             "Names in run.toml are relative to run.toml; correct the name or add the file.",
         )
     };
-    // What is no regular file is refused where text is read.
-    if !std::fs::metadata(path).map_err(refused)?.is_file() {
+    // What is no regular file, or none at all, is refused where text is read.
+    if !std::fs::metadata(path).is_ok_and(|kind| kind.is_file()) {
         return Ok(None);
     }
     let mut file = File::open(path).map_err(refused)?;

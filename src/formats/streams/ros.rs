@@ -6,15 +6,14 @@
 //! Source: wiki.ros.org/msg and wiki.ros.org/ROS/Technical Overview; ROS 2 design, "Interface definition"; OMG CDR
 //! (CORBA 3.3, 9.3) with the encapsulation of RTPS 2.3, 10.
 
+mod definition;
+
 use super::Column;
 use super::bytes::{Broken, Kind};
+use definition::Parser;
 
-/// Types within types.
-const DEEPEST: usize = 16;
 /// Longer arrays of numbers are no columns.
 const LONGEST: usize = 64;
-/// A message of more fields is none of an instrument.
-const MOST_FIELDS: usize = 4096;
 
 /// How numbers follow one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,165 +51,28 @@ enum Many {
     Any,
 }
 
+impl Many {
+    /// Whether numbers of it are columns.
+    fn is_column(self) -> bool {
+        match self {
+            Self::One => true,
+            Self::Fixed(size) => (1..=LONGEST).contains(&size),
+            Self::Any => false,
+        }
+    }
+}
+
 impl Message {
     /// By the text of its definition, behind which are those of the types that it needs; what is wrong with it if
     /// it cannot be read.
     pub fn parse(name: &str, definition: &str, encoding: Encoding) -> Result<Self, String> {
-        let mut definitions = vec![(name.replace("/msg/", "/"), String::new())];
-        for line in definition.lines() {
-            if line.starts_with("====") {
-                definitions.push(Default::default());
-            } else if let Some(name) = line.strip_prefix("MSG:") {
-                if let Some(last) = definitions.last_mut() {
-                    last.0 = name.trim().replace("/msg/", "/");
-                }
-            } else if let Some((_, text)) = definitions.last_mut() {
-                text.push_str(line);
-                text.push('\n');
-            }
-        }
-        let mut message = Self {
-            fields: Vec::new(),
-            columns: Vec::new(),
+        let mut parser = Parser::new(name, definition, encoding);
+        let fields = parser.message()?;
+        Ok(Self {
+            fields,
+            columns: parser.columns,
             encoding,
-        };
-        let mut count = 0;
-        message.fields = message.of_type(&definitions, 0, "", true, 0, &mut count)?;
-        Ok(message)
-    }
-
-    fn of_type(
-        &mut self,
-        all: &[(String, String)],
-        place: usize,
-        prefix: &str,
-        is_column: bool,
-        depth: usize,
-        count: &mut usize,
-    ) -> Result<Vec<Field>, String> {
-        let (own, text) = &all[place];
-        let package = own.split('/').next().unwrap_or_default();
-        let mut fields = Vec::new();
-        for line in text.lines() {
-            let line = line.split('#').next().unwrap_or_default().trim();
-            let mut words = line.split_whitespace();
-            let (Some(kind), Some(name)) = (words.next(), words.next()) else {
-                continue;
-            };
-            let constant =
-                name.contains('=') || words.next().is_some_and(|next| next.starts_with('='));
-            if constant {
-                continue;
-            }
-            *count += 1;
-            if *count > MOST_FIELDS || depth > DEEPEST {
-                return Err(format!("more than {MOST_FIELDS} fields in `{own}`"));
-            }
-            let (kind, many) = match kind.split_once('[') {
-                None => (kind, Many::One),
-                Some((kind, size)) => match size.trim_end_matches(']') {
-                    "" => (kind, Many::Any),
-                    bounded if bounded.starts_with("<=") => (kind, Many::Any),
-                    fixed => {
-                        let size = fixed.parse().map_err(|_| format!("the field `{line}`"))?;
-                        (kind, Many::Fixed(size))
-                    }
-                },
-            };
-            let path = format!("{prefix}{name}");
-            let (repeat, is_column) = match many {
-                Many::One => (None, is_column),
-                Many::Fixed(size) => (Some(size), is_column && size <= LONGEST),
-                Many::Any => (Some(0), false),
-            };
-            let field = self.field(all, package, kind, &path, repeat, is_column, depth, count)?;
-            fields.push(Field { kind: field, many });
-        }
-        Ok(fields)
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn field(
-        &mut self,
-        all: &[(String, String)],
-        package: &str,
-        kind: &str,
-        path: &str,
-        repeat: Option<usize>,
-        is_column: bool,
-        depth: usize,
-        count: &mut usize,
-    ) -> Result<FieldKind, String> {
-        let number = match kind {
-            "bool" | "byte" | "char" | "uint8" => Some(Kind::U8),
-            "int8" => Some(Kind::I8),
-            "int16" => Some(Kind::I16),
-            "uint16" => Some(Kind::U16),
-            "int32" => Some(Kind::I32),
-            "uint32" => Some(Kind::U32),
-            "int64" => Some(Kind::I64),
-            "uint64" => Some(Kind::U64),
-            "float32" => Some(Kind::F32),
-            "float64" => Some(Kind::F64),
-            _ => None,
-        };
-        let mut add = |unit| {
-            if !is_column {
-                return;
-            }
-            match repeat {
-                None => self.columns.push(Column::new(path, unit)),
-                Some(size) => {
-                    let names = (0..size).map(|k| Column::new(format!("{path}[{k}]"), unit));
-                    self.columns.extend(names);
-                }
-            }
-        };
-        if let Some(kind) = number {
-            add(unit(path));
-            return Ok(FieldKind::Number(kind));
-        }
-        if kind == "string" || kind.starts_with("string<=") {
-            return Ok(FieldKind::Text);
-        }
-        let time = match (kind, self.encoding) {
-            ("time", Encoding::Ros1) => Some(Kind::U32),
-            ("duration", Encoding::Ros1) => Some(Kind::I32),
-            _ => None,
-        };
-        if let Some(seconds) = time {
-            add("s");
-            return Ok(FieldKind::Time(seconds));
-        }
-        let full = match (kind, kind.contains('/')) {
-            ("Header", _) => "std_msgs/Header".to_owned(),
-            (_, true) => kind.replace("/msg/", "/"),
-            (_, false) => format!("{package}/{kind}"),
-        };
-        if matches!(
-            &*full,
-            "builtin_interfaces/Time" | "builtin_interfaces/Duration"
-        ) {
-            add("s");
-            return Ok(FieldKind::Time(Kind::I32));
-        }
-        let place = all.iter().position(|(name, _)| *name == full);
-        let place = place.ok_or_else(|| format!("no definition of `{full}`"))?;
-        let before = self.columns.len();
-        // A list of messages is one definition; its columns come once an item.
-        let items = if is_column { repeat.unwrap_or(1) } else { 1 };
-        let mut fields = Vec::new();
-        for item in 0..items.max(1) {
-            let prefix = match repeat {
-                None => format!("{path}."),
-                Some(_) => format!("{path}[{item}]."),
-            };
-            fields = self.of_type(all, place, &prefix, is_column, depth + 1, count)?;
-        }
-        if items == 0 {
-            self.columns.truncate(before);
-        }
-        Ok(FieldKind::Message(fields))
+        })
     }
 
     /// The numbers of a message whose bytes begin at this place of the file.
@@ -227,21 +89,6 @@ impl Message {
             reader.encapsulation()?;
         }
         reader.message(&self.fields, Some(row))
-    }
-}
-
-/// REP 103: SI.
-fn unit(path: &str) -> &'static str {
-    let of = |start: &str| {
-        path.strip_prefix(start)
-            .is_some_and(|rest| rest.starts_with('.'))
-    };
-    if of("angular_velocity") || path.contains(".angular_velocity.") {
-        "rad/s"
-    } else if of("linear_acceleration") || path.contains(".linear_acceleration.") {
-        "m/s^2"
-    } else {
-        ""
     }
 }
 
@@ -317,7 +164,7 @@ impl Reader<'_> {
         for field in fields {
             let (count, is_column) = match field.many {
                 Many::One => (1, true),
-                Many::Fixed(count) => (count, count <= LONGEST),
+                Many::Fixed(count) => (count, field.many.is_column()),
                 Many::Any => (self.length()?, false),
             };
             let mut row = row.as_deref_mut().filter(|_| is_column);
