@@ -29,6 +29,7 @@ mod rows;
 mod segments;
 mod sheet;
 mod small_file;
+mod source;
 mod specification;
 mod streams;
 mod table_log;

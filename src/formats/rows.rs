@@ -1,52 +1,13 @@
 //! LogRows of numbers, whatever a file holds them in.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::csv_file::CsvFile;
 use super::error::{FileError, Place};
 use super::joined::Joined;
 use super::names::Names;
-use super::streams::{self, StreamRows};
+use super::streams::StreamRows;
 use crate::recording::FileColumn;
-
-/// Where rows come from.
-#[derive(Debug, Clone)]
-pub(super) struct Source<'a> {
-    pub file: PathBuf,
-    /// Of a file of several streams the one that is meant.
-    pub stream: Option<&'a str>,
-    /// Whether what is whole of a damaged file is used.
-    pub salvage: bool,
-}
-
-impl Source<'_> {
-    /// A file of which nothing is known.
-    pub fn of_file(file: &Path) -> Self {
-        Self {
-            file: file.to_owned(),
-            stream: None,
-            salvage: false,
-        }
-    }
-
-    /// Opens it by its content.
-    pub fn open(&self) -> Result<LogRows, FileError> {
-        let Some(log) = streams::open(&self.file)? else {
-            if let Some(stream) = self.stream {
-                return Err(FileError::new(
-                    &self.file,
-                    Place::File,
-                    "rows of text",
-                    format_args!("a log with a stream `{stream}`"),
-                    "Leave `stream` out, or name another file.",
-                ));
-            }
-            return CsvFile::open(&self.file).map(LogRows::text);
-        };
-        let rows = StreamRows::open(&self.file, log, self.stream, self.salvage)?;
-        Ok(LogRows::stream(rows))
-    }
-}
 
 /// A file at one of its rows.
 pub(super) struct LogRows {
@@ -62,14 +23,14 @@ enum Kind {
 }
 
 impl LogRows {
-    fn text(csv: CsvFile) -> Self {
+    pub fn text(csv: CsvFile) -> Self {
         Self {
             kind: Kind::Text(Box::new(csv)),
             names: Names::default(),
         }
     }
 
-    fn stream(rows: StreamRows) -> Self {
+    pub fn stream(rows: StreamRows) -> Self {
         Self {
             names: Names::new(rows.header()),
             kind: Kind::Stream(rows),

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::FileError;
-use super::rows::{LogRows, Source};
+use super::rows::LogRows;
+use super::source::Source;
 
 /// The columns of a file of which nothing is known yet.
 #[derive(Debug, Clone, PartialEq)]

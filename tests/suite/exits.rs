@@ -190,7 +190,7 @@ fn open_vins_gives_the_test_vectors_in_both_models_and_takes_g_sensitivity_out()
 fn ikalibr_measures_the_raw_output_of_the_test_vectors_along_its_own_axes() {
     let text = exported(Format::IKalibr).text;
     let file = yaml(&text);
-    let value = |key: String| file[&format!("Intrinsics.{key}")][0];
+    let value = |key: String| file[&format!("Intrinsics.ptr_wrapper.data.{key}")][0];
     let bias = |triad: &str| Vector3::from_fn(|k, _| value(format!("{triad}.BIAS.r{k}c0")));
     let map = |triad: &str| {
         let [a, b, c, d, e, f] =

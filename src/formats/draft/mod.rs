@@ -19,7 +19,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::formats::rows::Source;
+use crate::formats::source::Source;
 use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::NoiseFigures;

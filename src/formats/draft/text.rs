@@ -155,19 +155,22 @@ impl Draft {
             line(text, "continuous", "true", &self.gaps());
         }
         let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
-        match of_streams.or_else(|| axes_of_program(&self.columns.names)) {
+        match of_streams {
             Some(axes) => line(
                 text,
                 "body_axes",
                 &quoted(axes),
-                "as programs that write such logs have them",
+                "as the program that wrote the log has them",
             ),
-            None => line(
-                text,
-                "body_axes",
-                "\"rfu\"",
-                "guessed: x right, y front, z up; else \"frd\" or \"flu\"",
-            ),
+            None => {
+                let mut why = "guessed: x right, y front, z up; else \"frd\" or \"flu\"".to_owned();
+                if let Some(axes) = axes_of_program(&self.columns.names) {
+                    why += &format!(
+                        "; columns are called so by PX4 or ArduPilot, whose axes are \"{axes}\""
+                    );
+                }
+                line(text, "body_axes", "\"rfu\"", &why);
+            }
         }
         if let Some((column, number)) = self.instance {
             let of = format!(

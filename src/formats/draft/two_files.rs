@@ -8,7 +8,7 @@ use super::name;
 use super::name::Name;
 use super::streams::{Member, Places, Streams, Written, joined};
 use super::time::Clock;
-use crate::formats::rows::Source;
+use crate::formats::source::Source;
 use crate::formats::streams::{Column, Found, Stream};
 use crate::formats::{FileError, Place, Sheet};
 use crate::imu::{PerSensor, Sensor};

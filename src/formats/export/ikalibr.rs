@@ -3,7 +3,7 @@
 //! From true to measured: `f_m = MAP_a f + BIAS_a`, `ω_m = MAP_g (SO3_AtoG ω) + BIAS_g`, both maps upper triangular
 //! with the coefficients (00, 11, 22, 01, 02, 12). The body is that of the accelerometers' map.
 //!
-//! Source: iKalibr, `include/sensor/imu_intrinsic.hpp`; cereal's YAML of its matrices.
+//! Source: iKalibr, `include/sensor/imu_intrinsic.hpp` and `config/imu-intri.yaml`.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -46,17 +46,18 @@ pub(super) fn write(source: &Source) -> Exported {
             yaml_list(&row)
         ));
     }
-    file.line("Intrinsics:");
+    // The pointer through which iKalibr reads them.
+    file.line("Intrinsics:\n  ptr_wrapper:\n    id: 2147483649\n    data:");
     let maps = PerSensor { gyro, accel };
     for (name, sensor) in [("ACCE", Sensor::Accel), ("GYRO", Sensor::Gyro)] {
-        file.line(&format!("  {name}:"));
+        file.line(&format!("      {name}:"));
         column(&mut file, "BIAS", along.triads.get(sensor).bias.as_slice());
         column(&mut file, "MAP_COEFF", &coefficients(maps.get(sensor)));
     }
     let q = UnitQuaternion::from_rotation_matrix(&accel_to_gyro);
-    file.line("  SO3_AtoG:");
+    file.line("      SO3_AtoG:");
     for (name, value) in [("qx", q.i), ("qy", q.j), ("qz", q.k), ("qw", q.w)] {
-        file.line(&format!("    {name}: {}", yaml_number(value)));
+        file.line(&format!("        {name}: {}", yaml_number(value)));
     }
     file.finish()
 }
@@ -66,8 +67,8 @@ fn coefficients(map: &Matrix3<f64>) -> [f64; 6] {
 }
 
 fn column(file: &mut Document, name: &str, values: &[f64]) {
-    file.line(&format!("    {name}:"));
+    file.line(&format!("        {name}:"));
     for (row, &value) in values.iter().enumerate() {
-        file.line(&format!("      r{row}c0: {}", yaml_number(value)));
+        file.line(&format!("          r{row}c0: {}", yaml_number(value)));
     }
 }

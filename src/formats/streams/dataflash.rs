@@ -282,7 +282,8 @@ impl DataFlash {
             columns: format.columns.clone(),
             remarks: Vec::new(),
             is_inertial: format.is_inertial(),
-            axes: Some("frd"),
+            // A log with its parameters is an autopilot's, along front, right, down.
+            axes: (!self.parameters.is_empty()).then_some("frd"),
         });
         self.of_streams.insert(key, stream);
         stream

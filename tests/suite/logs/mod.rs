@@ -189,6 +189,7 @@ fn flight(directory: &Path) -> Option<PathBuf> {
     fs::copy(&log, &path).unwrap();
     let draft = turncal(&["init", path.to_str().unwrap()]);
     let draft = String::from_utf8(draft.stdout).unwrap();
+    assert!(draft.contains("\nbody_axes = \"frd\""), "{draft}");
     let text = draft
         .replace("# latitude_deg = ", "latitude_deg = 47.4")
         .replace("# height_m = ", "height_m = 500.0");

@@ -33,6 +33,7 @@ pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
         input,
         formats: BTreeMap::new(),
         parameters: Parameters::default(),
+        is_px4: false,
         streams: Vec::new(),
         topics: HashMap::new(),
         appended: Vec::new(),
@@ -47,6 +48,8 @@ struct Ulog {
     /// Fields of each named format, as they are written.
     formats: BTreeMap<String, String>,
     parameters: Parameters,
+    /// Whether it says that PX4 wrote it, whose axes are front, right, down.
+    is_px4: bool,
     streams: Vec<Stream>,
     /// By the number that data messages have.
     topics: HashMap<u16, Topic>,
@@ -80,6 +83,7 @@ impl Log for Ulog {
                     let mut content = Slice::new(&self.message, self.offset + 3);
                     self.parameters.take(&mut content)?;
                 }
+                b'I' => self.information(),
                 b'A' => self.subscribe()?,
                 b'D' => {
                     let number = self.content().whole(2, "the number of a topic")? as u16;
@@ -102,8 +106,8 @@ impl Log for Ulog {
                         "a topic that was named before its data",
                     ));
                 }
-                // What is said of the log, its text messages, marks and lost data.
-                b'I' | b'M' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
+                // More that is said of the log, its text messages, marks and lost data.
+                b'M' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
                 other => {
                     return Err(Broken::new(
                         self.offset,
@@ -194,6 +198,16 @@ impl Ulog {
         Ok(())
     }
 
+    /// What is said of the log; nothing of it is needed.
+    fn information(&mut self) {
+        let mut content = self.content();
+        let length = content.length(1, "the length of a name").unwrap_or(0);
+        let key = content.text(length, "a name").unwrap_or_default();
+        let left = content.left();
+        let value = content.text(left, "a value").unwrap_or_default();
+        self.is_px4 |= key.ends_with(" sys_name") && value == "PX4";
+    }
+
     fn format(&mut self) -> Result<(), Broken> {
         let mut content = self.content();
         let length = content.left();
@@ -229,7 +243,7 @@ impl Ulog {
             columns: layout.columns.clone(),
             remarks: Vec::new(),
             is_inertial: INERTIAL.contains(&&*name),
-            axes: Some("frd"),
+            axes: self.is_px4.then_some("frd"),
         });
         let topic = Topic {
             stream,
