@@ -136,10 +136,8 @@ impl Solution {
                         tests => tests?,
                     },
                     quality: quality?,
-                    budget: match budget {
-                        Err(_) if !outcome.converged => None,
-                        budget => Some(budget?),
-                    },
+                    // A calibration is one without its budget, too.
+                    budget: budget.ok(),
                 })
             }
             Self::ClosedForm(closed_form) => Ok(Assessment {
