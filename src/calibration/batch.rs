@@ -42,8 +42,8 @@ const NO_SOURCE: f64 = 1e-14;
 /// observations that it let in, by batch least squares.
 ///
 /// # Errors
-/// [`CalibrationError`] where the problem is not the one of the outcome, has several stretches, or has an
-/// error term on that the batch does not know.
+/// [`CalibrationError`] where the problem is not the one of the outcome, or has on what the batch does not know:
+/// an error term, what follows temperature or differs between recordings.
 pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
     let problem = &outcome.with_noise(problem);
     let model = &problem.model;
@@ -55,29 +55,34 @@ pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, 
         let term = "turning at standstill";
         return Err(CalibrationError::NotInBatch { term });
     }
-    let [stretch] = problem.stretches() else {
-        let term = "a second stretch";
+    if problem.varies() {
+        let term = "what follows temperature or differs between recordings";
         return Err(CalibrationError::NotInBatch { term });
-    };
+    }
     let mut accepted = outcome.innovations.iter().map(|i| i.accepted);
-    let mut batch = Batch::new(problem, stretch, outcome)?;
-    let mut rested = false;
-    for step in &stretch.steps {
-        match &step.at_rest {
-            Some(at_rest) => {
-                let new_position = at_rest.first && rested;
-                let accepted = || accepted.next().unwrap_or(true);
-                batch.rest(step.samples.clone(), at_rest, new_position, accepted)?;
-                rested = true;
-            }
-            None => {
-                let block = batch.navigator.advance(step.samples.clone());
-                batch.advance(&block, step.samples.end)?;
+    let mut information = None;
+    for (number, stretch) in problem.stretches().iter().enumerate() {
+        let mut batch = Batch::new(problem, (stretch, number), outcome, information)?;
+        let mut rested = false;
+        for step in &stretch.steps {
+            match &step.at_rest {
+                Some(at_rest) => {
+                    let new_position = at_rest.first && rested;
+                    let accepted = || accepted.next().unwrap_or(true);
+                    batch.rest(step.samples.clone(), at_rest, new_position, accepted)?;
+                    rested = true;
+                }
+                None => {
+                    let block = batch.navigator.advance(step.samples.clone());
+                    batch.advance(&block, step.samples.end)?;
+                }
             }
         }
+        information = Some(batch.information);
     }
     let at = to_vector(&outcome.linearised_at.triads);
-    let (step, covariance) = batch.information.parameters();
+    let information = information.ok_or(CalibrationError::NoDwells)?;
+    let (step, covariance) = information.parameters();
     let triads = from_vector(model.form, &(at + step));
     Ok(Estimate {
         covariance: covariance + curvature(&triads, &covariance),
@@ -99,15 +104,16 @@ struct Batch<'a> {
 impl<'a> Batch<'a> {
     fn new(
         problem: &'a Problem,
-        stretch: &'a Stretch,
+        (stretch, number): (&'a Stretch, usize),
         outcome: &Outcome,
+        before: Option<Information>,
     ) -> Result<Self, CalibrationError> {
         let (run, model, at) = (stretch.run, &problem.model, &outcome.linearised_at);
         let diverged = CalibrationError::Diverged { time: 0.0 };
         let attitudes = at
             .initial_attitudes
-            .first()
-            .zip(outcome.prior_attitudes.first());
+            .get(number)
+            .zip(outcome.prior_attitudes.get(number));
         let (attitude, prior) = attitudes.ok_or(diverged)?;
         let start = State::at_rest(*attitude);
         let imu = &run.recording.imu;
@@ -119,11 +125,15 @@ impl<'a> Batch<'a> {
             accel: at.triads.accel,
             navigator,
             held: *attitude,
-            information: Information::new(
-                model,
-                &stretch.start(prior, attitude),
-                &(model.prior_mean - to_vector(&at.triads)),
-            ),
+            information: {
+                let start = stretch.start(prior, attitude);
+                let mean = model.prior_mean - to_vector(&at.triads);
+                let anew = Information::new(model, &start, &mean);
+                match before {
+                    Some(before) => anew.with_parameters_of(&before),
+                    None => anew,
+                }
+            },
         })
     }
 
@@ -234,6 +244,25 @@ impl Information {
             dwell,
             parameters,
         }
+    }
+
+    /// The same with what another stretch says of the parameters: all else of it leaves with its rows.
+    fn with_parameters_of(mut self, before: &Self) -> Self {
+        let (n, own) = (before.unknowns(), self.parameters.len());
+        let of_parameters = before.navigation().end..before.navigation().end + own;
+        let leaves = (0..n).filter(|column| !of_parameters.contains(column));
+        let order: Vec<usize> = leaves.chain(of_parameters.clone()).chain([n]).collect();
+        let ordered = Mat::from_fn(n, n + 1, |i, j| before.rows[(i, order[j])]);
+        let known = ordered.qr().thin_R().to_owned();
+        let first = n - own;
+        for i in 0..own {
+            let row = of_parameters.start + i;
+            for j in 0..own {
+                self.rows[(row, of_parameters.start + j)] = known[(first + i, first + j)];
+            }
+            self.rows[(row, n)] = known[(first + i, n)];
+        }
+        self
     }
 
     /// Number of unknowns, and the column of z.

@@ -322,4 +322,4 @@ fn general_tangent(triad: &Triad, da: &Matrix3<f64>, bias: Vector3<f64>) -> Tria
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

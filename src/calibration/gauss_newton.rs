@@ -1,8 +1,9 @@
 //! The estimator: coarse start, with a table a pass with feedback, and Gauss–Newton iterations with the
 //! linearisation held until nothing moves.
 
+use super::alone::Alone;
+use super::attempt::{Attempt, Progress, from_coarse_start};
 use super::auxiliary::auxiliary_name;
-use super::coarse::{CoarseStart, coarse_start};
 use super::curvature::curvature;
 use super::dwell_scatter::DwellScores;
 use super::error::CalibrationError;
@@ -10,24 +11,20 @@ use super::estimate::{Estimate, largest_growth};
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
 use super::innovation::{consistency, inconsistencies};
-use super::iterations::{Iterated, iterate, summary};
+use super::iterations::{Iterated, iterate};
 use super::layout::Layout;
-use super::linearisation::{AttitudePrior, Linearisation, singular};
+use super::linearisation::singular;
 use super::noise::{Learnt, learn};
 use super::observability::Observability;
-use super::outcome::{Outcome, Pass};
+use super::outcome::Outcome;
 use super::parameters::parameter_name;
-use super::pass::{Gate, Mode, PassResult, pass};
+use super::pass::{Gate, PassResult};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
-use super::together::{self, Alone, Joint};
+use super::together::{self, Joint};
 use super::unexplained::unexplained;
 use crate::imu::Sensor;
-use crate::run::Aiding;
-
-/// Told after each pass; the command line draws it.
-pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
 ///
@@ -171,14 +168,6 @@ fn estimated(held: &PassResult) -> Estimate {
     }
 }
 
-/// A calibration from one start, with stated noise.
-pub(super) struct Attempt {
-    pub priors: Vec<AttitudePrior>,
-    passes: Vec<Pass>,
-    feedback: Option<PassResult>,
-    pub iterated: Iterated,
-}
-
 /// A calibration with stated noise, of one recording or of several together.
 struct Solved<'a> {
     attempt: Attempt,
@@ -201,78 +190,6 @@ impl<'a> Solved<'a> {
             alone: joint.alone,
             findings: joint.findings,
         }
-    }
-}
-
-/// From the coarse start, and where the heading is hidden from all four quadrants.
-pub(super) fn from_coarse_start(
-    problem: &Problem,
-    progress: Progress,
-) -> Result<Attempt, CalibrationError> {
-    let start = coarse_start(problem)?;
-    let others = start.other_headings();
-    let of_start = attempt(problem, start, progress);
-    let others = others
-        .into_iter()
-        .map(|start| attempt(problem, start, progress));
-    others.fold(of_start, better)
-}
-
-fn attempt(
-    problem: &Problem,
-    start: CoarseStart,
-    progress: Progress,
-) -> Result<Attempt, CalibrationError> {
-    let mut passes = Vec::new();
-    let priors = start.attitudes;
-    // What is fed back while heading is known to degrees only leads a pass astray; the coarse start
-    // without a table is good enough for the iterations to begin from.
-    let feedback = match problem.model.aiding {
-        Aiding::Table => pass(problem, &priors, &start.at, Mode::Feedback).ok(),
-        Aiding::Velocity => None,
-    };
-    if let Some(feedback) = &feedback {
-        passes.push(summary(feedback, &start.at, true));
-        passes.iter().for_each(progress);
-    }
-    let mut from = |at: Linearisation| {
-        iterate(
-            problem,
-            &priors,
-            at,
-            Gate::Innovations,
-            &mut passes,
-            progress,
-        )
-    };
-    let live = feedback.as_ref().map(|pass| pass.estimate.clone());
-    let iterated = match live.map(&mut from) {
-        Some(Ok(iterated)) if iterated.converged => iterated,
-        // What figures that are wrong by orders of magnitude feed back may lead astray, too.
-        Some(astray) => match (astray, from(start.at)) {
-            (Ok(astray), Err(_)) => astray,
-            (_, of_start) => of_start?,
-        },
-        None => from(start.at)?,
-    };
-    Ok(Attempt {
-        priors,
-        passes,
-        feedback,
-        iterated,
-    })
-}
-
-/// The attempt that converged, and if both did, that of the lower cost.
-fn better(
-    one: Result<Attempt, CalibrationError>,
-    other: Result<Attempt, CalibrationError>,
-) -> Result<Attempt, CalibrationError> {
-    let rank = |attempt: &Attempt| (!attempt.iterated.converged, attempt.iterated.held.cost);
-    match (one, other) {
-        (Ok(one), Ok(other)) if rank(&other) < rank(&one) => Ok(other),
-        (Err(_), Ok(other)) => Ok(other),
-        (one, _) => one,
     }
 }
 

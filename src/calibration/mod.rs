@@ -4,7 +4,9 @@
 //! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] says what
 //! could be had. Nothing here prints, reads files or draws.
 
+mod alone;
 mod at_rest;
+mod attempt;
 mod auxiliary;
 mod batch;
 mod bound;
@@ -54,7 +56,9 @@ mod thermal_record;
 mod together;
 mod unexplained;
 
+pub use alone::Alone;
 pub use at_rest::{AtRest, AxisAtRest, Second};
+pub use attempt::Progress;
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
@@ -75,7 +79,7 @@ pub use estimate::Estimate;
 pub use finding::Finding;
 pub use form::FormTest;
 pub use frame::{Canonical, in_body_frame};
-pub use gauss_newton::{Progress, estimate};
+pub use gauss_newton::estimate;
 pub use group::Group;
 pub use innovation::{
     Consistency, Inconsistency, Innovation, Look, Nis, Observation, mean_square_interval,
@@ -105,4 +109,4 @@ pub use thermal_record::{
     CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
     TemperatureError, ThermalRecord, ValueRecord,
 };
-pub use together::{Alone, Repeatability, TemperatureOptions, Together};
+pub use together::{Repeatability, TemperatureOptions, Together};

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::alone::Alone;
 use super::auxiliary::Auxiliary;
 use super::dwell_scatter::DwellScatter;
 use super::estimate::Estimate;
@@ -16,7 +17,6 @@ use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::pass::{Epoch, Own};
 use super::problem::Problem;
 use super::thermal::Thermal;
-use super::together::Alone;
 use crate::run::Aiding;
 
 /// χ² by which opposite headings differ where a run observes the heading.

@@ -1,12 +1,13 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
+use super::attempt::Progress;
 use super::budget::Budget;
 use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
 use super::error_term_test::{ErrorTermTest, test_error_terms};
 use super::estimate::Estimate;
 use super::finding::Finding;
-use super::gauss_newton::{Progress, estimate};
+use super::gauss_newton::estimate;
 use super::mounting::Mounting;
 use super::outcome::Outcome;
 use super::problem::Problem;
@@ -136,10 +137,8 @@ impl Solution {
                         tests => tests?,
                     },
                     quality: quality?,
-                    budget: match budget {
-                        Err(_) if !outcome.converged => None,
-                        budget => Some(budget?),
-                    },
+                    // A calibration is one without its budget, too.
+                    budget: budget.ok(),
                 })
             }
             Self::ClosedForm(closed_form) => Ok(Assessment {

@@ -44,7 +44,8 @@ impl Day {
             month: next(2)?.parse().ok()?,
             day: next(2)?.parse().ok()?,
         };
-        let leap = day.year % 4 == 0 && (day.year % 100 != 0 || day.year % 400 == 0);
+        let every = |years: u16| day.year.is_multiple_of(years);
+        let leap = every(4) && (!every(100) || every(400));
         let length = match day.month {
             4 | 6 | 9 | 11 => 30,
             2 => 28 + u8::from(leap),

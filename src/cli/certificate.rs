@@ -22,7 +22,7 @@ use super::output::{Overwrite, print};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal certificate --draft > lab.toml
-  turncal certificate mine/calibration.json --laboratory lab.toml -o paper
+  turncal certificate mine/calibration.json --laboratory lab.toml
   turncal certificate mine/calibration.json --laboratory lab.toml \\
       --specification specification.toml \\
       --as-found last-year/calibration.json -o paper")]

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use turncal::calibration::result::Calibration;
 use turncal::formats::export;
 use turncal::formats::write_whole;
 use turncal::run::Run;
 
-use super::input::run_file;
+use super::input::{at_temperature, run_file};
 use super::output::{keep, print};
 
 /// Writes a calibration as what other programs read
@@ -33,6 +32,9 @@ pub struct Export {
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
     #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
+    /// The calibration at this temperature, °C [default: its reference; c, px4 and ardupilot hold its change]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -99,7 +101,7 @@ impl From<Format> for export::Format {
 
 impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
-        let record = Calibration::read(&self.calibration)?;
+        let record = at_temperature(&self.calibration, self.temperature_degc)?;
         let run = self.run.as_deref().map(Run::read).transpose()?;
         let exported = export::write(&record, self.format.into(), run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;

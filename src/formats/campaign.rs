@@ -100,7 +100,8 @@ impl Campaign {
             *of_run = of_run.take().or(stated.map(Temperature::constant));
             Ok(run)
         });
-        let runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
+        let mut runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
+        doubt_stuck(&mut runs);
         let day_to_day = day_to_day(&top, &runs)?;
         let temperature = match temperature {
             Stated::Follows(options) => Some(options),
@@ -166,6 +167,38 @@ fn recordings(top: &Fields, directory: &Path) -> Result<Vec<Named>, FileError> {
         })
     };
     tables.iter().map(recording).collect()
+}
+
+/// Notes temperatures that never change where those of other recordings do.
+fn doubt_stuck(runs: &mut [Run]) {
+    let facts = |run: &Run| {
+        run.recording
+            .imu
+            .log
+            .as_ref()
+            .and_then(|log| log.temperature)
+    };
+    let stuck: Vec<Option<f64>> = runs
+        .iter()
+        .map(|run| {
+            facts(run)
+                .filter(|of| of.smallest == of.largest)
+                .map(|of| of.smallest)
+        })
+        .collect();
+    let any_varies = runs
+        .iter()
+        .zip(&stuck)
+        .any(|(run, stuck)| facts(run).is_some() && stuck.is_none());
+    for (run, stuck) in runs.iter_mut().zip(stuck).filter(|_| any_varies) {
+        if let Some(value) = stuck {
+            run.recording.notes.push(format!(
+                "The temperature of {} is {value} °C in every row, that of other recordings varies: is its sensor stuck? \
+                 Say temperature_degc beside the recording in the campaign, and leave the column out of its run.toml.",
+                run.recording.name
+            ));
+        }
+    }
 }
 
 /// What a campaign says of temperature.

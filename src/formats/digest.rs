@@ -43,7 +43,28 @@ fn digest_of_file(path: &Path) -> io::Result<String> {
 
 /// The files of a run, as its run.toml names them, each with its digest, or with what the system says
 /// where it cannot be read. The run.toml comes first; the others are those that it names.
+///
+/// Of a campaign its file, then those of each recording, in the order of their paths.
 pub fn input_digests(run: &Path) -> Vec<(String, String)> {
+    let recordings = recordings(run);
+    if !recordings.is_empty() {
+        let directory = run.parent().unwrap_or(Path::new(""));
+        let digest = digest_of_file(run).unwrap_or_else(|error| error.kind().to_string());
+        let mut all = vec![("campaign.toml".to_owned(), digest)];
+        for recording in recordings {
+            let of_recording = digests_of_run(&directory.join(&recording));
+            let folder = Path::new(&recording).parent().unwrap_or(Path::new(""));
+            let named = of_recording
+                .into_iter()
+                .map(|(name, digest)| (folder.join(name).display().to_string(), digest));
+            all.extend(named);
+        }
+        return all;
+    }
+    digests_of_run(run)
+}
+
+fn digests_of_run(run: &Path) -> Vec<(String, String)> {
     let digest = |name: String, path: PathBuf| {
         let digest = digest_of_file(&path).unwrap_or_else(|error| error.kind().to_string());
         (name, digest)
@@ -64,6 +85,26 @@ pub fn input_digests(run: &Path) -> Vec<(String, String)> {
         }
     }
     all
+}
+
+/// The recordings that a campaign names, sorted; none of a run.
+fn recordings(campaign: &Path) -> Vec<String> {
+    let text = small_file::text(campaign).unwrap_or_default();
+    let Ok(table) = DeTable::parse(&text) else {
+        return Vec::new();
+    };
+    let all = table.get_ref().get("recording");
+    let all = all.and_then(|value| value.get_ref().as_array());
+    let run = |value: &toml::Spanned<toml::de::DeValue>| {
+        let table = value.get_ref().as_table()?;
+        Some(table.get("run")?.get_ref().as_str()?.to_owned())
+    };
+    let mut named: Vec<String> = all
+        .into_iter()
+        .flat_map(|all| all.iter().filter_map(run))
+        .collect();
+    named.sort();
+    named
 }
 
 #[cfg(test)]

@@ -361,6 +361,7 @@ impl<'a> Field<'a> {
     }
 
     /// Lists of texts in a list; none if it is anything else.
+    #[cfg(feature = "certificate")]
     pub fn rows_of_texts(&self) -> Option<Vec<Vec<&'a str>>> {
         let rows = self.value.get_ref().as_array()?.iter();
         let row = |row: &'a Spanned<DeValue<'a>>| -> Option<Vec<&'a str>> {

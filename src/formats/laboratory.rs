@@ -168,12 +168,12 @@ impl<'a, M: Fn(&str) -> Option<String>> Tables<'a, M> {
         if missing.is_empty() {
             return Ok(());
         }
-        let missing = list(missing.iter().map(String::as_str));
+        let (count, missing) = (missing.len(), list(missing.iter().map(String::as_str)));
         Err(FileError::new(
             path,
             At::File,
-            format_args!("no {missing}"),
-            "all that ISO/IEC 17025, 7.8.2 and 7.8.4 ask for",
+            format_args!("{count} required fields missing"),
+            format_args!("what ISO/IEC 17025, 7.8.2 and 7.8.4, ask for: {missing}"),
             "Add what is missing.",
         ))
     }
@@ -366,7 +366,7 @@ mod tests {
     #[test]
     fn what_cannot_be_right_is_named_with_its_place() {
         for (from, to, expected) in [
-            ("issued = 2026-03-06", "issued = 2026-03-32", "2026-03-32"),
+            ("issued = 2026-03-06", "issued = \"yesterday\"", "yesterday"),
             (
                 "issued = 2026-03-06",
                 "issued = 2026-01-06",

@@ -137,7 +137,7 @@ mod tests {
         assert_relative_eq!(temperature.rate(5.0).accel[0], 0.01, epsilon = 1e-12);
         assert_relative_eq!(temperature.at(-100.0).gyro[0], 20.0);
         assert_relative_eq!(temperature.at(1e9).gyro[0], 25.99, epsilon = 1e-12);
-        assert_eq!(temperature.range(Sensor::Gyro)[0], 20.0);
+        assert_relative_eq!(temperature.range(Sensor::Gyro)[0], 20.0, epsilon = 1e-12);
     }
 
     #[test]

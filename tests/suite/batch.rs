@@ -84,3 +84,36 @@ fn it_agrees_where_gyros_or_table_have_no_error_and_the_problem_fewer_unknowns()
         assert!(estimate < 1e-6 && covariance < 1e-6);
     }
 }
+
+#[test]
+fn two_recordings_together_are_both_stacked() {
+    let scenario = Scenario::load("demo").unwrap();
+    let one = short();
+    let mut other = short();
+    let second = scenario.simulate_recording(1, 0, 1, &Default::default());
+    let second = second.unwrap().run;
+    other.recording.imu.gyro = second.recording.imu.gyro[..20_000].to_vec();
+    other.recording.imu.accel = second.recording.imu.accel[..20_000].to_vec();
+    if let (Some(table), Some(of)) = (&mut other.recording.table, &second.recording.table) {
+        let readings = table.attitude.len();
+        table.attitude = of.attitude[..readings].to_vec();
+    }
+    let problem = Problem::new(&one, &stated()).and(&other);
+    let outcome = estimate(&problem, &|_| {}).unwrap();
+    assert!(outcome.converged);
+    let (together, covariance) = difference(&problem, &outcome);
+    assert!(together < 1e-6 && covariance < 1e-6);
+    // The order of recordings does not matter.
+    let turned = Problem::new(&other, &stated()).and(&one);
+    let turned = estimate(&turned, &|_| {}).unwrap();
+    let sigma = outcome.estimate.sigma();
+    for i in (0..PARAMETERS).filter(|&i| sigma[i] > 0.0) {
+        let apart = turned.estimate.vector()[i] - outcome.estimate.vector()[i];
+        // Both stop within 0.02 σ of where nothing moves.
+        assert!(
+            (apart / sigma[i]).abs() < 0.02,
+            "{i}: {} σ",
+            apart / sigma[i]
+        );
+    }
+}

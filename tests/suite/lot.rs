@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// An axis up and down in turn, in a minute and a half.
-const PATH: &str = "first_dwell_s = 6.0
+pub const PATH: &str = "first_dwell_s = 6.0
 [body]
 start_pitch_roll_heading_deg = [0, 0, 0]
 acceleration_deg_per_s2 = 90.0

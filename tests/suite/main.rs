@@ -5,6 +5,7 @@ mod apply;
 mod batch;
 mod by_hand;
 mod calibration_file;
+mod campaign;
 mod certificate;
 mod check;
 mod cli;

@@ -164,10 +164,8 @@ impl BudgetSource {
             return Self::Gravity;
         }
         if let Some((_, index)) = layout.table_axes().find(|&(axis, _)| axis == state) {
-            let kinds = AxisError::ALL.into_iter();
-            let kind = kinds
-                .filter(|kind| kind.range().contains(&index))
-                .next_back();
+            let mut kinds = AxisError::ALL.into_iter();
+            let kind = kinds.find(|kind| kind.range().contains(&index));
             return match kind {
                 Some(AxisError::Tilt) => Self::TableSquareness,
                 Some(AxisError::Wobble) => Self::TableWobble,

@@ -8,7 +8,7 @@ use crate::attitude;
 use crate::calibration::comparison::{Named, compare};
 
 /// Scale factors in counts, installation of hundredths, biases; no σ.
-pub(in crate::calibration) fn record() -> Calibration {
+pub(crate) fn record() -> Calibration {
     let rows = |v: [f64; 6]| {
         let c = InstallationForm::General.matrix(&v.into());
         [0, 1, 2].map(|i| [c[(i, 0)], c[(i, 1)], c[(i, 2)]])
@@ -30,10 +30,7 @@ pub(in crate::calibration) fn record() -> Calibration {
 }
 
 /// σ of a good calibration, with correlations.
-pub(in crate::calibration) fn with_covariance(
-    mut record: Calibration,
-    form: InstallationForm,
-) -> Calibration {
+pub(crate) fn with_covariance(mut record: Calibration, form: InstallationForm) -> Calibration {
     let indices: Vec<usize> = (0..PARAMETERS)
         .filter(|&i| parameter_name(form, i).is_some())
         .collect();

@@ -1,18 +1,18 @@
 //! Each recording of a problem calibrated alone.
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::super::alone::Alone;
+use super::super::attempt::from_coarse_start;
 use super::super::coarse::coarse_start;
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
-use super::super::gauss_newton::from_coarse_start;
-use super::super::linearisation::AttitudePrior;
 use super::super::model::Model;
-use super::super::parameters::{ParameterVector, parameter};
+use super::super::parameters::parameter;
 use super::super::problem::Problem;
 use super::solved;
-use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange, ThermalState};
+use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange};
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
 /// more.
@@ -20,32 +20,6 @@ const BEYOND_NOISE: f64 = 10.0;
 
 /// A recording within this part of the range is at one temperature.
 const PART_OF_RANGE: f64 = 0.1;
-
-/// What a recording alone says.
-#[derive(Debug, Clone)]
-pub struct Alone {
-    /// Its name.
-    pub name: String,
-    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
-    pub temperature: Option<PerSensor<[f64; 3]>>,
-    /// The span of its temperatures, K.
-    pub span: f64,
-    /// Calibration at that temperature, with stated noise; none where it gave none.
-    pub estimate: Option<Estimate>,
-    /// Where its temperature stands for all of it: the functions of temperature then.
-    pub(super) state: Option<ThermalState>,
-    pub(super) start: ParameterVector,
-    pub(super) priors: Vec<AttitudePrior>,
-    pub(super) initial_attitudes: Vec<Matrix3<f64>>,
-}
-
-impl Alone {
-    /// Mean temperature of all axes over its dwells, °C.
-    pub fn mean_temperature(&self) -> Option<f64> {
-        let PerSensor { gyro, accel } = self.temperature?;
-        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
-    }
-}
 
 /// Each recording alone, on as many threads as there are.
 pub(super) fn each(problem: &Problem) -> Result<Vec<Alone>, CalibrationError> {

@@ -14,9 +14,10 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
+use super::alone::Alone;
+use super::attempt::Progress;
 use super::error::CalibrationError;
 use super::finding::Finding;
-use super::gauss_newton::Progress;
 use super::iterations::{Iterated, iterate};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::options::Options;
@@ -29,7 +30,6 @@ use crate::imu::{
     ThermalCoefficients, ThermalModel, ThermalRange, Triad,
 };
 use crate::run::Run;
-pub use alone::Alone;
 pub use repeat::Repeatability;
 use temperatures::Temperatures;
 

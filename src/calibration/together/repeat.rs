@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::super::alone::Alone;
 use super::super::innovation::Observation;
 use super::super::outcome::Outcome;
 use super::super::parameters::{PARAMETERS, ParameterVector};
-use super::Alone;
 use crate::statistics::chi_square_limit;
 
 /// Chance that recordings which repeat are said not to.

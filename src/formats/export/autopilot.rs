@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Exported;
 use super::along::{Along, Remainder};
 use super::source::{Document, Source};
+use super::thermal;
 use crate::imu::Sensor;
 
 /// How a program names and writes its parameters.
@@ -19,6 +20,8 @@ struct Program {
     /// Name of a parameter of a triad: offset or scale of an axis.
     parameter: fn(Sensor, What, &str) -> String,
     line: fn(&str, f32) -> String,
+    /// What changes with temperature.
+    thermal: fn(&Source, &mut Document),
     notes: &'static [&'static str],
 }
 
@@ -43,6 +46,7 @@ const PX4: Program = Program {
     },
     // Vehicle, component, name, value, type 9: a 32-bit number.
     line: |name, value| format!("1\t1\t{name}\t{value:?}\t9"),
+    thermal: thermal::px4,
     notes: &[
         "which device it is: PX4 takes the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID are the device's; where the \
          instrument is another than number 0, rename them",
@@ -63,6 +67,7 @@ const ARDUPILOT: Program = Program {
         format!("INS_{kind}{what}_{axis}")
     },
     line: |name, value| format!("{name},{value:?}"),
+    thermal: thermal::ardupilot,
     notes: &[
         "which instance it is: the second has INS_ACC2OFFS_X and so on",
         "gyro offsets for long: ArduPilot finds them anew when it starts, unless INS_GYR_CAL is 0",
@@ -132,5 +137,6 @@ fn write(source: &Source, program: &Program) -> Exported {
             }
         }
     }
+    (program.thermal)(source, &mut file);
     file.finish()
 }

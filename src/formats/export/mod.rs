@@ -18,6 +18,7 @@ mod ros;
 mod samples;
 mod source;
 mod text;
+mod thermal;
 
 pub use samples::{HEADER, sample_rows, write_samples};
 
@@ -112,7 +113,7 @@ pub fn write(
     run: Option<&Run>,
 ) -> Result<Exported, CorrectionError> {
     let source = Source::new(record, run)?;
-    Ok(match format {
+    let mut exported = match format {
         Format::Kalibr => kalibr::write(&source),
         Format::KfGins => kf_gins::write(&source),
         Format::C => c::write(&source),
@@ -128,5 +129,11 @@ pub fn write(
         Format::Gazebo => gazebo::write(&source),
         Format::Mat => mat::write(&source),
         Format::Betaflight => betaflight::write(&source),
-    })
+    };
+    exported.notes.extend(match format {
+        Format::C => None,
+        Format::Px4 | Format::ArduPilot => thermal::autopilot_note(&source),
+        _ => thermal::note(&source),
+    });
+    Ok(exported)
 }

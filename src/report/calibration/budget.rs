@@ -5,11 +5,16 @@ use super::super::group::{Group, axis_name};
 use super::super::number::{self, sigma, three_digits, value};
 use super::super::plot::{Axis, Color, Panel, Plot, Series, Shape};
 use super::super::terms::title;
+use super::report::Report;
 use crate::calibration::{Budget, BudgetPart, ErrorTermTest, Estimate, ParameterVector};
+use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
+use crate::units::{DEG_PER_H, DEGREE};
 
 /// So many sources have a colour of their own; the others share one.
 const SHOWN: usize = 5;
+/// A latitude is usually stated to this, rad.
+const LATITUDE: f64 = 1e-3 * DEGREE;
 /// A source is named where it adds at least this part of a variance.
 const NAMED: f64 = 1e-3;
 
@@ -139,7 +144,7 @@ pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
 }
 
 /// What is in no sum: error terms that are not estimated.
-pub(super) fn left_off(tests: &[ErrorTermTest], estimate: &Estimate) -> Table {
+pub(super) fn left_off(report: &Report, estimate: &Estimate) -> Table {
     let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let cell = |group: Group, of: &ParameterVector| {
         let spread = group.spread(of, &group.estimated(estimate));
@@ -161,7 +166,15 @@ pub(super) fn left_off(tests: &[ErrorTermTest], estimate: &Estimate) -> Table {
         "Error terms that are not estimated: what they may add",
         std::iter::once("term".to_owned()).chain(columns),
     )
-    .section(tests.iter().filter_map(row))
+    .section(report.effects.iter().filter_map(row))
+    .note(format!(
+        "Taken as exact: the site's latitude, of which 0.001° would move gyro biases by up to {} °/h{}.",
+        three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H),
+        match report.run.site.gravity_sigma > 0.0 {
+            true => "",
+            false => ", and gravity, of which 1 mGal is 1.02 ppm of every accelerometer's scale factor",
+        }
+    ))
     .note(
         "In no sum above. RMS change of the parameters of a group if the term is as large as the record allows \
          (in brackets: as large as its usual σ). Where it matters, estimate the term with --with.",

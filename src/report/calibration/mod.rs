@@ -49,7 +49,7 @@ impl Report<'_> {
             document.fold("Uncertainty budget");
             document.page(budget::table(of, estimate));
             document.page(budget::figure(of, estimate));
-            document.page(budget::left_off(self.effects, estimate));
+            document.page(budget::left_off(self, estimate));
         }
         document.fold("Navigation");
         outlook::add(&mut document, self.navigation);

@@ -95,6 +95,10 @@ fn log(run: &Run, survey: &Survey) -> Option<Value> {
     if let Some(of) = &log.temperature {
         data["temperature"] =
             json!({ "smallest": of.smallest, "mean": of.mean, "largest": of.largest });
+        if let Some(temperature) = &run.recording.imu.temperature {
+            let rates = Sensor::ALL.map(|sensor| temperature.largest_rate(sensor));
+            data["temperature"]["largest_rate_k_per_s"] = json!(rates[0].max(rates[1]));
+        }
     }
     Some(data)
 }

@@ -2,7 +2,7 @@
 
 use super::super::number::{count, three_digits, value};
 use crate::calibration::Mounting;
-use crate::imu::AXES;
+use crate::imu::{AXES, Sensor};
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Turn};
 use crate::survey::{APART, Survey};
@@ -18,6 +18,10 @@ const WRONG_PART: f64 = 0.1;
 const WORTH: f64 = 60.0 * DEGREE;
 /// Parameters of the accelerometers without a table: as many directions of up are needed.
 const DIRECTIONS: usize = 9;
+/// Seconds in a minute: rates of temperature are shown per minute.
+const MINUTE: f64 = 60.0;
+/// An instrument whose temperature spans less, K, has soaked.
+const SOAKED: f64 = 1.0;
 const MICROSECOND: f64 = 1e-6;
 /// Beyond so many places only their number is said.
 const NAMED: usize = 4;
@@ -73,14 +77,40 @@ pub(super) fn log(run: &Run, survey: &Survey) -> String {
         );
         if let Some(temperature) = log.temperature {
             text += &format!(
-                " Temperature column: {} to {}, mean {}.",
+                " Temperature column: {} to {} °C, mean {} °C.",
                 three_digits(temperature.smallest),
                 three_digits(temperature.largest),
                 three_digits(temperature.mean)
             );
         }
+        text += &warming(run);
     }
     text
+}
+
+/// How fast the instrument warms or cools, and whether it has soaked.
+fn warming(run: &Run) -> String {
+    let imu = &run.recording.imu;
+    let Some(temperature) = &imu.temperature else {
+        return String::new();
+    };
+    let of = |sensor: Sensor| {
+        let [lowest, highest] = temperature.range(sensor);
+        let last = temperature.rate(imu.end()).get(sensor).map(f64::abs);
+        let last = last.into_iter().fold(0.0, f64::max);
+        (highest - lowest, temperature.largest_rate(sensor), last)
+    };
+    let (one, other) = (of(Sensor::Gyro), of(Sensor::Accel));
+    let (span, largest, last) = (one.0.max(other.0), one.1.max(other.1), one.2.max(other.2));
+    format!(
+        " It changes by {} K/min at most and {} K/min at the end: {}.",
+        three_digits(largest * MINUTE),
+        three_digits(last * MINUTE),
+        match span < SOAKED {
+            true => "soaked within 1 K",
+            false => "not soaked, parameters may change meanwhile; see calibrate --temperature",
+        }
+    )
 }
 
 /// What to look at and what to change, a sentence or two each.

@@ -368,8 +368,7 @@ impl<'a> Layout<'a> {
         let mut lines = vec![String::new()];
         for word in text.split(' ') {
             let mut word = word.to_owned();
-            loop {
-                let Some(line) = lines.last_mut() else { break };
+            while let Some(line) = lines.last_mut() {
                 let joined = match line.is_empty() {
                     true => word.clone(),
                     false => format!("{line} {word}"),

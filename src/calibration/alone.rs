@@ -1,0 +1,34 @@
+//! What each of several recordings says alone.
+
+use nalgebra::Matrix3;
+
+use super::estimate::Estimate;
+use super::linearisation::AttitudePrior;
+use super::parameters::ParameterVector;
+use crate::imu::{PerSensor, ThermalState};
+
+/// What a recording alone says.
+#[derive(Debug, Clone)]
+pub struct Alone {
+    /// Its name.
+    pub name: String,
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
+    pub temperature: Option<PerSensor<[f64; 3]>>,
+    /// The span of its temperatures, K.
+    pub span: f64,
+    /// Calibration at that temperature, with stated noise; none where it gave none.
+    pub estimate: Option<Estimate>,
+    /// Where its temperature stands for all of it: the functions of temperature then.
+    pub(super) state: Option<ThermalState>,
+    pub(super) start: ParameterVector,
+    pub(super) priors: Vec<AttitudePrior>,
+    pub(super) initial_attitudes: Vec<Matrix3<f64>>,
+}
+
+impl Alone {
+    /// Mean temperature of all axes over its dwells, °C.
+    pub fn mean_temperature(&self) -> Option<f64> {
+        let PerSensor { gyro, accel } = self.temperature?;
+        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
+    }
+}
