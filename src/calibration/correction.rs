@@ -6,6 +6,7 @@ use thiserror::Error;
 use super::frame::triad_record;
 use crate::calibration::result::Calibration;
 use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
+use crate::recording::Near;
 use crate::run::Run;
 
 /// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
@@ -181,12 +182,14 @@ impl Correction {
     /// inertial one: 10 ms times Earth rate is 0.7 µg.
     pub fn samples<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = Calibrated> + 'a {
         let plain = self.terms().next().is_none();
+        let mut near = Near::new(&run.recording.imu);
         (0..run.recording.imu.len()).map(move |k| {
-            let of_triads = PerSensor::from_fn(|sensor| self.of_triad(sensor, run, k));
+            near.reach(&(k.saturating_sub(1)..k + 2));
+            let of_triads = PerSensor::from_fn(|sensor| self.of_triad(sensor, run, &near, k));
             let u = if plain {
                 of_triads
             } else {
-                self.without_terms(&of_triads, self.angular_acceleration(run, k))
+                self.without_terms(&of_triads, self.angular_acceleration(run, &near, k))
             };
             Calibrated {
                 start: run.recording.imu.time(k),
@@ -198,23 +201,20 @@ impl Correction {
     }
 
     /// `(K C)⁻¹ (N − D)` of sample `k`.
-    fn of_triad(&self, sensor: Sensor, run: &Run, k: usize) -> Vector3<f64> {
-        let increment = match sensor {
-            Sensor::Gyro => run.recording.imu.gyro[k],
-            Sensor::Accel => run.recording.imu.accel[k],
-        };
+    fn of_triad(&self, sensor: Sensor, run: &Run, near: &Near, k: usize) -> Vector3<f64> {
+        let increment = near.at(k).get(sensor).to_owned();
         let output = increment.component_mul(&run.instrument.nominal.get(sensor).0)
             / run.recording.imu.period;
         self.matrix.get(sensor) * (output - self.bias.get(sensor))
     }
 
-    fn angular_acceleration(&self, run: &Run, k: usize) -> Vector3<f64> {
+    fn angular_acceleration(&self, run: &Run, near: &Near, k: usize) -> Vector3<f64> {
         let first = k.saturating_sub(1);
         let last = (k + 1).min(run.recording.imu.len() - 1);
         if !run.recording.imu.continuous || first == last {
             return Vector3::zeros();
         }
-        let rate = |k| self.of_triad(Sensor::Gyro, run, k);
+        let rate = |k| self.of_triad(Sensor::Gyro, run, near, k);
         (rate(last) - rate(first)) / ((last - first) as f64 * run.recording.imu.period)
     }
 

@@ -228,7 +228,7 @@ fn measures(
         {
             let triad = &at.triads.gyro;
             let correction = triad.correction().ok_or_else(|| singular(&at.triads))?;
-            let sum: Vector3<f64> = run.recording.imu.gyro[segment.samples.clone()].iter().sum();
+            let sum: Vector3<f64> = run.recording.imu.gyro.sum(segment.samples.clone());
             let duration = segment.samples.len() as f64 * run.recording.imu.period;
             turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
         }

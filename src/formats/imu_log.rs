@@ -1,5 +1,7 @@
 //! The instrument's samples.
 
+mod long;
+
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
@@ -11,8 +13,11 @@ use super::error::FileError;
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
-use crate::recording::{ColumnFacts, FileColumn, ImuSamples, LogFacts, NamedColumns};
-use crate::recording::{TemperatureFacts, stretches_between};
+use crate::recording::{
+    Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
+    TemperatureFacts, stretches_between,
+};
+use long::{LONG, LongLog, Whole};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
@@ -61,66 +66,200 @@ pub(super) struct ImuLog<'a> {
     pub full_scale: PerSensor<Option<f64>>,
 }
 
-/// What the file holds.
-struct Content {
-    stamps: Stamps,
-    triads: PerSensor<[FileColumn; 3]>,
+/// Where the values of a sample stand in a row.
+#[derive(Clone)]
+struct Layout {
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
+    names: [FileColumn; 6],
+    places: [usize; 6],
+    /// Right, front or up, whichever each lies along.
+    body_axes: [usize; 6],
+}
+
+fn sensor(column: usize) -> Sensor {
+    Sensor::ALL[column / 3]
+}
+
+impl Layout {
+    /// Rad and m/s by the nominal scale for one of each column's unit in a row.
+    fn units(&self, log: &ImuLog, period: f64) -> [f64; 6] {
+        let unit = |k: usize| log.seconds(period) / log.nominal.get(sensor(k)).0[self.body_axes[k]];
+        std::array::from_fn(unit)
+    }
+
+    fn full_scale(&self, log: &ImuLog) -> [Option<f64>; 6] {
+        std::array::from_fn(|k| *log.full_scale.get(sensor(k)))
+    }
+
+    /// The columns of a triad that lie along right, front and up.
+    fn columns(&self, sensor: Sensor) -> [usize; 3] {
+        let first = 3 * sensor as usize;
+        let along = |axis: usize| (first..first + 3).find(|&k| self.body_axes[k] == axis);
+        [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
+    }
+
+    /// Rad and m/s along right, front and up for one of the unit of the column that lies along it.
+    fn body_units(&self, log: &ImuLog, sensor: Sensor, period: f64) -> [f64; 3] {
+        let units = self.units(log, period);
+        self.columns(sensor).map(|k| {
+            let sign = if self.names[k].reversed { -1.0 } else { 1.0 };
+            let along = log.axes.vector(Vector3::ith(k % 3, sign));
+            units[k] * along[self.body_axes[k]]
+        })
+    }
+
+    fn triads(&self) -> PerSensor<[FileColumn; 3]> {
+        let name = |k: usize| self.names[k].clone();
+        PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| name(3 * sensor as usize + axis)))
+    }
+}
+
+/// Rows that are held, without duplicates.
+#[derive(Default)]
+struct Held {
     columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     duplicates: Vec<(usize, u64)>,
+    temperatures: Vec<f64>,
+}
+
+impl Held {
+    fn len(&self) -> usize {
+        self.columns[0].len()
+    }
+
+    /// Lets go of the first rows.
+    fn let_go(&mut self, rows: usize) {
+        for column in &mut self.columns {
+            column.drain(..rows);
+            column.shrink_to(2 * column.len());
+        }
+        self.temperatures.drain(..rows.min(self.temperatures.len()));
+        self.duplicates.retain(|&(row, _)| row > rows);
+        self.duplicates.iter_mut().for_each(|(row, _)| *row -= rows);
+    }
+}
+
+/// What was read besides samples.
+struct Read<'a> {
+    layout: &'a Layout,
+    clock: Uniform,
+    facts: [ColumnFacts; 6],
+    rows: usize,
     temperature: Option<TemperatureFacts>,
+    faults: Vec<Fault>,
+    bridges: Vec<Bridge>,
+}
+
+/// What the file holds.
+struct Content<'a> {
+    layout: Layout,
+    stamps: Stamps,
+    held: Held,
+    long: Option<LongLog<'a>>,
+    duplicates: usize,
 }
 
 impl ImuLog<'_> {
+    /// What a row's value is to be taken for to be an integral over its sample.
+    fn seconds(&self, period: f64) -> f64 {
+        match self.output {
+            Output::Pulse | Output::Increment => 1.0,
+            Output::Rate => period,
+        }
+    }
+
     /// Reads the samples, finds what is wrong with them, and bridges it; what the file leaves open goes to
     /// `notes`.
     pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let Content {
+            layout,
             stamps,
-            triads,
-            columns,
+            held,
+            long,
             duplicates,
-            temperature,
         } = self.content(notes)?;
-        let clock = Uniform::new(&self.file, &stamps.of_rows, self.clock.period)?;
+        match long {
+            Some(long) => {
+                let whole = long.finish(duplicates)?;
+                notes.extend(stamps.lost_count(whole.samples + duplicates - whole.rows));
+                Ok(self.packed(&layout, whole))
+            }
+            None => self.whole(layout, &stamps, held, notes),
+        }
+    }
+
+    /// The samples of a log that was packed as it was read.
+    fn packed(&self, layout: &Layout, whole: Whole) -> ImuSamples {
+        let Whole {
+            clock,
+            facts,
+            packed,
+            samples,
+            faults,
+            bridges,
+            rows,
+            temperature,
+        } = whole;
+        let read = Read {
+            layout,
+            clock,
+            facts,
+            rows,
+            temperature,
+            faults,
+            bridges,
+        };
+        // Samples are then whole steps, as pulses are.
+        let pulse = PerSensor::from_fn(|sensor| packed.get(sensor).step());
+        let series = PerSensor {
+            gyro: Series::packed(packed.gyro),
+            accel: Series::packed(packed.accel),
+        };
+        self.samples(read, samples, series, pulse)
+    }
+
+    /// The samples of a log whose rows are all held.
+    fn whole(
+        &self,
+        layout: Layout,
+        stamps: &Stamps,
+        held: Held,
+        notes: &mut Vec<String>,
+    ) -> Result<ImuSamples, FileError> {
+        let mut clock = Uniform::new(&self.file, &stamps.of_rows, self.clock.period)?;
         let samples = clock.numbers.last().map_or(0, |last| last + 1);
         notes.extend(stamps.lost_count(samples - clock.numbers.len()));
-        let stamps = stamps.of_rows;
+        let lines = stamps.of_rows.iter().map(|&(_, line)| line);
         let period = clock.period;
-        let seconds = match self.output {
-            Output::Pulse | Output::Increment => 1.0,
-            Output::Rate => period,
-        };
-        let body_axes = std::array::from_fn(|column| self.axes.body_axis(column % 3));
-        let sensor = |column: usize| Sensor::ALL[column / 3];
-        let named = |k: usize| &triads.get(sensor(k))[k % 3];
-        let unit = |k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]];
-        let units = std::array::from_fn(unit);
-        let facts = std::array::from_fn(|k| ColumnFacts::of(&named(k).name, &columns[k], units[k]));
+        let units = layout.units(self, period);
+        let facts = std::array::from_fn(|k| {
+            ColumnFacts::of(&layout.names[k].name, &held.columns[k], units[k])
+        });
+        let count = held.len() + held.duplicates.len();
         let rows = Rows {
-            columns,
+            columns: held.columns,
             facts: &facts,
-            full_scale: std::array::from_fn(|k| *self.full_scale.get(sensor(k))),
+            full_scale: layout.full_scale(self),
             pulses: self.output == Output::Pulse,
-            body_axes,
+            body_axes: layout.body_axes,
             units,
-            lines: stamps.iter().map(|&(_, line)| line).collect(),
-            numbers: clock.numbers,
+            lines: lines.collect(),
+            numbers: std::mem::take(&mut clock.numbers),
             period,
-            duplicates,
+            duplicates: held.duplicates,
         };
-        let count = stamps.len() + rows.duplicates.len();
         let Repaired {
             columns,
             faults,
             bridges,
         } = rows.repair();
 
-        let samples = PerSensor::from_fn(|sensor| {
+        let seconds = self.seconds(period);
+        let series = PerSensor::from_fn(|sensor| {
             let nominal = self.nominal.get(sensor).0;
             let [x, y, z] = std::array::from_fn(|axis| &columns[3 * sensor as usize + axis]);
-            let signs = triads.get(sensor).each_ref();
+            let signs = [0, 1, 2].map(|axis| &layout.names[3 * sensor as usize + axis]);
             let signs = Vector3::from(signs.map(|column| if column.reversed { -1.0 } else { 1.0 }));
             let rows = x.iter().zip(y).zip(z);
             let sample = |((&x, &y), &z)| {
@@ -129,72 +268,109 @@ impl ImuLog<'_> {
                     .vector(Vector3::new(x, y, z).component_mul(&signs));
                 (row * seconds).component_div(&nominal)
             };
-            rows.map(sample).collect::<Vec<_>>()
+            rows.map(sample).collect::<Series>()
         });
         let pulse = PerSensor::from_fn(|sensor| match self.output {
             Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
             Output::Increment | Output::Rate => 0.0,
         });
+        let read = Read {
+            layout: &layout,
+            clock,
+            facts,
+            rows: count,
+            temperature: TemperatureFacts::of(&held.temperatures),
+            faults,
+            bridges,
+        };
+        Ok(self.samples(read, samples, series, pulse))
+    }
+
+    fn samples(
+        &self,
+        read: Read,
+        samples: usize,
+        series: PerSensor<Series>,
+        pulse: PerSensor<f64>,
+    ) -> ImuSamples {
+        let Read {
+            layout,
+            clock,
+            facts,
+            rows,
+            temperature,
+            faults,
+            bridges,
+        } = read;
+        let period = clock.period;
         let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
         for (k, facts) in facts.into_iter().enumerate() {
-            of_axes.get_mut(sensor(k))[body_axes[k]] = facts;
+            of_axes.get_mut(sensor(k))[layout.body_axes[k]] = facts;
         }
-        Ok(ImuSamples {
+        ImuSamples {
             stretches: stretches_between(
-                samples.gyro.len(),
+                samples,
                 clock.first - self.stamp.lag() * period,
                 period,
                 &faults,
             ),
             period,
             continuous: self.continuous,
-            gyro: samples.gyro,
-            accel: samples.accel,
+            gyro: series.gyro,
+            accel: series.accel,
             pulse,
             faults,
             bridges,
             log: Some(LogFacts {
-                rows: count,
+                rows,
                 jitter_rms: clock.jitter_rms,
                 jitter_max: clock.jitter_max,
                 off_stated_period: clock.off_given,
                 columns: of_axes,
                 named: NamedColumns {
                     time: self.clock.column.map(str::to_owned),
-                    triads,
+                    triads: layout.triads(),
                     temperature: self.temperature.map(str::to_owned),
                     axes: self.axes.order(),
                 },
                 temperature,
             }),
+        }
+    }
+
+    fn layout(&self, csv: &mut CsvFile) -> Result<Layout, FileError> {
+        let names = self.triads.gyro.iter().chain(&self.triads.accel);
+        let found = names.map(|name| csv.signed_column(name));
+        let found = found.collect::<Result<Vec<_>, _>>()?;
+        let (places, names): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        let mut names = names.into_iter();
+        let mut name = |_| {
+            names.next().unwrap_or(FileColumn {
+                name: String::new(),
+                reversed: false,
+            })
+        };
+        Ok(Layout {
+            names: std::array::from_fn(&mut name),
+            places: std::array::from_fn(|k| places[k]),
+            body_axes: std::array::from_fn(|k| self.axes.body_axis(k % 3)),
         })
     }
 
-    fn content(&self, notes: &mut Vec<String>) -> Result<Content, FileError> {
+    fn content(&self, notes: &mut Vec<String>) -> Result<Content<'_>, FileError> {
         let mut csv = CsvFile::open(&self.file)?;
         let mut stamps = self.clock.start(&mut csv)?;
-        let mut triad = |[x, y, z]: [&str; 3]| -> Result<_, FileError> {
-            Ok([
-                csv.signed_column(x)?,
-                csv.signed_column(y)?,
-                csv.signed_column(z)?,
-            ])
-        };
-        let found = PerSensor {
-            gyro: triad(self.triads.gyro)?,
-            accel: triad(self.triads.accel)?,
-        };
-        let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
+        let layout = self.layout(&mut csv)?;
+        let places = layout.places;
         let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
 
         let instance = match self.instance {
             Some((name, number)) => Some((csv.column(name)?, number)),
             None => None,
         };
-        let mut blank = 0;
-        let mut columns = [const { Vec::new() }; 6];
-        let mut duplicates = Vec::new();
-        let mut temperatures = Vec::new();
+        let (mut blank, mut duplicates) = (0, 0);
+        let mut held = Held::default();
+        let mut long: Option<LongLog> = None;
         let mut before = [f64::NAN; 6];
         while csv.advance()? && !csv.may_be_cut() {
             if let Some((place, number)) = instance
@@ -213,17 +389,27 @@ impl ImuLog<'_> {
             }
             match stamps.look(&csv)? {
                 Stamp::Same if row == before => {
-                    duplicates.push((stamps.of_rows.len(), csv.line()));
+                    held.duplicates.push((held.len(), csv.line()));
+                    duplicates += 1;
                     continue;
                 }
                 Stamp::Same => return Err(Stamps::same(&csv)),
                 Stamp::Later => before = row,
             }
-            for (column, value) in columns.iter_mut().zip(row) {
+            for (column, value) in held.columns.iter_mut().zip(row) {
                 column.push(value);
             }
             if let Some(place) = temperature {
-                temperatures.push(csv.number(place)?);
+                held.temperatures.push(csv.number(place)?);
+            }
+            match &mut long {
+                Some(long) if long.is_full(&held) => long.take(&mut held, &mut stamps, false)?,
+                None if held.len() == LONG => {
+                    csv.pack();
+                    let layout = layout.clone();
+                    long = Some(LongLog::new(self, layout, &held, &stamps)?);
+                }
+                _ => {}
             }
         }
         notes.extend(csv.cut_off("It is left out"));
@@ -233,23 +419,23 @@ impl ImuLog<'_> {
                 self.file.display()
             ));
         }
-        if stamps.of_rows.len() < FEWEST_SAMPLES {
-            return Err(csv.error(
-                format_args!("{} samples", stamps.of_rows.len()),
-                format_args!("at least {FEWEST_SAMPLES}"),
-                "Record a run with dwells and turns.",
-            ));
+        match &mut long {
+            Some(long) => long.take(&mut held, &mut stamps, true)?,
+            None if held.len() < FEWEST_SAMPLES => {
+                return Err(csv.error(
+                    format_args!("{} samples", held.len()),
+                    format_args!("at least {FEWEST_SAMPLES}"),
+                    "Record a run with dwells and turns.",
+                ));
+            }
+            None => {}
         }
-        let PerSensor { gyro, accel } = found;
         Ok(Content {
+            layout,
             stamps,
-            triads: PerSensor {
-                gyro: gyro.map(|(_, column)| column),
-                accel: accel.map(|(_, column)| column),
-            },
-            columns,
+            held,
+            long,
             duplicates,
-            temperature: TemperatureFacts::of(&temperatures),
         })
     }
 

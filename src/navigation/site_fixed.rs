@@ -13,7 +13,7 @@ use super::sums::Sums;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
 use crate::imu::{PerSensor, Sensed, Sensor, TermResponse, TermVector, Triad};
-use crate::recording::ImuSamples;
+use crate::recording::{ImuSamples, Near};
 
 /// Within this time, s, what happened first is taken to act on all that follows as a whole; the sensitivity of
 /// navigation to errors is of second order in it.
@@ -28,6 +28,7 @@ pub(crate) fn samples_of(time: f64, period: f64) -> usize {
 #[derive(Debug, Clone)]
 pub struct Navigator<'a> {
     imu: &'a ImuSamples,
+    near: Near<'a>,
     gravity: Vector3<f64>,
     earth_rate: Vector3<f64>,
     earth_turn: Matrix3<f64>,
@@ -75,6 +76,7 @@ impl<'a> Navigator<'a> {
         let earth_rate = site.earth_rate_n();
         Some(Self {
             imu,
+            near: Near::new(imu),
             gravity: site.gravity_n(),
             earth_rate,
             earth_turn: exp(-earth_rate * imu.period),
@@ -140,9 +142,10 @@ impl<'a> Navigator<'a> {
     #[inline]
     fn of_triads(&self, k: usize) -> Increments {
         let PerSensor { gyro, accel } = &self.instrument;
+        let raw = self.near.at(k);
         Increments {
-            angle: gyro.correction * self.imu.gyro[k] - gyro.bias,
-            velocity: accel.correction * self.imu.accel[k] - accel.bias,
+            angle: gyro.correction * raw.gyro - gyro.bias,
+            velocity: accel.correction * raw.accel - accel.bias,
         }
     }
 
@@ -254,6 +257,9 @@ impl<'a> Navigator<'a> {
     #[inline]
     fn navigate(&mut self, samples: Range<usize>, mut each: impl FnMut(&Self, &Step)) {
         let period = self.imu.period;
+        // Coning asks for the sample before, angular acceleration for those beside.
+        self.near
+            .reach(&(samples.start.saturating_sub(2)..samples.end + 1));
         let mut state = self.state;
         let mut before = samples
             .start

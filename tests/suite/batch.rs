@@ -46,8 +46,8 @@ fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
 /// The first 200 s of the demo's run.
 fn short() -> Run {
     let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-    run.recording.imu.gyro.truncate(20_000);
-    run.recording.imu.accel.truncate(20_000);
+    run.recording.imu.gyro.to_mut().truncate(20_000);
+    run.recording.imu.accel.to_mut().truncate(20_000);
     run.recording.imu.stretches[0].samples.end = 20_000;
     if let Some(table) = &mut run.recording.table {
         let readings = table.time.partition_point(|&t| t <= 200.0);

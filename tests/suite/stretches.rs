@@ -8,7 +8,7 @@ use turncal::calibration::{
     mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
-use turncal::recording::{Bridge, Recording, SampleError, Stretch, TableLog};
+use turncal::recording::{Bridge, Recording, SampleError, Series, Stretch, TableLog};
 use turncal::run::{Aiding, Run};
 use turncal::simulation::{Given, Scenario, Simulated};
 
@@ -76,8 +76,8 @@ fn broken(run: &Run, lost: &Range<usize>) -> Run {
     imu.stretches[0].samples.end = lost.start;
     imu.stretches.push(after);
     // Whatever lies there, nothing may look at it.
-    imu.gyro[lost.clone()].fill(Vector3::repeat(0.3));
-    imu.accel[lost.clone()].fill(Vector3::repeat(-7.0));
+    imu.gyro.to_mut()[lost.clone()].fill(Vector3::repeat(0.3));
+    imu.accel.to_mut()[lost.clone()].fill(Vector3::repeat(-7.0));
     run
 }
 
@@ -87,7 +87,7 @@ fn part(run: &Run, samples: Range<usize>) -> Run {
         name, imu, table, ..
     } = &run.recording;
     let (begin, end) = (imu.time(samples.start), imu.time(samples.end));
-    let of_part = |all: &[Vector3<f64>]| all[samples.clone()].to_vec();
+    let of_part = |all: &Series| all.part(samples.clone()).to_vec();
     let (gyro, accel) = (of_part(&imu.gyro), of_part(&imu.accel));
     let mut recording = Recording::from_samples(name, begin, imu.period, gyro, accel).unwrap();
     recording.imu.pulse = imu.pulse;

@@ -196,7 +196,7 @@ impl Legs<'_> {
 
     /// How far it turns in all, one way and the other, rad.
     fn way(&self, samples: Range<usize>) -> f64 {
-        let increments = self.run.recording.imu.gyro[samples].iter();
+        let increments = self.run.recording.imu.gyro.within(samples);
         increments
             .map(|increment| (increment - self.zero).norm())
             .sum()
@@ -204,7 +204,7 @@ impl Legs<'_> {
 
     fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>) -> Move {
         let increments = || {
-            let of = self.run.recording.imu.gyro[samples.clone()].iter();
+            let of = self.run.recording.imu.gyro.within(samples.clone());
             of.map(|increment| increment - self.zero)
         };
         let turned = |sign: f64| {

@@ -47,6 +47,21 @@ pub(crate) struct Repaired {
     pub bridges: Vec<Bridge>,
 }
 
+impl Repaired {
+    /// The samples of each fault and each bridge.
+    pub fn samples_mut(&mut self) -> impl Iterator<Item = &mut Range<usize>> {
+        let faults = self.faults.iter_mut().map(|fault| &mut fault.samples);
+        faults.chain(self.bridges.iter_mut().map(|bridge| &mut bridge.samples))
+    }
+
+    /// Whether no fault has this sample.
+    pub fn is_sound(&self, sample: usize) -> bool {
+        let concerns =
+            |fault: &Fault| fault.kind != FaultKind::Duplicate && fault.samples.contains(&sample);
+        !self.faults.iter().any(concerns)
+    }
+}
+
 fn sensor(column: usize) -> Sensor {
     Sensor::ALL[column / 3]
 }

@@ -89,7 +89,7 @@ fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
 /// Mean rate of each sample about a body axis in degrees a second.
 fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
     let samples = imu.gyro.iter().enumerate();
-    let rate = |(k, angle): (usize, &nalgebra::Vector3<f64>)| {
+    let rate = |(k, angle): (usize, nalgebra::Vector3<f64>)| {
         (
             imu.time(k) + 0.5 * imu.period,
             angle[axis] / imu.period / DEGREE,
