@@ -39,17 +39,24 @@ pub(super) struct AtRest {
 
 /// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
 const STEP: f64 = 0.1;
+/// The same of a packed record once a dwell has lasted as long, in such steps: by then what is observed is
+/// limited by random walk, not by its own noise.
+const STEPS_OF_PACKED: usize = 10;
 
 /// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
-/// dwells `longer` times as long as usual.
+/// dwells so many taken together.
 pub(super) fn steps(
     run: &Run,
     table: Option<&TableLog>,
     dwells: &[Dwell],
-    longer: usize,
+    together: usize,
 ) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
+    let longest = match imu.is_packed() {
+        true => STEPS_OF_PACKED * length,
+        false => length,
+    };
     let mut steps = Vec::new();
     let mut at = dwells.first().map_or(0, |dwell| dwell.samples.start);
     for (number, dwell) in dwells.iter().enumerate() {
@@ -71,7 +78,7 @@ pub(super) fn steps(
         let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
         let axes = axes.map(|angles| Arc::new(axis_response(angles)));
         let mut first = true;
-        for samples in cut(dwell.samples.clone(), longer * length) {
+        for samples in growing(dwell.samples.clone(), (length, longest), together) {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
             let reading = table.zip(unread.as_mut()).and_then(|(table, unread)| {
                 let readings = take_until(unread, table, until);
@@ -127,6 +134,25 @@ pub(super) fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Ra
     let end = range.end;
     let begins = range.step_by(length.max(1));
     begins.map(move |begin| begin..(begin + length).min(end))
+}
+
+/// Cuts a range into parts of the first length, then into ever longer ones, each as long as all before it, up
+/// to the second; so many of them are taken together.
+fn growing(
+    range: Range<usize>,
+    (length, longest): (usize, usize),
+    together: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let begin = range.start;
+    let mut at = begin;
+    std::iter::from_fn(move || {
+        let from = at;
+        for _ in 0..together.max(1) {
+            let length = (at - begin).clamp(length.max(1), longest.max(1));
+            at = (at + length).min(range.end);
+        }
+        (at > from).then_some(from..at)
+    })
 }
 
 /// Takes the readings up to a time off the front of those not yet used.

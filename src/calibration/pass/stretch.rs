@@ -17,8 +17,10 @@ use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::schedule::{AtRest, Step};
 use crate::navigation::{Navigator, State, TermValues};
 
-/// Spacing of the history, s.
+/// Spacing of the history, s …
 const EPOCH: f64 = 1.0;
+/// … and how many there are of a recording at most.
+const EPOCHS: f64 = 3600.0;
 
 /// A pass within a stretch.
 pub(super) struct OneStretch<'a> {
@@ -129,7 +131,8 @@ impl<'a> OneStretch<'a> {
     /// Keeps what is known at this time for the history.
     fn remember(&mut self, time: f64) {
         let last = self.sums.history.last();
-        if last.is_none_or(|last| (time - last.time).abs() >= EPOCH) {
+        let apart = EPOCH.max(self.stretch.run.recording.imu.duration() / EPOCHS);
+        if last.is_none_or(|last| (time - last.time).abs() >= apart) {
             let epoch = self.sums.epoch(time);
             self.sums.history.push(epoch);
         }
