@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::super::plot::{Axis, Panel, Plot, Point, Series};
+use super::super::plot::{Axis, Panel, Plot, Point, Series, thinned};
 use super::report::Report;
 use crate::imu::AXES;
 use crate::recording::{ImuSamples, TableLog};
@@ -95,7 +95,7 @@ fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
             angle[axis] / imu.period / DEGREE,
         )
     };
-    samples.map(rate).collect()
+    thinned(samples.map(rate))
 }
 
 #[cfg(test)]
