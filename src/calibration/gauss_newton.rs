@@ -17,7 +17,7 @@ use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::{Outcome, Pass};
 use super::parameters::parameter_name;
-use super::pass::{Gate, Mode, PassResult, pass};
+use super::pass::{Epoch, Gate, Mode, PassResult, pass};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
@@ -47,7 +47,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let Attempt {
         priors,
         mut passes,
-        feedback,
+        feedback_history,
         mut iterated,
     } = others.fold(of_start, better)?;
     let stated = problem;
@@ -121,7 +121,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         log_determinant: held.log_determinant,
         consistency: consistency(&held.innovations),
         history: held.history,
-        feedback_history: feedback.map(|pass| pass.history).unwrap_or_default(),
+        feedback_history,
         innovations: held.innovations,
         aiding: model.aiding,
         velocity_sigma: problem
@@ -157,7 +157,8 @@ fn estimated(held: &PassResult) -> Estimate {
 struct Attempt {
     priors: Vec<AttitudePrior>,
     passes: Vec<Pass>,
-    feedback: Option<PassResult>,
+    /// Of the pass with feedback, where there was one.
+    feedback_history: Vec<Epoch>,
     iterated: Iterated,
 }
 
@@ -188,7 +189,11 @@ fn attempt(
             progress,
         )
     };
-    let live = feedback.as_ref().map(|pass| pass.estimate.clone());
+    // Nothing else of it is needed.
+    let (live, feedback_history) = match feedback {
+        Some(pass) => (Some(pass.estimate), pass.history),
+        None => (None, Vec::new()),
+    };
     let iterated = match live.map(&mut from) {
         Some(Ok(iterated)) if iterated.converged => iterated,
         // What figures that are wrong by orders of magnitude feed back may lead astray, too.
@@ -201,7 +206,7 @@ fn attempt(
     Ok(Attempt {
         priors,
         passes,
-        feedback,
+        feedback_history,
         iterated,
     })
 }

@@ -319,10 +319,11 @@ impl<'a> Navigator<'a> {
     fn bridged(&self, samples: &Range<usize>) -> PerSensor<Matrix3<f64>> {
         let mut covariance = PerSensor::<Matrix3<f64>>::default();
         for (bridge, part) in self.imu.bridged(samples) {
-            let correction = &self.instrument.get(bridge.sensor).correction;
-            let error = self.state.attitude * correction.column(bridge.axis);
-            *covariance.get_mut(bridge.sensor) +=
-                error * error.transpose() * (bridge.variance * part);
+            for (sensor, axis, variance) in bridge.each() {
+                let correction = &self.instrument.get(sensor).correction;
+                let error = self.state.attitude * correction.column(axis);
+                *covariance.get_mut(sensor) += error * error.transpose() * (variance * part);
+            }
         }
         covariance
     }

@@ -27,7 +27,8 @@ pub struct ImuSamples {
     pub pulse: PerSensor<f64>,
     /// What was wrong with the file's samples, in order of kind, axis and time.
     pub faults: Vec<Fault>,
-    /// Interpolated samples, in order of triad, axis and time; those of one axis do not overlap.
+    /// Interpolated samples, those of the same axes together, in order of time; those of one axis do not
+    /// overlap.
     pub bridges: Vec<Bridge>,
     /// The file that the samples are from; none if they were made.
     pub log: Option<LogFacts>,
@@ -186,10 +187,15 @@ impl ImuSamples {
 
     /// Whether these samples follow one another without a break.
     pub fn unbroken(&self, samples: &Range<usize>) -> bool {
-        let of_one = |stretch: &Stretch| {
-            stretch.samples.start <= samples.start && samples.end <= stretch.samples.end
-        };
-        self.continuous && self.stretches.iter().any(of_one)
+        self.continuous && !self.is_lost(samples)
+    }
+
+    /// Whether some of these samples are not known.
+    pub fn is_lost(&self, samples: &Range<usize>) -> bool {
+        let begun = |stretch: &Stretch| stretch.samples.start <= samples.start;
+        let begun = self.stretches.partition_point(begun);
+        let stretch = self.stretches.get(begun.wrapping_sub(1));
+        stretch.is_none_or(|stretch| samples.end > stretch.samples.end)
     }
 
     /// The samples between stretches, of which nothing is known.

@@ -191,8 +191,9 @@ impl Dwell {
         let sum = samples.sum(self.samples.clone());
         let mut interpolated = Vector3::<f64>::zeros();
         for (bridge, part) in run.recording.imu.bridged(&self.samples) {
-            if bridge.sensor == sensor {
-                interpolated[bridge.axis] += bridge.variance * part;
+            let of_sensor = bridge.each().filter(|&(of, ..)| of == sensor);
+            for (_, axis, variance) in of_sensor {
+                interpolated[axis] += variance * part;
             }
         }
         let span = self.times(run);

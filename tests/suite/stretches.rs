@@ -162,16 +162,13 @@ fn a_break_of_ten_seconds_in_a_move_costs_no_more_than_what_is_lost() {
     // The same samples with an error without bound, and no break: attitude and velocity after them are
     // as unknown, by another way through the filter.
     let mut bridged = run.clone();
-    let bridges = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let samples = lost.clone();
-        (0..3).map(move |axis| Bridge {
-            sensor,
-            axis,
-            samples: samples.clone(),
-            variance: [1.0, 1e4][sensor as usize],
-        })
+    let axes = Sensor::ALL
+        .into_iter()
+        .flat_map(|sensor| [0, 1, 2].map(|axis| (sensor, axis)));
+    let bridge = axes.fold(Bridge::new(lost.clone()), |bridge, (sensor, axis)| {
+        bridge.with(sensor, axis, [1.0, 1e4][sensor as usize])
     });
-    bridged.recording.imu.bridges = bridges.collect();
+    bridged.recording.imu.bridges = vec![bridge];
     let bridged = Problem::new(&bridged, &Options::default());
     let without = bound(&bridged, &truth, &terms).unwrap().estimate;
     let (_, change) = apart(&without, &least);

@@ -186,8 +186,8 @@ impl Legs<'_> {
         table: &TableLog,
         readings: Range<usize>,
     ) -> impl Iterator<Item = (usize, Matrix3<f64>)> {
-        let times = table.time.iter().zip(&table.attitude);
-        let times = times.skip(readings.start).take(readings.len());
+        let attitudes = &table.attitude[readings.clone()];
+        let times = table.time[readings].iter().zip(attitudes);
         times.map(|(&time, attitude)| {
             let edge = self.run.recording.imu.edge(time).round().max(0.0);
             (edge as usize, *attitude)

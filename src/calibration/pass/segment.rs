@@ -112,7 +112,9 @@ impl Segment {
         let begin = navigator.state;
         let mut segment = Self {
             begin,
-            axes: steps.first().and_then(|(_, at_rest)| at_rest.axes.clone()),
+            axes: steps
+                .first()
+                .and_then(|(_, at_rest)| at_rest.dwell.axes.clone()),
             models: Vec::new(),
             steps: Vec::with_capacity(steps.len()),
         };

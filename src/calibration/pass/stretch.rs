@@ -124,7 +124,7 @@ impl<'a> OneStretch<'a> {
             }
         }
         let posterior = self.sums.filter.constants();
-        self.sums.posteriors.push(posterior);
+        self.sums.posteriors.after_dwell(posterior);
         Ok(done)
     }
 
@@ -212,7 +212,7 @@ impl<'a> OneStretch<'a> {
             model: &problem.model,
             mode: self.mode,
             limit: problem.gate(),
-            dwell: sums.posteriors.len() - 1,
+            dwell: sums.posteriors.dwells(),
             memory: &mut self.gate,
             innovations: &mut sums.innovations,
             cost: &mut sums.cost,

@@ -224,7 +224,8 @@ impl<'a> LongLog<'a> {
             let axis = fault.axis.map(|(sensor, axis)| (sensor as usize, axis));
             (fault.kind as usize, axis, fault.samples.start)
         };
-        faults.sort_by_key(order);
+        faults.sort_unstable_by_key(order);
+        faults.shrink_to_fit();
         // What goes on in the next part is one.
         faults.dedup_by(|next, fault| {
             let goes_on = next.kind == fault.kind
@@ -239,7 +240,8 @@ impl<'a> LongLog<'a> {
             goes_on
         });
         let mut bridges = self.bridges;
-        bridges.sort_by_key(|b| (b.sensor as usize, b.axis, b.samples.start));
+        Bridge::sort(&mut bridges);
+        bridges.shrink_to_fit();
         Ok(Whole {
             clock,
             facts,

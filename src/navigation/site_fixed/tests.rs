@@ -231,11 +231,9 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
 fn an_interpolated_axis_adds_its_error_along_that_axis() {
     let site = site();
     let attitude = start().attitude;
-    let bridge = |sensor, axis, samples| Bridge {
-        sensor,
-        axis,
-        samples,
-        variance: if sensor == Sensor::Gyro { 4e-8 } else { 9e-6 },
+    let bridge = |sensor, axis, samples| {
+        let variance = if sensor == Sensor::Gyro { 4e-8 } else { 9e-6 };
+        Bridge::new(samples).with(sensor, axis, variance)
     };
     let record = ImuSamples {
         gyro: vec![Vector3::zeros(); SAMPLES].into(),

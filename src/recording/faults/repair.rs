@@ -120,6 +120,7 @@ impl Rows<'_> {
                     filled += 1;
                 }
                 let hole = Hole::new(&sound, samples.clone(), longest);
+                let mut bridge = Bridge::new(samples.clone());
                 for &k in &of {
                     let (sensor, axis) = (sensor(k), body_axes[k]);
                     let variance = hole.fill(&mut columns[k]);
@@ -127,12 +128,7 @@ impl Rows<'_> {
                     let linear =
                         |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
                     match variance.filter(linear) {
-                        Some(variance) => bridges.push(Bridge {
-                            sensor,
-                            axis,
-                            samples: samples.clone(),
-                            variance,
-                        }),
+                        Some(variance) => bridge = bridge.with(sensor, axis, variance),
                         None => {
                             let within = |fault: &&mut Fault| {
                                 fault.concerns(sensor, axis)
@@ -146,9 +142,12 @@ impl Rows<'_> {
                         }
                     }
                 }
+                if bridge.each().next().is_some() {
+                    bridges.push(bridge);
+                }
             }
         }
-        bridges.sort_by_key(|b| (b.sensor as usize, b.axis, b.samples.start));
+        Bridge::sort(&mut bridges);
         Repaired {
             columns,
             faults,
