@@ -17,7 +17,7 @@ use crate::recording::{
     Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
     TemperatureFacts, stretches_between,
 };
-use long::{LONG, LongLog, Whole};
+use long::{LongLog, Sizes, Whole};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
@@ -172,13 +172,17 @@ impl ImuLog<'_> {
     /// Reads the samples, finds what is wrong with them, and bridges it; what the file leaves open goes to
     /// `notes`.
     pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
+        self.read_by(Sizes::default(), notes)
+    }
+
+    fn read_by(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let Content {
             layout,
             stamps,
             held,
             long,
             duplicates,
-        } = self.content(notes)?;
+        } = self.content(sizes, notes)?;
         match long {
             Some(long) => {
                 let whole = long.finish(duplicates)?;
@@ -357,7 +361,7 @@ impl ImuLog<'_> {
         })
     }
 
-    fn content(&self, notes: &mut Vec<String>) -> Result<Content<'_>, FileError> {
+    fn content(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<Content<'_>, FileError> {
         let mut csv = CsvFile::open(&self.file)?;
         let mut stamps = self.clock.start(&mut csv)?;
         let layout = self.layout(&mut csv)?;
@@ -404,10 +408,10 @@ impl ImuLog<'_> {
             }
             match &mut long {
                 Some(long) if long.is_full(&held) => long.take(&mut held, &mut stamps, false)?,
-                None if held.len() == LONG => {
+                None if held.len() == sizes.long => {
                     csv.pack();
                     let layout = layout.clone();
-                    long = Some(LongLog::new(self, layout, &held, &stamps)?);
+                    long = Some(LongLog::new(self, (layout, sizes), &held, &stamps)?);
                 }
                 _ => {}
             }
@@ -451,3 +455,6 @@ impl ImuLog<'_> {
         Ok(value)
     }
 }
+
+#[cfg(test)]
+mod tests;

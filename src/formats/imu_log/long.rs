@@ -12,18 +12,33 @@ use crate::recording::{
     Bridge, ColumnFacts, Fault, FaultKind, Packed, Packer, TemperatureFacts, finest_step,
 };
 
-/// Rows from which on a log is packed: before that it takes 50 MB at most.
-pub(super) const LONG: usize = 1 << 20;
-/// Rows in which faults are looked for at once, as though they were a record …
-const PART: usize = 1 << 18;
-/// … with so many on either side that others are looked for in: more than what is bridged, and what tells of it,
-/// reach over.
+/// How many rows are held.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    /// From so many on a log is packed: until then they take 50 MB at most.
+    pub long: usize,
+    /// So many are looked at for faults at once, as though they were a record.
+    pub part: usize,
+}
+
+impl Default for Sizes {
+    fn default() -> Self {
+        Self {
+            long: 1 << 20,
+            part: 1 << 18,
+        }
+    }
+}
+
+/// Rows on either side of a part that are looked at with it: more than what is bridged, and what tells of it, reach
+/// over.
 const BESIDE: usize = 1 << 13;
 
 /// What a long log has come to so far.
 pub(super) struct LongLog<'a> {
     log: &'a ImuLog<'a>,
     layout: Layout,
+    sizes: Sizes,
     clock: Following,
     /// The sample of each row that is held.
     numbers: Vec<usize>,
@@ -56,7 +71,7 @@ impl<'a> LongLog<'a> {
     /// Begins with the first rows of a log.
     pub fn new(
         log: &'a ImuLog<'a>,
-        layout: Layout,
+        (layout, sizes): (Layout, Sizes),
         held: &Held,
         stamps: &Stamps,
     ) -> Result<Self, FileError> {
@@ -69,6 +84,7 @@ impl<'a> LongLog<'a> {
             packers: PerSensor::from_fn(|sensor| Packer::new(layout.columns(sensor).map(step))),
             log,
             layout,
+            sizes,
             clock,
             numbers,
             taken: 0,
@@ -83,7 +99,7 @@ impl<'a> LongLog<'a> {
 
     /// Whether so many rows are held that some can be taken.
     pub fn is_full(&self, held: &Held) -> bool {
-        held.len() >= self.taken + PART + 2 * BESIDE
+        held.len() >= self.taken + self.sizes.part + 2 * BESIDE
     }
 
     /// Takes rows that are held, all of them at the end of the file, and lets go of what no later row asks for.
@@ -97,7 +113,7 @@ impl<'a> LongLog<'a> {
             self.numbers.push(self.clock.number(stamp)?);
         }
         while self.is_full(held) {
-            self.part(held, stamps, self.taken + PART + BESIDE);
+            self.part(held, stamps, self.taken + self.sizes.part + 2 * BESIDE);
         }
         if at_end {
             self.part(held, stamps, held.len());
