@@ -49,12 +49,14 @@
 //! run before it is calibrated, [`noise`] at its noise.
 //!
 //! # Features
-//! `report` (pages, figures, tables) and `cli` (the command `turncal`, with `report`) are on by
-//! default. Without them no crate of a user interface is compiled:
+//! `report` (pages, figures, tables), `certificate` (calibration certificates as PDF/A-3 and XML, with
+//! `report`) and `cli` (the command `turncal`, with `report`) are on by default. Without them no crate of a user interface is compiled:
 //! `turncal = { version = "…", default-features = false }`.
 
 pub mod attitude;
 pub mod calibration;
+#[cfg(feature = "certificate")]
+pub mod certificate;
 pub mod earth;
 pub mod formats;
 pub mod imu;

@@ -7,6 +7,7 @@
 mod catalogue;
 mod instrument;
 mod machine;
+mod thermal;
 mod trajectory;
 mod values;
 
@@ -17,6 +18,7 @@ use serde::de::DeserializeOwned;
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
+pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
 pub(crate) use values::{Finite, NonNegative, OneOrThree, Positive};
 
@@ -33,14 +35,17 @@ pub enum Room {
     Path,
     /// Whole simulated runs.
     Scenario,
+    /// Recordings of one instrument, to be simulated.
+    Campaign,
     /// Trajectories to navigate along.
     Trajectory,
 }
 
 impl Room {
     /// All folders, those first that commands name most.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Scenario,
+        Self::Campaign,
         Self::Path,
         Self::Turntable,
         Self::Imu,
@@ -56,6 +61,7 @@ impl Room {
             Self::Turntable => "turntable",
             Self::Path => "path",
             Self::Scenario => "scenario",
+            Self::Campaign => "campaign",
             Self::Trajectory => "trajectory",
         }
     }
@@ -67,6 +73,7 @@ impl Room {
             Self::Turntable => TURNTABLE,
             Self::Path => PATH,
             Self::Scenario => SCENARIO,
+            Self::Campaign => CAMPAIGN,
             Self::Trajectory => TRAJECTORY,
         }
     }
@@ -84,7 +91,9 @@ embed!(
     IMU,
     "imu",
     "industrial-mems",
+    "industrial-mems-warming",
     "navigation-fog",
+    "navigation-fog-warming",
     "paper",
     "paper-unsteady",
     "ring-laser",
@@ -112,6 +121,7 @@ embed!(
     "six-position",
     "three-axis",
     "three-axis-hour",
+    "three-axis-two-hours",
     "two-axis",
 );
 embed!(
@@ -125,7 +135,10 @@ embed!(
     "real-table",
     "single-axis",
     "two-axis",
+    "warming",
+    "warming-mems",
 );
+embed!(CAMPAIGN, "campaign", "days", "five-soaks", "ramp");
 embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
 
 /// Why a model cannot be had.
@@ -288,6 +301,7 @@ mod tests {
             Room::Installation => InstallationModel::load(path, place).unwrap_err(),
             Room::Turntable => turntable(path, place).unwrap_err(),
             Room::Path => machine::path(path, place, &site).unwrap_err(),
+            Room::Campaign => crate::simulation::SimulatedCampaign::load(path).unwrap_err(),
             Room::Scenario => crate::simulation::Scenario::load(path).unwrap_err(),
             Room::Trajectory => trajectory(path, place).unwrap_err(),
         };

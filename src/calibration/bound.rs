@@ -1,13 +1,16 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
+use nalgebra::DVector;
+
 use super::auxiliary::Auxiliary;
 use super::coarse::initial_attitudes;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::linearisation::Linearisation;
+use super::parameters::PARAMETERS;
 use super::pass::{Epoch, Gate, Mode, pass};
 use super::problem::Problem;
-use crate::imu::{PerSensor, TermVector, Triad};
+use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
 /// What no estimator of a run can beat.
 #[derive(Debug, Clone)]
@@ -37,11 +40,8 @@ pub fn bound(
     let model = problem.model.in_form(problem.run(), truth.gyro.form);
     let problem = problem.with_model(model);
     let attitudes = initial_attitudes(&problem)?;
-    let at = Linearisation {
-        triads: *truth,
-        terms: *terms,
-        initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
-    };
+    let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
+    let at = Linearisation::new(*truth, *terms, initial);
     let result = pass(&problem, &attitudes, &at, Mode::Held(Gate::Open))?;
     Ok(Bound {
         estimate: Estimate {
@@ -51,4 +51,33 @@ pub fn bound(
         auxiliary: result.auxiliary,
         history: result.history,
     })
+}
+
+/// The variances that no estimator of recordings together can beat, at a truth with these coefficients of
+/// temperature: of the parameters of both triads at the reference, then of the coefficients that the problem has on.
+///
+/// # Errors
+/// [`CalibrationError`] as for [`super::estimate`].
+pub fn thermal_bound(
+    problem: &Problem,
+    truth: &PerSensor<Triad>,
+    coefficients: &PerSensor<ThermalCoefficients>,
+) -> Result<DVector<f64>, CalibrationError> {
+    let attitudes = initial_attitudes(problem)?;
+    let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
+    let at = Linearisation {
+        thermal: *coefficients,
+        ..Linearisation::new(*truth, TermVector::zeros(), initial)
+    };
+    let result = pass(problem, &attitudes, &at, Mode::Held(Gate::Open))?;
+    let of_coefficients = result.thermal.map(|thermal| thermal.covariance.diagonal());
+    let of_coefficients = of_coefficients.unwrap_or_else(|| DVector::zeros(0));
+    let of_parameters = result.covariance.diagonal();
+    Ok(DVector::from_fn(
+        PARAMETERS + of_coefficients.len(),
+        |k, _| match k.checked_sub(PARAMETERS) {
+            None => of_parameters[k],
+            Some(k) => of_coefficients[k],
+        },
+    ))
 }

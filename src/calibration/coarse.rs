@@ -62,11 +62,11 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     enough(problem)?;
     if let Some(attitudes) = attitudes_of_table(problem) {
         return Ok(CoarseStart {
-            at: Linearisation {
-                triads: table::from_table(problem)?,
-                terms: TermVector::zeros(),
-                initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
-            },
+            at: Linearisation::new(
+                table::from_table(problem)?,
+                TermVector::zeros(),
+                attitudes.iter().map(|attitude| attitude.mean).collect(),
+            ),
             attitudes,
             hidden: false,
         });

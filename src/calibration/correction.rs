@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::frame::triad_record;
 use crate::calibration::result::Calibration;
 use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
-use crate::recording::Near;
+use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
 /// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
@@ -21,6 +21,8 @@ pub struct Correction {
     pub bias: PerSensor<Vector3<f64>>,
     /// Parameters `q` of error terms, in SI; zero where the record has none.
     pub terms: TermVector,
+    /// The record, where it changes with temperature.
+    changing: Option<Box<Calibration>>,
 }
 
 /// One sample, calibrated, along right, front and up of the calibration's body frame.
@@ -34,6 +36,8 @@ pub struct Calibrated {
     pub rate: Vector3<f64>,
     /// Mean specific force, m/s².
     pub force: Vector3<f64>,
+    /// Whether its temperature is one that the calibration holds for.
+    pub in_range: bool,
 }
 
 /// Scale factors of one instrument are within this factor of its nominal ones.
@@ -128,6 +132,10 @@ impl Correction {
             bias: PerSensor::from_fn(|sensor| Vector3::from(triad_record(record, sensor).bias)),
             sensitivity,
             terms,
+            changing: record
+                .temperature
+                .is_some()
+                .then(|| Box::new(record.clone())),
         })
     }
 
@@ -182,22 +190,57 @@ impl Correction {
     /// inertial one: 10 ms times Earth rate is 0.7 µg.
     pub fn samples<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = Calibrated> + 'a {
         let plain = self.terms().next().is_none();
+        // A calibration that changes with temperature is made anew each second.
+        let mut now: Option<(u64, Self, bool)> = None;
         let mut near = Near::new(&run.recording.imu);
         (0..run.recording.imu.len()).map(move |k| {
             near.reach(&(k.saturating_sub(1)..k + 2));
-            let of_triads = PerSensor::from_fn(|sensor| self.of_triad(sensor, run, &near, k));
+            let time = run.recording.imu.time(k);
+            let second = ((time - run.recording.imu.start()) / TEMPERATURE_SPACING) as u64;
+            if self.changing.is_some() && now.as_ref().is_none_or(|(of, ..)| *of != second) {
+                let (here, in_range) = self.at(run, time + 0.5 * TEMPERATURE_SPACING);
+                now = Some((second, here, in_range));
+            }
+            let (here, in_range) = match &now {
+                Some((_, here, in_range)) => (here, *in_range),
+                None => (self, true),
+            };
+            let of_triads = PerSensor::from_fn(|sensor| here.of_triad(sensor, run, &near, k));
             let u = if plain {
                 of_triads
             } else {
-                self.without_terms(&of_triads, self.angular_acceleration(run, &near, k))
+                here.without_terms(&of_triads, here.angular_acceleration(run, &near, k))
             };
             Calibrated {
+                in_range,
                 start: run.recording.imu.time(k),
                 end: run.recording.imu.time(k + 1),
                 rate: u.gyro,
                 force: u.accel,
             }
         })
+    }
+
+    /// Whether it changes with temperature.
+    pub fn changes(&self) -> bool {
+        self.changing.is_some()
+    }
+
+    /// The same at the temperature of a run at a time in s, and whether it holds there. Where the run has none, or a
+    /// triad would be singular there, it is that of the reference temperature.
+    fn at(&self, run: &Run, time: f64) -> (Self, bool) {
+        let temperature = run.recording.imu.temperature.as_ref();
+        let known = self
+            .changing
+            .as_ref()
+            .zip(temperature)
+            .and_then(|(record, temperature)| {
+                let thermal = record.temperature.as_ref()?;
+                let (t, rate) = (temperature.at(time), temperature.rate(time));
+                let there = record.in_state(&thermal.state(&t, &rate)).ok()?;
+                Some((Self::of_record(&there).ok()?, thermal.holds(&t)))
+            });
+        known.unwrap_or_else(|| (self.clone(), false))
     }
 
     /// `(K C)⁻¹ (N − D)` of sample `k`.

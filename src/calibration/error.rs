@@ -27,6 +27,18 @@ pub enum CalibrationError {
         /// What it takes.
         megabytes: usize,
     },
+    /// Parameters that follow temperature, and a recording without one.
+    #[error(
+        "recording {number}, {recording}, has no temperature that could be used, which parameters are to follow: \
+         name the column in its run.toml (columns, `temperature`), or temperature_degc in [meta] or beside the \
+         recording in the campaign; or calibrate it apart"
+    )]
+    NoTemperature {
+        /// Its name.
+        recording: String,
+        /// Its number, from one.
+        number: usize,
+    },
     /// Nothing at rest.
     #[error(
         "no dwell was found, expected: one at least, better one with each axis up and each down; the \

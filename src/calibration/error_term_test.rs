@@ -6,6 +6,7 @@
 
 mod evidence;
 mod joint;
+mod left_off;
 
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,7 @@ use super::pass::PassResult;
 use super::problem::Problem;
 use evidence::ln_survival;
 use joint::{Fit, Joint, once_more};
+pub use left_off::LeftOff;
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,6 +48,9 @@ pub struct ErrorTermTest {
     pub without: f64,
     /// … and with it.
     pub with: f64,
+    /// What leaving it off may have done to the estimate; none where it is on, or not constant.
+    #[serde(skip)]
+    pub left_off: Option<LeftOff>,
 }
 
 /// What an error term that is off is to a record.
@@ -155,6 +160,7 @@ fn tests(problem: &Problem, outcome: &Outcome) -> Result<Vec<ErrorTermTest>, Cal
         role: Role::None,
         without: without.cost / scalars,
         with: with.cost / scalars,
+        left_off: None,
     };
     let own = Fit::of(&joint.own);
     let of_constant = |term: ErrorTerm| {
@@ -168,6 +174,7 @@ fn tests(problem: &Problem, outcome: &Outcome) -> Result<Vec<ErrorTermTest>, Cal
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
+            left_off: joint.left_off(term).filter(|_| !model.has(term)),
             ..test(term, &with, &without)
         })
     };

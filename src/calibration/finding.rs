@@ -44,6 +44,11 @@ pub enum Finding {
         /// Its 1σ after the run, rad.
         sigma_rad: f64,
     },
+    /// Parameters whose change with temperature the recordings do not show.
+    TemperatureNotSeen {
+        /// Their names.
+        parameters: Vec<String>,
+    },
     /// Second order and asymmetry of the accelerometers cannot be told apart.
     EvenTermsInseparable,
     /// The data reject the installation form.
@@ -183,6 +188,12 @@ impl fmt::Display for Finding {
             Self::NotObserved { by, parameters } => write!(
                 f,
                 "Not observed by {by}, σ not even halved: {}.",
+                listed(parameters)
+            ),
+            Self::TemperatureNotSeen { parameters } => write!(
+                f,
+                "How these change with temperature is not observed: {}. Their σ holds at the temperatures of the \
+                 recordings only; turn the instrument at more of them.",
                 listed(parameters)
             ),
             Self::CombinationsNotObserved { combinations } => write!(

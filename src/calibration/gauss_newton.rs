@@ -21,6 +21,7 @@ use super::pass::{Epoch, Gate, Mode, PassResult, pass};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
+use super::together::{self, Alone, Joint};
 use super::unexplained::unexplained;
 use crate::imu::Sensor;
 use crate::run::Aiding;
@@ -38,19 +39,28 @@ pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 /// [`CalibrationError`] where the runs cannot give a calibration. Runs that give one without
 /// convergence are an [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
-    let start = coarse_start(problem)?;
-    let others = start.other_headings();
-    let of_start = attempt(problem, start, progress);
-    let others = others
-        .into_iter()
-        .map(|start| attempt(problem, start, progress));
+    let Solved {
+        attempt,
+        problem,
+        alone,
+        findings: of_temperature,
+    } = match problem.varies() {
+        true => Solved::of(together::solve(problem, progress)?),
+        false => Solved {
+            attempt: from_coarse_start(problem, progress)?,
+            problem: problem.clone(),
+            alone: Vec::new(),
+            findings: Vec::new(),
+        },
+    };
     let Attempt {
         priors,
         mut passes,
         feedback_history,
         mut iterated,
-    } = others.fold(of_start, better)?;
-    let stated = problem;
+    } = attempt;
+    let stated = &problem;
+    let problem = &problem;
     let widened = widened(&problem.model, &estimated(&iterated.held));
     let with_wide_prior = widened.map(|model| problem.with_model(model));
     let problem = with_wide_prior.as_ref().unwrap_or(problem);
@@ -115,6 +125,13 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         prior_attitudes: priors,
         attitude_sigma: held.attitude_sigma,
         auxiliary: held.auxiliary,
+        thermal: held.thermal,
+        own: held.own,
+        warming: match problem.model.thermal {
+            Some(_) => problem.warming(),
+            None => Vec::new(),
+        },
+        alone,
         gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
         linearised_at: held.at,
         converged,
@@ -134,6 +151,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         findings: Vec::new(),
     };
     outcome.findings = findings(stated, &outcome);
+    outcome.findings.extend(of_temperature);
     if let Some((scatter, growth)) = outcome.dwell_scatter.zip(growth) {
         outcome.findings.push(Finding::DwellsScatter {
             mean: scatter.mean,
@@ -153,13 +171,52 @@ fn estimated(held: &PassResult) -> Estimate {
     }
 }
 
-/// A calibration from one start.
-struct Attempt {
-    priors: Vec<AttitudePrior>,
+/// A calibration from one start, with stated noise.
+pub(super) struct Attempt {
+    pub priors: Vec<AttitudePrior>,
     passes: Vec<Pass>,
     /// Of the pass with feedback, where there was one.
     feedback_history: Vec<Epoch>,
-    iterated: Iterated,
+    pub iterated: Iterated,
+}
+
+/// A calibration with stated noise, of one recording or of several together.
+struct Solved<'a> {
+    attempt: Attempt,
+    /// With what the data call for of what it had.
+    problem: Problem<'a>,
+    alone: Vec<Alone>,
+    findings: Vec<Finding>,
+}
+
+impl<'a> Solved<'a> {
+    fn of(joint: Joint<'a>) -> Self {
+        Self {
+            attempt: Attempt {
+                priors: joint.priors,
+                passes: joint.passes,
+                feedback_history: Vec::new(),
+                iterated: joint.iterated,
+            },
+            problem: joint.problem,
+            alone: joint.alone,
+            findings: joint.findings,
+        }
+    }
+}
+
+/// From the coarse start, and where the heading is hidden from all four quadrants.
+pub(super) fn from_coarse_start(
+    problem: &Problem,
+    progress: Progress,
+) -> Result<Attempt, CalibrationError> {
+    let start = coarse_start(problem)?;
+    let others = start.other_headings();
+    let of_start = attempt(problem, start, progress);
+    let others = others
+        .into_iter()
+        .map(|start| attempt(problem, start, progress));
+    others.fold(of_start, better)
 }
 
 fn attempt(
@@ -327,11 +384,9 @@ mod tests {
 
         let estimate = |shift: f64| {
             let turn = exp(Vector3::new(1.0, -2.0, 3.0) * (shift * ARCSEC));
-            let at = Linearisation {
-                triads: from_vector(form, &problem.model.prior_mean.add_scalar(shift * PPM)),
-                terms: TermVector::zeros(),
-                initial_attitudes: vec![turn * prior.mean],
-            };
+            let triads = from_vector(form, &problem.model.prior_mean.add_scalar(shift * PPM));
+            let initial = vec![turn * prior.mean];
+            let at = Linearisation::new(triads, TermVector::zeros(), initial);
             let mode = Mode::Held(Gate::Open);
             pass(&problem, &[prior], &at, mode).unwrap()
         };

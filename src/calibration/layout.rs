@@ -8,18 +8,19 @@
 //! | position | 3 | δp = computed − true, East-North-Up, m |
 //! | parameters | up to 24 | δθ = true − estimated, see [`super::parameters`]; those that form and body frame leave free |
 //! | error terms | one for each parameter that is on | true − estimated, see [`crate::imu::Term`] |
+//! | temperature | one for each coefficient that is on | true − estimated, see [`crate::imu::ThermalModel`] |
 //! | gravity | 1 | true − stated magnitude of gravity, m/s²; where it has a σ |
 //! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
+//! | of the recording | one for each parameter that is not common to all | by how much it differs in this recording |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
 //! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
 //! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
-use std::ops::Range;
-
 use super::model::Model;
 use super::parameters::PARAMETERS;
+use super::thermal::Coefficient;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
 use crate::run::Aiding;
 use crate::turntable::{AXIS_ERRORS, TABLE_GEOMETRY};
@@ -42,8 +43,11 @@ pub(super) struct Layout {
     terms: Vec<usize>,
     /// Whether gravity's error is a state.
     gravity: bool,
+    thermal: Vec<Coefficient>,
     /// Triad and axis of each bias that varies.
     varying: Vec<(Sensor, usize)>,
+    /// The parameter of both triads that each state of the recording is of.
+    own: Vec<usize>,
     /// Whether the table's position error is a state.
     table: bool,
     /// Whether the turn at rest is.
@@ -66,9 +70,13 @@ impl Layout {
             terms: (0..TERM_PARAMETERS)
                 .filter(|&k| model.term_sigma[k] > 0.0)
                 .collect(),
+            thermal: Coefficient::all(model.form, model.thermal.as_deref()),
             gravity: model.gravity_sigma > 0.0,
             varying: triads
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
+                .collect(),
+            own: (0..PARAMETERS)
+                .filter(|&i| model.own_sigma[i] > 0.0 && model.prior_sigma[i] > 0.0)
                 .collect(),
             table: model.position_sigma > 0.0,
             turn: model.aiding == Aiding::Velocity,
@@ -118,6 +126,16 @@ impl Layout {
         placed(self.terms_begin(), &self.terms)
     }
 
+    /// State of each coefficient of temperature that is on.
+    pub fn thermal(&self) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
+        placed(self.thermal_begin(), &self.thermal)
+    }
+
+    /// State and index among [`PARAMETERS`] of each parameter that is not common to all recordings.
+    pub fn own(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        placed(self.own_begin(), &self.own)
+    }
+
     /// Error of gravity, if it is a state.
     pub fn gravity(&self) -> Option<usize> {
         self.gravity.then(|| self.gravity_begin())
@@ -127,11 +145,6 @@ impl Layout {
     pub fn varying_biases(&self) -> impl Iterator<Item = (usize, Sensor, usize)> + '_ {
         let states = placed(self.varying_begin(), &self.varying);
         states.map(|(state, (sensor, axis))| (state, sensor, PER_TRIAD - 3 + axis))
-    }
-
-    /// The states that drive the navigation errors: parameters, error terms, gravity, varying biases.
-    pub fn driving(&self) -> Range<usize> {
-        NAVIGATION..self.dwell_begin()
     }
 
     /// The states that are the same constants throughout a recording.
@@ -165,26 +178,28 @@ impl Layout {
         placed(self.axes_begin(), &self.axes)
     }
 
-    /// The states that all stretches share.
-    pub fn shared(&self) -> impl Iterator<Item = usize> + use<> {
-        self.driving()
-            .chain(self.initial_attitude() + 3..self.size())
-    }
-
     fn terms_begin(&self) -> usize {
         NAVIGATION + self.parameters.len()
     }
 
-    fn gravity_begin(&self) -> usize {
+    fn thermal_begin(&self) -> usize {
         self.terms_begin() + self.terms.len()
+    }
+
+    fn gravity_begin(&self) -> usize {
+        self.thermal_begin() + self.thermal.len()
     }
 
     fn varying_begin(&self) -> usize {
         self.gravity_begin() + usize::from(self.gravity)
     }
 
-    fn dwell_begin(&self) -> usize {
+    fn own_begin(&self) -> usize {
         self.varying_begin() + self.varying.len()
+    }
+
+    fn dwell_begin(&self) -> usize {
+        self.own_begin() + self.own.len()
     }
 
     fn axes_begin(&self) -> usize {

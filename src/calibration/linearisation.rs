@@ -1,11 +1,15 @@
 //! Where a pass linearises, and what is known of attitudes before it.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::CalibrationError;
-use super::parameters::{from_vector, to_vector};
+use super::model::Model;
+use super::parameters::{ParameterVector, from_vector, to_vector};
 use crate::attitude::{exp, log};
-use crate::imu::{PerSensor, Sensor, TermVector, Triad};
+use crate::imu::{PerSensor, Sensor, TermVector, ThermalCoefficients, Triad};
+use crate::run::Run;
 use crate::turntable::TableAccuracy;
 use crate::units::{ARCSEC, DEGREE};
 
@@ -16,11 +20,64 @@ pub struct Linearisation {
     pub triads: PerSensor<Triad>,
     /// Parameters of its error terms.
     pub terms: TermVector,
+    /// How it changes with temperature; zero where it does not.
+    pub thermal: PerSensor<ThermalCoefficients>,
+    /// By how much it differs in each recording from what all have in common; of those beyond the end, by
+    /// nothing.
+    pub own: Vec<ParameterVector>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
 }
 
 impl Linearisation {
+    /// With what is the same at any temperature and in all recordings.
+    pub fn new(
+        triads: PerSensor<Triad>,
+        terms: TermVector,
+        initial_attitudes: Vec<Matrix3<f64>>,
+    ) -> Self {
+        Self {
+            triads,
+            terms,
+            thermal: PerSensor::default(),
+            own: Vec::new(),
+            initial_attitudes,
+        }
+    }
+
+    /// The instrument in a recording, at its reference temperature.
+    pub fn in_recording(&self, recording: usize) -> PerSensor<Triad> {
+        match self.own.get(recording) {
+            Some(own) => from_vector(self.triads.gyro.form, &(to_vector(&self.triads) + own)),
+            None => self.triads,
+        }
+    }
+
+    /// The instrument in a recording, told with its number, at the temperature in the middle of these samples.
+    pub(super) fn instrument(
+        &self,
+        model: &Model,
+        (run, recording): (&Run, usize),
+        samples: &Range<usize>,
+    ) -> PerSensor<Triad> {
+        let triads = self.in_recording(recording);
+        let imu = &run.recording.imu;
+        let (Some(thermal), Some(temperature)) = (&model.thermal, &imu.temperature) else {
+            return triads;
+        };
+        let middle = 0.5 * (imu.time(samples.start) + imu.time(samples.end));
+        let state = thermal.state(&temperature.at(middle), &temperature.rate(middle));
+        PerSensor::from_fn(|sensor| {
+            let coefficients = self.thermal.get(sensor);
+            triads.get(sensor).warmed(coefficients, state.get(sensor))
+        })
+    }
+
+    /// By how much a recording differs from what all have in common.
+    pub(super) fn own(&self, recording: usize) -> ParameterVector {
+        self.own.get(recording).copied().unwrap_or_default()
+    }
+
     /// The point a fraction of the way to another.
     pub(super) fn towards(&self, other: &Self, fraction: f64) -> Self {
         let from = to_vector(&self.triads);
@@ -31,6 +88,13 @@ impl Linearisation {
                 &(from + (to_vector(&other.triads) - from) * fraction),
             ),
             terms: self.terms + (other.terms - self.terms) * fraction,
+            thermal: PerSensor::from_fn(|sensor| {
+                let (from, to) = (self.thermal.get(sensor), other.thermal.get(sensor));
+                from + (to - from) * fraction
+            }),
+            own: (0..self.own.len().max(other.own.len()))
+                .map(|k| self.own(k) + (other.own(k) - self.own(k)) * fraction)
+                .collect(),
             initial_attitudes: attitudes
                 .map(|(from, to)| exp(log(&(to * from.transpose())) * fraction) * from)
                 .collect(),

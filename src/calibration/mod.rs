@@ -4,9 +4,11 @@
 //! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] says what
 //! could be had. Nothing here prints, reads files or draws.
 
+mod at_rest;
 mod auxiliary;
 mod batch;
 mod bound;
+mod budget;
 mod closed_form;
 mod coarse;
 mod comparison;
@@ -47,13 +49,18 @@ mod scatter;
 mod schedule;
 mod solution;
 mod standstill;
+mod thermal;
+mod thermal_record;
+mod together;
 mod unexplained;
 
+pub use at_rest::{AtRest, AxisAtRest, Second};
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
 pub use batch::batch_estimate;
-pub use bound::{Bound, bound};
+pub use bound::{Bound, bound, thermal_bound};
+pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use closed_form::{
     ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
 };
@@ -63,7 +70,7 @@ pub use correction::{Calibrated, Correction, CorrectionError};
 pub use dwell_scatter::DwellScatter;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
-pub use error_term_test::{ErrorTermTest, Role, test_error_terms};
+pub use error_term_test::{ErrorTermTest, LeftOff, Role, test_error_terms};
 pub use estimate::Estimate;
 pub use finding::Finding;
 pub use form::FormTest;
@@ -85,7 +92,7 @@ pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
     parameter, parameter_name, sensor_and_parameter, to_vector,
 };
-pub use pass::Epoch;
+pub use pass::{Epoch, Own};
 pub use prior_cause::PriorCause;
 pub use problem::Problem;
 pub use quality::{Measures, Quality, Spread};
@@ -93,3 +100,9 @@ pub use record::truth_record;
 pub use result::{Calibration, Method, triads_of};
 pub use scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use solution::{Assessment, Solution};
+pub use thermal::{Coefficient, Thermal};
+pub use thermal_record::{
+    CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
+    TemperatureError, ThermalRecord, ValueRecord,
+};
+pub use together::{Alone, Repeatability, TemperatureOptions, Together};

@@ -1,5 +1,7 @@
 //! What is estimated of a run, and what is known of it beforehand: small, and cheap to copy and change.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::error_term::ErrorTerm;
@@ -8,7 +10,7 @@ use super::parameters::{ParameterVector, parameter, to_vector};
 use super::standstill::FLOOR;
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
-    TermVector, Triad,
+    TermVector, ThermalModel, Triad,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
@@ -49,6 +51,10 @@ pub struct Model {
     pub turning_at_rest: f64,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
+    /// How the instrument changes with temperature, where it does.
+    pub thermal: Option<Arc<ThermalModel>>,
+    /// 1σ by which each parameter differs from one recording to the next; zero where it is common to all.
+    pub own_sigma: ParameterVector,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
     pub gravity_sigma: f64,
     /// 1σ per axis of the table's position error, rad; zero without a table.
@@ -78,6 +84,8 @@ impl Model {
             stillness: PerSensor::default(),
             turning_at_rest: run.standstill.turning,
             term_sigma: run.instrument.term_sigma,
+            thermal: None,
+            own_sigma: ParameterVector::zeros(),
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,

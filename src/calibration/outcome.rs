@@ -13,8 +13,10 @@ use super::model::Model;
 use super::noise::NoiseReport;
 use super::observability::Observability;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
-use super::pass::Epoch;
+use super::pass::{Epoch, Own};
 use super::problem::Problem;
+use super::thermal::Thermal;
+use super::together::Alone;
 use crate::run::Aiding;
 
 /// χ² by which opposite headings differ where a run observes the heading.
@@ -39,6 +41,14 @@ pub struct Outcome {
     pub attitude_sigma: Vector3<f64>,
     /// Errors of the table's geometry and parameters of the instrument's error terms.
     pub auxiliary: Auxiliary,
+    /// How parameters change with temperature, where they do.
+    pub thermal: Option<Thermal>,
+    /// By how much each recording differs from what all have in common; empty where nothing does.
+    pub own: Vec<Own>,
+    /// What each recording alone says, where something differs between recordings or temperatures.
+    pub alone: Vec<Alone>,
+    /// Mean temperature of each dwell in °C and its rate in K/s; empty where nothing follows temperature.
+    pub warming: Vec<(f64, f64)>,
     /// Gravity and its 1σ after the run, m/s².
     pub gravity: (f64, f64),
     /// What the run showed of the parameters and what it left as it was.

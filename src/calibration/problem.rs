@@ -88,6 +88,22 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// One of its recordings alone, told by number.
+    pub(super) fn recording(&self, number: usize) -> Self {
+        let of = |stretch: &&Stretch<'a>| stretch.recording == number;
+        let alone = |stretch: &Stretch<'a>| Stretch {
+            recording: 0,
+            ..stretch.clone()
+        };
+        let stretches = self.stretches.iter().filter(of).map(alone);
+        Self {
+            run: self.runs().nth(number).unwrap_or(self.run),
+            others: Vec::new(),
+            stretches: stretches.collect(),
+            ..self.clone()
+        }
+    }
+
     /// The same with another model.
     pub fn with_model(&self, model: Model) -> Self {
         Self {

@@ -79,7 +79,7 @@ impl Outcome {
         let estimate = Linearisation {
             triads: self.estimate.triads,
             terms: self.auxiliary.terms(),
-            initial_attitudes: self.linearised_at.initial_attitudes.clone(),
+            ..self.linearised_at.clone()
         };
         let half = every_other(problem).and_then(|half| {
             let mode = Mode::Held(Gate::Innovations);
@@ -106,13 +106,9 @@ impl ClosedForm {
         let run = problem.run();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
             let first = problem.stretches().iter();
-            let at = Linearisation {
-                triads: *triads,
-                terms: TermVector::zeros(),
-                initial_attitudes: first
-                    .map(|s| first_attitude(s, triads))
-                    .collect::<Result<_, _>>()?,
-            };
+            let initial = first.map(|s| first_attitude(s, triads));
+            let initial = initial.collect::<Result<_, _>>()?;
+            let at = Linearisation::new(*triads, TermVector::zeros(), initial);
             measures(problem, &at, judged)
         };
         let all = of(&self.estimate.triads, &|_| true)?;
@@ -188,6 +184,9 @@ fn measures(
     let mut number = 0;
     for (stretch, initial) in problem.stretches().iter().zip(&at.initial_attitudes) {
         let run = stretch.run;
+        let during = |samples: &Range<usize>| {
+            at.instrument(&problem.model, (run, stretch.recording), samples)
+        };
         let mut carried = *initial;
         let mut before: Option<&Dwell> = None;
         for dwell in &stretch.dwells {
@@ -197,12 +196,12 @@ fn measures(
             if let Some(before) = before {
                 let turn = before.samples.end..dwell.samples.start;
                 let start = before.position.as_ref().map_or(carried, |p| p.attitude);
-                carried = navigate(run, at, start, turn)?;
+                carried = navigate(run, (at, &during(&turn)), start, turn)?;
                 if let Some(position) = position.filter(|_| judged) {
                     turns.push(log(&(carried * position.attitude.transpose())).norm());
                 }
             }
-            let force = force_at_rest(run, dwell, at, &carried)?;
+            let force = force_at_rest(run, dwell, (at, &during(&dwell.samples)), &carried)?;
             let off = tilt(&(carried * force));
             if judged {
                 gravity.push(force.norm() - run.site.gravity);
@@ -226,8 +225,9 @@ fn measures(
             && of_judged
             && !run.recording.imu.is_lost(&segment.samples)
         {
-            let triad = &at.triads.gyro;
-            let correction = triad.correction().ok_or_else(|| singular(&at.triads))?;
+            let triads = at.instrument(&problem.model, (run, 0), &segment.samples);
+            let triad = &triads.gyro;
+            let correction = triad.correction().ok_or_else(|| singular(&triads))?;
             let sum: Vector3<f64> = run.recording.imu.gyro.sum(segment.samples.clone());
             let duration = segment.samples.len() as f64 * run.recording.imu.period;
             turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
@@ -243,18 +243,18 @@ fn measures(
 /// Attitude after these samples, navigated from this one before.
 fn navigate(
     run: &Run,
-    at: &Linearisation,
+    (at, triads): (&Linearisation, &PerSensor<Triad>),
     from: Matrix3<f64>,
     samples: Range<usize>,
 ) -> Result<Matrix3<f64>, CalibrationError> {
     let (imu, state) = (&run.recording.imu, State::at_rest(from));
-    let navigator = Navigator::new(imu, &run.site, &at.triads, state);
+    let navigator = Navigator::new(imu, &run.site, triads, state);
     let on = (0..at.terms.len()).filter(|&k| at.terms[k] != 0.0);
     let terms = TermValues {
         on: on.collect(),
         values: at.terms,
     };
-    let navigator = navigator.ok_or_else(|| singular(&at.triads))?;
+    let navigator = navigator.ok_or_else(|| singular(triads))?;
     let block = navigator.with_terms(terms).advance(samples);
     Ok(block.state.attitude)
 }
@@ -267,11 +267,11 @@ const ROUNDS: usize = 3;
 fn force_at_rest(
     run: &Run,
     dwell: &Dwell,
-    at: &Linearisation,
+    (at, triads): (&Linearisation, &PerSensor<Triad>),
     attitude: &Matrix3<f64>,
 ) -> Result<Vector3<f64>, CalibrationError> {
-    let triad = &at.triads.accel;
-    let correction = triad.correction().ok_or_else(|| singular(&at.triads))?;
+    let triad = &triads.accel;
+    let correction = triad.correction().ok_or_else(|| singular(triads))?;
     let of_triad = correction * (dwell.mean(Sensor::Accel, run).output - triad.bias);
     let mut sensed = Sensed {
         rate: attitude.tr_mul(&run.site.earth_rate_n()),

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::at_rest::AtRest;
 use super::auxiliary::{Auxiliary, auxiliary_name};
+use super::budget::Budget;
 use super::closed_form::ClosedForm;
 use super::error_term_test::ErrorTermTest;
 use super::estimate::Estimate;
@@ -12,14 +14,17 @@ use super::finding::Finding;
 use super::innovation::{Consistency, Nis};
 use super::observability::Direction;
 use super::outcome::Outcome;
-use super::parameters::{PARAMETERS, parameter, parameter_name, sensor_and_parameter};
+use super::parameters::{
+    PARAMETERS, ParameterMatrix, parameter, parameter_name, sensor_and_parameter,
+};
 use super::problem::Problem;
 use super::quality::{Measures, Quality, Spread};
 use super::result::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FindingRecord, GravityRecord, MeasuresRecord, Method, NisRecord, NoiseRecord, QualityRecord,
-    SpreadRecord, TermRecord, TestVector, TriadRecord,
+    FORMAT, FORMAT_WITH_TEMPERATURE, FindingRecord, GravityRecord, MeasuresRecord, Method,
+    NisRecord, NoiseRecord, QualityRecord, SpreadRecord, TermRecord, TestVector, TriadRecord,
 };
+use super::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
 };
@@ -65,6 +70,15 @@ impl Outcome {
             }),
             observability: direction_records(self),
             noise: Some(noise_record(self)),
+            format: match self.thermal {
+                Some(_) => FORMAT_WITH_TEMPERATURE.to_owned(),
+                None => FORMAT.to_owned(),
+            },
+            temperature: self
+                .thermal
+                .as_ref()
+                .map(|thermal| ThermalRecord::of(thermal, &self.estimate, problem.run())),
+            recordings: RecordingRecord::all(self, problem.run()),
             warnings: texts(&findings),
             findings: findings.iter().map(FindingRecord::from).collect(),
             ..self
@@ -72,6 +86,35 @@ impl Outcome {
                 .record(problem.run(), problem.model.aiding.body_frame())
         }
     }
+}
+
+impl Calibration {
+    /// With what each source adds to its uncertainty, and with the covariance that is the sum of that: the
+    /// same as the filter's, but for the rounding of passes in which variances fall by ten orders of magnitude.
+    pub(super) fn take_budget(
+        &mut self,
+        run: &Run,
+        outcome: &Outcome,
+        budget: &Budget,
+        tests: &[ErrorTermTest],
+    ) {
+        let estimate = Estimate {
+            triads: outcome.estimate.triads,
+            covariance: budget.covariance(),
+        };
+        let estimated: Vec<usize> = estimate.estimated().collect();
+        self.budget = Some(budget.record(&estimated, |index| factor(run, index), tests));
+        let Self {
+            sigma, covariance, ..
+        } = estimate.record(run, self.body_frame);
+        (self.sigma, self.covariance) = (sigma, covariance);
+    }
+}
+
+/// What brings a parameter to the file's unit.
+fn factor(run: &Run, index: usize) -> f64 {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    run.instrument.nominal.get(sensor).factor(of_triad)
 }
 
 impl ClosedForm {
@@ -89,6 +132,30 @@ impl ClosedForm {
             ..self
                 .estimate
                 .record(problem.run(), self.reference.body_frame())
+        }
+    }
+}
+
+impl AtRest {
+    /// What of a calibration it says: biases of the gyros within Earth rate, and how all biases change; the rest is as
+    /// it was known before.
+    pub fn record(&self, run: &Run) -> Calibration {
+        let (triads, sigma) = self.triads(run);
+        let mut covariance = ParameterMatrix::zeros();
+        for sensor in Sensor::ALL {
+            for (of_triad, sigma) in sigma.get(sensor).iter().enumerate() {
+                let index = parameter(sensor, of_triad);
+                covariance[(index, index)] = sigma * sigma;
+            }
+        }
+        let estimate = Estimate { triads, covariance };
+        let findings = self.findings(&estimate);
+        Calibration {
+            format: FORMAT_WITH_TEMPERATURE.to_owned(),
+            temperature: Some(ThermalRecord::of(&self.thermal(), &estimate, run)),
+            warnings: texts(&findings),
+            findings: findings.iter().map(FindingRecord::from).collect(),
+            ..estimate.record(run, BodyFrame::Accelerometer)
         }
     }
 }
@@ -120,10 +187,6 @@ impl Estimate {
                 .filter_map(|i| parameter_name(form, i))
                 .collect()
         };
-        let factor = |index: usize| {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            run.instrument.nominal.get(sensor).factor(of_triad)
-        };
         let of = |sensor| triad_record(self.triads.get(sensor), run.instrument.nominal.get(sensor));
         let correction = |sensor| {
             let sensitivity = run
@@ -151,7 +214,7 @@ impl Estimate {
                 .map(|&i| {
                     estimated
                         .iter()
-                        .map(|&j| self.covariance[(i, j)] * factor(i) * factor(j))
+                        .map(|&j| self.covariance[(i, j)] * factor(run, i) * factor(run, j))
                         .collect()
                 })
                 .collect(),
@@ -202,6 +265,11 @@ fn triad_record(triad: &Triad, nominal: &Nominal) -> TriadRecord {
     }
 }
 
+/// σ of a triad's parameters where they stand in its record, in their own units.
+pub(super) fn sigma_rows(form: InstallationForm, sigma: &crate::imu::TriadVector) -> TriadRecord {
+    sigma_record(form, sigma, &Nominal(Vector3::repeat(1.0)))
+}
+
 fn sigma_record(
     form: InstallationForm,
     sigma: &crate::imu::TriadVector,
@@ -222,7 +290,7 @@ fn sigma_record(
     }
 }
 
-fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+pub(super) fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
 }
 

@@ -10,13 +10,17 @@ use nalgebra::{Matrix3, Vector3};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::budget::BudgetRecord;
 use super::dwell_scatter::DwellScatter;
 use super::noise::NoiseReport;
+use super::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-calibration/1";
+/// The version of one that changes with temperature.
+pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 
 /// The equation of a record.
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
@@ -30,7 +34,7 @@ pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bi
 /// Only the two triads are always there. Unknown fields are ignored when reading.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Always [`FORMAT`].
+    /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
     pub format: String,
     /// How it was found; none for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,10 +64,19 @@ pub struct Calibration {
     /// Covariance of the estimated parameters, in their units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
+    /// What each source adds to their uncertainty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<BudgetRecord>,
     /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
+    /// How it changes with temperature; the values are those at its reference. None where it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ThermalRecord>,
+    /// What each of several recordings says.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<RecordingRecord>,
     /// Gravity at the site.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<GravityRecord>,
@@ -110,9 +123,43 @@ pub struct Calibration {
     /// Raw outputs with what they are calibrated, to check a user's own code.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub test_vectors: Vec<TestVector>,
+    /// What it was made of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
     /// `[meta]` of the run.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meta: BTreeMap<String, String>,
+}
+
+/// What a calibration was made of: enough to say which data and program gave it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The program with its version.
+    pub program: String,
+    /// Each file that was read with its SHA-256, the run.toml first; empty where nothing was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<InputFile>,
+    /// Nominal scales: the file's quantity per second for one rad/s or m/s².
+    pub nominal: PerSensor<[f64; 3]>,
+    /// Latitude of the site, degrees.
+    pub latitude_deg: f64,
+    /// Height of the site, m.
+    pub height_m: f64,
+    /// Time recorded, s.
+    pub duration_s: f64,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// How many dwells.
+    pub dwells: usize,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// Its name, as run.toml spells it.
+    pub name: String,
+    /// SHA-256 in hexadecimal digits.
+    pub sha256: String,
 }
 
 /// The noise that a calibration used.
@@ -350,7 +397,10 @@ impl Calibration {
             sigma: None,
             parameters: Vec::new(),
             covariance: Vec::new(),
+            budget: None,
             terms: BTreeMap::new(),
+            temperature: None,
+            recordings: Vec::new(),
             gravity: None,
             passes: None,
             converged: None,
@@ -365,6 +415,7 @@ impl Calibration {
             equation: None,
             correction: None,
             test_vectors: Vec::new(),
+            provenance: None,
             meta: BTreeMap::new(),
         }
     }

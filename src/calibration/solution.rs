@@ -1,5 +1,6 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
+use super::budget::Budget;
 use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
 use super::error_term_test::{ErrorTermTest, test_error_terms};
@@ -10,9 +11,11 @@ use super::mounting::Mounting;
 use super::outcome::Outcome;
 use super::problem::Problem;
 use super::quality::Quality;
-use super::result::{Calibration, Method};
+use super::result::{Calibration, Method, Provenance};
+use crate::imu::PerSensor;
 use crate::room;
 use crate::run::Run;
+use crate::units::DEGREE;
 
 /// Bytes of the passes, their history and innovations for each sample: 200 to 235, as measured.
 const BYTES_A_SAMPLE: usize = 256;
@@ -37,6 +40,8 @@ pub struct Assessment {
     pub error_terms: Vec<ErrorTermTest>,
     /// What is left of gravity and turns.
     pub quality: Quality,
+    /// Where its uncertainty comes from; none for the closed form.
+    pub budget: Option<Budget>,
 }
 
 impl Problem<'_> {
@@ -68,6 +73,24 @@ impl Problem<'_> {
             Method::Ekf => Solution::Filter(Box::new(estimate(self, progress)?)),
             Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),
         })
+    }
+}
+
+impl Problem<'_> {
+    /// What a calibration of it is made of, but for the files.
+    pub fn provenance(&self) -> Provenance {
+        let run = self.run();
+        let imu = &run.recording.imu;
+        Provenance {
+            program: concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned(),
+            inputs: Vec::new(),
+            nominal: PerSensor::from_fn(|sensor| run.instrument.nominal.get(sensor).0.into()),
+            latitude_deg: run.site.latitude / DEGREE,
+            height_m: run.site.height,
+            duration_s: self.runs().map(|run| run.recording.imu.duration()).sum(),
+            rate_hz: 1.0 / imu.period,
+            dwells: self.dwells().count(),
+        }
     }
 }
 
@@ -113,9 +136,9 @@ impl Solution {
     pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         match self {
             Self::Filter(outcome) => {
-                let (error_terms, quality) = rayon::join(
+                let (error_terms, (quality, budget)) = rayon::join(
                     || test_error_terms(problem, outcome),
-                    || outcome.quality(problem),
+                    || (outcome.quality(problem), Budget::new(problem, outcome)),
                 );
                 Ok(Assessment {
                     // Where the iterations ended without convergence there may be nothing to test.
@@ -124,11 +147,16 @@ impl Solution {
                         tests => tests?,
                     },
                     quality: quality?,
+                    budget: match budget {
+                        Err(_) if !outcome.converged => None,
+                        budget => Some(budget?),
+                    },
                 })
             }
             Self::ClosedForm(closed_form) => Ok(Assessment {
                 error_terms: Vec::new(),
                 quality: closed_form.quality(problem)?,
+                budget: None,
             }),
         }
     }
@@ -145,11 +173,22 @@ impl Solution {
 
     /// The calibration, in the file's quantity.
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
-        match self {
+        let mut record = match self {
             Self::Filter(outcome) => {
-                outcome.record(problem, &assessment.error_terms, &assessment.quality)
+                let Assessment {
+                    error_terms,
+                    quality,
+                    budget,
+                } = assessment;
+                let mut record = outcome.record(problem, error_terms, quality);
+                if let Some(budget) = budget {
+                    record.take_budget(problem.run(), outcome, budget, error_terms);
+                }
+                record
             }
             Self::ClosedForm(closed_form) => closed_form.record(problem, &assessment.quality),
-        }
+        };
+        record.provenance = Some(problem.provenance());
+        record
     }
 }

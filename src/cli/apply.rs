@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::error::ErrorKind;
-use turncal::calibration::Correction;
 use turncal::calibration::result::Calibration;
+use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE};
 use turncal::formats::export::{sample_rows, write_samples};
 use turncal::imu::{Sensor, Term};
 use turncal::report::terminal::printable;
@@ -23,7 +23,7 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 ///
 /// Writes a row a sample: its begin and end in s, angular rate in rad/s and specific force in m/s², both
 /// mean over the sample, along right, front and up of the calibration's body frame. Error terms of
-/// the calibration are corrected, too; the correction of its time offset neglects Earth rate. The file is
+/// the calibration are corrected, too, and what changes with temperature by the run's own; the correction of its time offset neglects Earth rate. The file is
 /// itself a record for a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -111,6 +111,32 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
                 off.amax() / PPM,
                 sigmas.max()
             ));
+        }
+    }
+    if let Some(thermal) = &record.temperature {
+        match &run.recording.imu.temperature {
+            None => notes.push(format!(
+                "the run has no temperature, the calibration changes with it: all rows are corrected as at {} °C and \
+                 have 0 in in_range",
+                thermal.range.gyro.reference_degc
+            )),
+            Some(temperature) => {
+                for sensor in Sensor::ALL {
+                    let ([lowest, highest], range) =
+                        (temperature.range(sensor), thermal.range.get(sensor));
+                    if lowest < range.lowest_degc - TEMPERATURE_TOLERANCE
+                        || highest > range.highest_degc + TEMPERATURE_TOLERANCE
+                    {
+                        notes.push(format!(
+                            "{}: the run is at {lowest:.1} to {highest:.1} °C, the calibration holds for {:.1} to \
+                             {:.1} °C; rows beyond have 0 in in_range",
+                            sensor.name(),
+                            range.lowest_degc,
+                            range.highest_degc
+                        ));
+                    }
+                }
+            }
         }
     }
     if correction.has(Term::TimeOffset) {

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{self, Problem, Solution};
+use turncal::calibration::{self, AtRest, Problem, Solution, Together};
+use turncal::formats::Campaign;
+use turncal::report;
 use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::study::Shard;
@@ -16,10 +18,19 @@ use super::lot;
 use super::output::{Overwrite, print, show};
 use super::progress::Activity;
 
+/// Highest order of the polynomials of outputs at rest.
+const HIGHEST_ORDER_AT_REST: usize = 5;
+
 /// Estimates scale factors, installation and biases of a run
 ///
 /// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
 /// failure.
+///
+/// With --temperature parameters follow the temperature column; of an instrument that stands in one attitude only
+/// biases do.
+///
+/// A campaign.toml names several recordings of one instrument, which are calibrated as one: its parameters may
+/// follow temperature, and differ from day to day.
 ///
 /// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
 /// index.html say what they are together. A unit that cannot be calibrated is a row with its reason, and the
@@ -31,11 +42,13 @@ use super::progress::Activity;
   turncal calibrate my-run/run.toml --method six-position
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale
+  turncal calibrate my-run/run.toml --temperature
+  turncal calibrate campaign.toml -o mine
   turncal calibrate lot/*/run.toml -o lot-result \\
       --specification specification.toml
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
-    /// The run's run.toml; several are the units of a lot
+    /// The run's run.toml; several are the units of a lot; a campaign.toml names recordings of one instrument
     #[arg(required = true, value_name = "RUN.toml", value_parser = run_file)]
     runs: Vec<PathBuf>,
     /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method,
@@ -44,6 +57,9 @@ pub struct Calibrate {
     output: Option<PathBuf>,
     #[command(flatten)]
     estimation: Estimation,
+    /// Let the parameters follow the temperature column of the run; a campaign does where it is known
+    #[arg(long, conflicts_with_all = ["specification", "shard"])]
+    temperature: bool,
     /// True calibration; the estimator does not use it, summary and report show errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
@@ -64,7 +80,12 @@ impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
         self.estimation.check();
         match self.runs.as_slice() {
-            [run] if self.specification.is_none() && self.shard.is_none() => self.one(run),
+            [file] if self.specification.is_none() && self.shard.is_none() => {
+                match Campaign::is_at(file) {
+                    true => self.campaign(file),
+                    false => self.one(file),
+                }
+            }
             _ => self.lot(),
         }
     }
@@ -91,18 +112,79 @@ impl Calibrate {
     fn one(&self, path: &Path) -> anyhow::Result<()> {
         let activity = Activity::new(format!("reading {}", path.display()));
         let run = Run::read(path)?;
-        let problem = self.estimation.problem(&run, path)?;
+        let problem = match self.temperature {
+            true => {
+                let together = Together::default();
+                let problem = self.estimation.together(&[&run], &together);
+                let problem = problem.inspect_err(|_| say(&run.recording.notes))?;
+                // Without a turn, only what is at rest against temperature can be had.
+                if problem.dwells().nth(1).is_none()
+                    && let Some(at_rest) = AtRest::new(&run, HIGHEST_ORDER_AT_REST)
+                {
+                    return self.at_rest(&at_rest, &run, path);
+                }
+                problem
+            }
+            false => self.estimation.problem(&run, path)?,
+        };
+        self.solved(&problem, &run.recording.name, path, activity)
+    }
+
+    /// Outputs of an instrument that stands against its temperature.
+    fn at_rest(&self, at_rest: &AtRest, run: &Run, path: &Path) -> anyhow::Result<()> {
+        let calibration = at_rest.record(run);
+        let document = report::at_rest::document(at_rest, run, &calibration);
+        let target = match (&self.output, self.json) {
+            (Some(directory), _) => Some(directory.clone()),
+            (None, true) => None,
+            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.recording.name))),
+        };
+        if let Some(target) = &target {
+            let directory = self.overwrite.directory(target, &[path])?;
+            calibration.write(&directory.path().join("calibration.json"), false)?;
+            write_report(&document, &directory.path().join("report"))?;
+            directory.commit()?;
+        }
+        match self.json {
+            true => print(&calibration.to_json(Path::new("standard output"))?),
+            false => show(&document, false),
+        }?;
+        say(&run.recording.notes);
+        Ok(())
+    }
+
+    fn campaign(&self, path: &Path) -> anyhow::Result<()> {
+        let activity = Activity::new(format!("reading {}", path.display()));
+        let campaign = Campaign::read(path)?;
+        let runs: Vec<&Run> = campaign.runs.iter().collect();
+        let problem = self.estimation.together(&runs, &campaign.together);
+        let problem = problem.inspect_err(|_| {
+            runs.iter().for_each(|run| say(&run.recording.notes));
+        });
+        let problem = problem.with_context(|| path.display().to_string())?;
+        self.solved(&problem, &campaign.name, path, activity)
+    }
+
+    /// Solves a problem, writes and shows what came of it.
+    fn solved(
+        &self,
+        problem: &Problem,
+        name: &str,
+        path: &Path,
+        activity: Activity,
+    ) -> anyhow::Result<()> {
+        let run = problem.run();
         let truth = self
             .truth
             .as_deref()
-            .map(|path| read_truth(path, &run, problem.model.aiding.body_frame()))
+            .map(|path| read_truth(path, run, problem.model.aiding.body_frame()))
             .transpose()?;
         let target = match (&self.output, self.json) {
             (Some(directory), _) => Some(directory.clone()),
             (None, true) => None,
             (None, false) => Some(PathBuf::from(match self.estimation.method {
-                Method::Ekf => format!("{}-calibration", run.recording.name),
-                Method::SixPosition => format!("{}-calibration-six-position", run.recording.name),
+                Method::Ekf => format!("{name}-calibration"),
+                Method::SixPosition => format!("{name}-calibration-six-position"),
             })),
         };
         let directory = target
@@ -115,13 +197,19 @@ impl Calibrate {
             .transpose()?;
 
         // What was found in the files may be why.
-        let solution = solve(&problem, self.estimation.method.into(), &activity)
+        let solution = solve(problem, self.estimation.method.into(), &activity)
             .inspect_err(|_| say(&run.recording.notes))?;
         let Calibrated {
             calibration,
             document,
             converged,
-        } = Calibrated::new(&problem, &solution, self.estimation.method, truth.as_ref())?;
+        } = Calibrated::new(
+            (problem, name),
+            &solution,
+            self.estimation.method,
+            truth.as_ref(),
+        )?
+        .of_files(path);
         activity.next("writing");
         if let Some(directory) = directory {
             calibration.write(&directory.path().join("calibration.json"), false)?;
@@ -139,15 +227,11 @@ impl Calibrate {
             eprintln!("\nreport: {}", printable(&page.display().to_string()));
         }
         if !converged {
-            bail!(
-                "{}: not converged; values and σ may not be used, see the findings",
-                run.recording.name
-            );
+            bail!("{name}: not converged; values and σ may not be used, see the findings");
         }
         if !solution.is_usable() {
             bail!(
-                "{}: no noise explains what the calibration leaves; values may not be used, see the findings",
-                run.recording.name
+                "{name}: no noise explains what the calibration leaves; values may not be used, see the findings"
             );
         }
         Ok(())

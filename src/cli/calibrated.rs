@@ -6,15 +6,16 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use rayon::prelude::*;
-use turncal::calibration::result::TermRecord;
+use turncal::calibration::result::{InputFile, TermRecord};
 use turncal::calibration::{
     Calibration, ClosedForm, Estimate, Problem, Reference, Solution, in_body_frame, triads_of,
 };
+use turncal::formats::input_digests;
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
 use turncal::report::calibration::{self as of_calibration, Navigated, Report};
 use turncal::run::Run;
-use turncal::study::navigation::{FORTY_HOURS, Mission, NavigationStudyError};
+use turncal::study::navigation::{Mission, NavigationStudyError};
 
 use super::estimation::Method;
 
@@ -34,7 +35,7 @@ pub struct Calibrated {
 impl Calibrated {
     /// Judges a solution and says what it is worth.
     pub fn new(
-        problem: &Problem,
+        (problem, name): (&Problem, &str),
         solution: &Solution,
         method: Method,
         truth: Option<&Truth>,
@@ -59,13 +60,14 @@ impl Calibrated {
             triads.map(|truth| PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form)));
         let no_terms = BTreeMap::new();
         let report = Report {
-            title: &run.recording.name,
+            title: name,
             run,
             aiding: problem.model.aiding,
             body_frame: calibration.body_frame,
             outcome: solution.outcome(),
             findings: &findings,
             effects: &assessment.error_terms,
+            budget: assessment.budget.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
             closed_form: solution
@@ -83,6 +85,24 @@ impl Calibrated {
             converged: solution.converged(),
             calibration,
         })
+    }
+}
+
+impl Calibrated {
+    /// With the files that a run.toml or campaign.toml names.
+    pub fn of_files(mut self, path: &Path) -> Self {
+        stamp(&mut self.calibration, path);
+        self
+    }
+}
+
+/// Says in a calibration of which files it was made.
+pub fn stamp(calibration: &mut Calibration, path: &Path) {
+    if let Some(provenance) = &mut calibration.provenance {
+        let inputs = input_digests(path).into_iter();
+        provenance.inputs = inputs
+            .map(|(name, sha256)| InputFile { name, sha256 })
+            .collect();
     }
 }
 
@@ -104,13 +124,14 @@ pub fn note(closed_form: &ClosedForm) -> String {
     format!("{from}, {minutes:.digits$} min at rest")
 }
 
-/// Navigates 40 h standing level at the run's site by the calibration of each method.
+/// Navigates standing level at the run's site by the calibration of each method, for as long as suits them.
 pub fn navigate(
     run: &Run,
     methods: &[(&'static str, &Estimate)],
     truth: Option<&PerSensor<Triad>>,
 ) -> std::result::Result<Vec<Navigated>, NavigationStudyError> {
-    let mission = Mission::standing_level(&run.site, FORTY_HOURS);
+    let estimates: Vec<&Estimate> = methods.iter().map(|(_, estimate)| *estimate).collect();
+    let mission = Mission::suited(&run.site, &estimates)?;
     let all = methods.par_iter().map(|&(method, estimate)| {
         let outlook = mission.outlook(estimate, truth)?;
         Ok(Navigated { method, outlook })

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
-use turncal::calibration::result::Calibration;
 use turncal::calibration::{Named, compare};
 use turncal::report::comparison;
 
+use super::input::at_temperature;
 use super::names::short_names;
 use super::output::Delivery;
 
@@ -24,6 +24,9 @@ pub struct Compare {
     /// The true values, if they are known
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// Compare them at this temperature, °C; without, each at its own reference
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
     #[command(flatten)]
     delivery: Delivery,
 }
@@ -43,8 +46,8 @@ impl Compare {
             .collect();
         let records = paths
             .iter()
-            .map(|path| Calibration::read(path))
-            .collect::<Result<Vec<_>, _>>()?;
+            .map(|path| at_temperature(path, self.temperature_degc))
+            .collect::<anyhow::Result<Vec<_>>>()?;
         let names = short_names(&paths);
         let named: Vec<Named> = names
             .iter()

@@ -15,7 +15,7 @@ use turncal::simulation::{Scenario, Simulated};
 use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 
 use super::calibrate::solve;
-use super::calibrated::{dwell_times, navigate, note, write_report};
+use super::calibrated::{dwell_times, navigate, note, stamp, write_report};
 use super::input::seed;
 use super::output::{Overwrite, show};
 use super::progress::Activity;
@@ -99,6 +99,7 @@ impl Demo {
             outcome: solution.outcome(),
             findings: &findings,
             effects: &assessment.error_terms,
+            budget: assessment.budget.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
             closed_form: Some(of_calibration::ClosedForm {
@@ -122,7 +123,8 @@ impl Demo {
         };
         let (filtered, closed) = (method("ekf")?, method("six-position")?);
         write(&standing, &closed)?;
-        let record = solution.calibration(&problem, &assessment);
+        let mut record = solution.calibration(&problem, &assessment);
+        stamp(&mut record, &root.join("run.toml"));
         record.write(&filtered.join("calibration.json"), false)?;
         let record = whole.record(&still, &whole.quality(&still)?);
         record.write(&closed.join("calibration.json"), false)?;

@@ -4,7 +4,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use clap::error::ErrorKind;
 use serde_json::{Value, json};
-use turncal::calibration::{self, CalibrationError, NoisePolicy, Options, Problem};
+use turncal::calibration::{self, CalibrationError, NoisePolicy, Options, Problem, Together};
 use turncal::imu::InstallationForm;
 use turncal::run::Run;
 
@@ -139,15 +139,32 @@ impl Estimation {
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
         }
-        let mut options = Options::default()
-            .installation(self.installation.into())
-            .noise(self.noise.into());
-        options.aiding = self.aiding.map(turncal::run::Aiding::from);
-        let mut problem = Problem::new(run, &options);
+        let mut problem = Problem::new(run, &self.options());
         for term in &self.with {
             term.switch_on(&mut problem)?;
         }
         Ok(problem)
+    }
+
+    /// The problem that recordings of one instrument pose together.
+    pub fn together<'a>(
+        &self,
+        runs: &[&'a Run],
+        together: &Together,
+    ) -> anyhow::Result<Problem<'a>> {
+        let mut problem = Problem::together(runs, &self.options(), together)?;
+        for term in &self.with {
+            term.switch_on(&mut problem)?;
+        }
+        Ok(problem)
+    }
+
+    fn options(&self) -> Options {
+        let mut options = Options::default()
+            .installation(self.installation.into())
+            .noise(self.noise.into());
+        options.aiding = self.aiding.map(turncal::run::Aiding::from);
+        options
     }
 
     /// All of it by name, as the command line spells it.

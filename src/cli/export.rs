@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use turncal::calibration::result::Calibration;
 use turncal::formats::export;
 use turncal::formats::write_whole;
 use turncal::run::Run;
 
-use super::input::run_file;
+use super::input::{at_temperature, run_file};
 use super::output::{keep, print};
 
 /// Writes a calibration as what other programs read
@@ -33,6 +32,9 @@ pub struct Export {
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
     #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
+    /// The calibration at this temperature, °C [default: its reference; c, px4 and ardupilot hold its change]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -53,6 +55,26 @@ enum Format {
     Octave,
     /// Every value with its name, σ and unit
     Text,
+    /// Parameters of PX4: CAL_GYRO0, CAL_ACC0
+    Px4,
+    /// Parameters of ArduPilot: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL
+    Ardupilot,
+    /// IMU intrinsics of OpenVINS, model kalibr
+    OpenVinsKalibr,
+    /// IMU intrinsics of OpenVINS, model rpng
+    OpenVinsRpng,
+    /// IMU intrinsics of iKalibr
+    Ikalibr,
+    /// The accelerometers' calibration of the ROS package imu_calib
+    ImuCalib,
+    /// Covariances of ROS sensor_msgs/Imu; needs --run
+    RosCovariance,
+    /// Noise of an IMU in Gazebo
+    Gazebo,
+    /// A structure for MATLAB, a MAT file
+    Mat,
+    /// Zeros of accelerometers for Betaflight
+    Betaflight,
 }
 
 impl From<Format> for export::Format {
@@ -63,17 +85,27 @@ impl From<Format> for export::Format {
             Format::C => Self::C,
             Format::Octave => Self::Octave,
             Format::Text => Self::Text,
+            Format::Px4 => Self::Px4,
+            Format::Ardupilot => Self::ArduPilot,
+            Format::OpenVinsKalibr => Self::OpenVinsKalibr,
+            Format::OpenVinsRpng => Self::OpenVinsRpng,
+            Format::Ikalibr => Self::IKalibr,
+            Format::ImuCalib => Self::ImuCalib,
+            Format::RosCovariance => Self::RosCovariance,
+            Format::Gazebo => Self::Gazebo,
+            Format::Mat => Self::Mat,
+            Format::Betaflight => Self::Betaflight,
         }
     }
 }
 
 impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
-        let record = Calibration::read(&self.calibration)?;
+        let record = at_temperature(&self.calibration, self.temperature_degc)?;
         let run = self.run.as_deref().map(Run::read).transpose()?;
         let exported = export::write(&record, self.format.into(), run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;
-        let text = exported.text.as_bytes();
+        let text = exported.bytes();
         match &self.output {
             Some(output) => {
                 let files = run.iter().flat_map(|run| &run.recording.files);

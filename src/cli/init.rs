@@ -16,12 +16,20 @@ use super::progress::Activity;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal init imu.csv
-  turncal init imu.csv.gz -o run.toml")]
+  turncal init imu.csv.gz -o run.toml
+  turncal init flight.ulg
+  turncal init Gyroscope.csv Accelerometer.csv")]
 pub struct Init {
     /// Rows of numbers below a line of names, or without one: `.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also
-    /// with `.gz`
+    /// with `.gz`; or MCAP, a ROS 1 bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
+    /// Rows of the accelerometers, where the other file has those of the gyros alone
+    #[arg(value_name = "ACCEL.csv", conflicts_with = "stream")]
+    accel: Option<PathBuf>,
+    /// The stream that holds the instrument [default: the one with the most samples]
+    #[arg(long, value_name = "NAME")]
+    stream: Option<String>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -33,13 +41,16 @@ pub struct Init {
 impl Init {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
-        let draft = Draft::of_file(&self.log)?;
+        let draft = match &self.accel {
+            Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel))?,
+            None => Draft::of_stream(&self.log, self.stream.as_deref())?,
+        };
         drop(activity);
-        let text = draft.to_toml(&self.name());
+        let text = draft.to_toml(&self.name(&self.log));
         let Some(output) = &self.output else {
             return print(text.as_bytes());
         };
-        keep(output, [&self.log])?;
+        keep(output, [&self.log].into_iter().chain(&self.accel))?;
         write_whole(output, text.as_bytes(), self.force)?;
         let open = text.matches("TODO:").count();
         eprintln!(
@@ -49,20 +60,17 @@ impl Init {
         Ok(())
     }
 
-    /// The log's name as the new file, which stands beside the log unless told otherwise, says it.
-    fn name(&self) -> String {
+    /// A log's name as the new file, which stands beside the log unless told otherwise, says it.
+    fn name(&self, log: &Path) -> String {
         let directory = |path: &Path| {
             let parent = path.parent().filter(|parent| *parent != Path::new(""));
             parent.unwrap_or(Path::new(".")).canonicalize().ok()
         };
-        let beside = self
-            .output
-            .as_ref()
-            .is_none_or(|output| directory(output) == directory(&self.log));
-        let name = match (self.log.file_name(), self.log.canonicalize()) {
-            (Some(name), _) if beside => PathBuf::from(name),
+        let place = self.output.as_deref().unwrap_or(&self.log);
+        let name = match (log.file_name(), log.canonicalize()) {
+            (Some(name), _) if directory(place) == directory(log) => PathBuf::from(name),
             (_, Ok(full)) => full,
-            _ => self.log.clone(),
+            _ => log.to_owned(),
         };
         name.to_string_lossy().into_owned()
     }

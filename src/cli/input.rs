@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
+use turncal::calibration::result::Calibration;
 use turncal::study::navigation::INTERVAL;
 use turncal::study::{Shard, ShardError};
 
@@ -14,7 +16,10 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     if inside.is_file() {
         return Err(format!("this is a directory; give {}", inside.display()));
     }
-    let log = [".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".log"];
+    let log = [
+        ".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".log", ".bag", ".bin", ".mat", ".mcap", ".npy",
+        ".npz", ".ulg",
+    ];
     if path.is_file() && log.iter().any(|end| text.ends_with(end)) {
         return Err(format!(
             "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"
@@ -67,5 +72,17 @@ pub fn at_least_two(text: &str) -> Result<u64, String> {
     match text.parse() {
         Ok(count @ 2..=MOST) => Ok(count),
         _ => Err(format!("expected a whole number from 2 to {MOST}")),
+    }
+}
+
+/// A calibration as it is at a temperature in °C; without one as it stands.
+pub fn at_temperature(path: &Path, temperature: Option<f64>) -> anyhow::Result<Calibration> {
+    let record = Calibration::read(path)?;
+    match temperature {
+        Some(temperature) => {
+            let there = record.at_temperature(temperature);
+            there.with_context(|| path.display().to_string())
+        }
+        None => Ok(record),
     }
 }

@@ -138,7 +138,8 @@ impl Request<'_> {
             calibration,
             document,
             ..
-        } = Calibrated::new(&problem, &solution, method, None)?;
+        } = Calibrated::new((&problem, &run.recording.name), &solution, method, None)?
+            .of_files(path);
         // What cannot be written is no calibration.
         calibration.to_json(path)?;
         let dwells: Vec<_> = problem

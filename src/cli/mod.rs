@@ -4,9 +4,12 @@ mod allan;
 mod apply;
 mod calibrate;
 mod calibrated;
+#[cfg(feature = "certificate")]
+mod certificate;
 mod check;
 mod compare;
 mod completions;
+mod convert;
 mod demo;
 mod error_term;
 mod estimation;
@@ -63,9 +66,12 @@ enum Command {
     Navigate(navigate::Navigate),
     Apply(apply::Apply),
     Export(export::Export),
+    #[cfg(feature = "certificate")]
+    Certificate(certificate::Certificate),
     Study(study::Study),
     Merge(merge::Merge),
     Init(init::Init),
+    Convert(convert::Convert),
     Check(check::Check),
     Allan(allan::Allan),
     Noise(noise::Noise),
@@ -85,9 +91,12 @@ impl Cli {
             Command::Navigate(navigate) => navigate.run(),
             Command::Apply(apply) => apply.run(),
             Command::Export(export) => export.run(),
+            #[cfg(feature = "certificate")]
+            Command::Certificate(certificate) => certificate.run(),
             Command::Study(study) => study.run(),
             Command::Merge(merge) => merge.run(),
             Command::Init(init) => init.run(),
+            Command::Convert(convert) => convert.run(),
             Command::Check(check) => check.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),

@@ -7,15 +7,14 @@ use clap::ValueEnum;
 use nalgebra::Vector3;
 use turncal::attitude::from_pitch_roll_heading;
 use turncal::calibration::Named;
-use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
 use turncal::report::navigation::Navigation;
-use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair};
+use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
 use turncal::units::DEGREE;
 
-use super::input::{hours, latitude, number};
+use super::input::{at_temperature, hours, latitude, number};
 use super::names::short_names;
 use super::output::Delivery;
 use super::progress::Activity;
@@ -36,6 +35,8 @@ const LARGEST_PITCH: f64 = 89.0;
       --latitude-deg 45
   turncal navigate calibration.json --truth truth.json \\
       --trajectory flight --hours 3 -o flight
+  turncal navigate calibration.json --truth truth.json \\
+      --latitude-deg 45 --hours 10 --warming-degc 20,40
   turncal navigate monday.json --truth friday.json \\
       --latitude-deg -33.9 --errors gyro --json")]
 pub struct Navigate {
@@ -76,9 +77,22 @@ pub struct Navigate {
     /// Move instead of resting: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
+    /// Warm up meanwhile, from one temperature to another, °C
+    #[arg(long, value_name = "FROM,TO", allow_hyphen_values = true, conflicts_with_all = ["temperature_degc", "errors"], value_parser = two)]
+    warming_degc: Option<Two>,
+    /// Time constant of warming up, h
+    #[arg(long, value_name = "H", default_value_t = 1.0, value_parser = time_constant)]
+    warming_time_constant_h: f64,
+    /// At this temperature, °C; without, each calibration at its own reference
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
     #[command(flatten)]
     delivery: Delivery,
 }
+
+/// Two temperatures, °C.
+#[derive(Debug, Clone, Copy)]
+struct Two([f64; 2]);
 
 /// Pitch, roll and heading in degrees.
 #[derive(Debug, Clone, Copy)]
@@ -109,8 +123,8 @@ impl Navigate {
         let paths = [self.calibration.as_path(), self.truth.as_path()];
         let names = short_names(&paths);
         let [calibration, truth] = [
-            Calibration::read(&self.calibration)?,
-            Calibration::read(&self.truth)?,
+            at_temperature(&self.calibration, self.temperature_degc)?,
+            at_temperature(&self.truth, self.temperature_degc)?,
         ];
         let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
             .map(|(name, record)| Named { name, record });
@@ -123,6 +137,7 @@ impl Navigate {
         let mission = Mission {
             motion,
             intervals: (self.hours * HOUR / INTERVAL).round() as u32,
+            interval: INTERVAL,
         };
         let inputs: Vec<&Path> = paths
             .into_iter()
@@ -131,9 +146,19 @@ impl Navigate {
         let begun = self.delivery.begin(&inputs)?;
 
         let activity = Activity::new(format!("navigating {} h", self.hours));
-        let moments = mission
-            .navigate(&pair)
-            .with_context(|| self.calibration.display().to_string())?;
+        let moments = match self.warming_degc {
+            None => mission.navigate(&pair),
+            Some(Two([from, to])) => {
+                let warming = Warming {
+                    from,
+                    to,
+                    time_constant: self.warming_time_constant_h * HOUR,
+                };
+                let pair = WarmingPair::of_records(&calibration, &truth)?;
+                mission.navigate_warming(&pair, &warming)
+            }
+        };
+        let moments = moments.with_context(|| self.calibration.display().to_string())?;
         drop(activity);
         let navigation = Navigation {
             calibration: &names[0],
@@ -175,6 +200,22 @@ impl Navigate {
         };
         Ok((Motion::Standing(standing), None))
     }
+}
+
+fn two(text: &str) -> Result<Two, String> {
+    let temperatures: Vec<&str> = text.split(',').collect();
+    let [from, to] = temperatures[..] else {
+        return Err(format!(
+            "expected two temperatures with a comma between, found {} number(s)",
+            temperatures.len()
+        ));
+    };
+    let within = |text| number(text, -100.0, 100.0);
+    Ok(Two([within(from)?, within(to)?]))
+}
+
+fn time_constant(text: &str) -> Result<f64, String> {
+    number(text, 1e-3, 1e3)
 }
 
 fn height(text: &str) -> Result<f64, String> {

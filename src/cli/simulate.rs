@@ -7,9 +7,9 @@ use anyhow::Context;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::truth_record;
-use turncal::formats::write_run;
+use turncal::formats::{campaign_text, write_run};
 use turncal::imu::{TERM_PARAMETERS, Term};
-use turncal::simulation::{Scenario, Simulated};
+use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 
 use super::input::seed;
 use super::output::Overwrite;
@@ -20,9 +20,12 @@ use super::progress::Activity;
 /// Writes run.toml, the logs that it names and truth.json. The scenario is a TOML file or the name of an
 /// embedded one; turncal list shows them.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7")]
+#[command(
+    after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7
+          turncal simulate five-soaks -o my-campaign"
+)]
 pub struct Simulate {
-    /// Scenario: a TOML file or an embedded name
+    /// Scenario or campaign: a TOML file or an embedded name
     scenario: String,
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]
@@ -36,6 +39,9 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> anyhow::Result<()> {
+        if SimulatedCampaign::is_named(&self.scenario) {
+            return self.campaign();
+        }
         let scenario = Scenario::load(&self.scenario)?;
         let directory = self
             .overwrite
@@ -63,6 +69,45 @@ impl Simulate {
     }
 }
 
+impl Simulate {
+    fn campaign(&self) -> anyhow::Result<()> {
+        let campaign = SimulatedCampaign::load(&self.scenario)?;
+        let directory = self
+            .overwrite
+            .directory(&self.output, &[Path::new(&self.scenario)])?;
+        let activity = Activity::new(format!("simulating {}", campaign.name));
+        let seed = self.seed.unwrap_or(campaign.scenario.seed);
+        let simulated = campaign.simulate(seed, 0);
+        let simulated =
+            simulated.with_context(|| format!("campaign {} cannot be simulated", campaign.name))?;
+        activity.next("writing");
+        let mut paths = Vec::new();
+        for recording in &simulated {
+            let name = &recording.run.recording.name;
+            let of_recording = directory.path().join(name);
+            std::fs::create_dir(&of_recording)
+                .with_context(|| format!("cannot create {}", of_recording.display()))?;
+            write(recording, &of_recording)?;
+            paths.push(format!("{name}/run.toml"));
+        }
+        if let Some(truth) = SimulatedCampaign::truth(&simulated) {
+            truth.write(&directory.path().join("truth.json"), false)?;
+        }
+        let text = campaign_text(&paths, &campaign.day_to_day);
+        let path = directory.path().join("campaign.toml");
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        directory.commit()?;
+        drop(activity);
+        eprintln!(
+            "{}: {} recording(s) written to {}",
+            campaign.name,
+            simulated.len(),
+            self.output.display()
+        );
+        Ok(())
+    }
+}
+
 /// A simulated run with this seed or the scenario's own.
 pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simulated> {
     scenario
@@ -84,7 +129,7 @@ fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
 pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
     let truth = Calibration {
         terms: true_terms(simulated),
-        ..truth_record(&simulated.truth, &simulated.run)
+        ..truth_record(&simulated.truth_here(), &simulated.run)
     };
     write_run(directory, &simulated.run, simulated.output, Some(&truth))?;
     Ok(())

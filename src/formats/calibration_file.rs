@@ -6,8 +6,9 @@ use std::path::Path;
 use super::error::{FileError, Place, suggestion};
 use super::small_file;
 use super::whole::write_whole;
-use crate::calibration::result::{Calibration, FORMAT, TriadRecord};
-use crate::imu::{PARAMETERS, Sensor, Triad};
+use crate::calibration::RangeRecord;
+use crate::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
+use crate::imu::{PARAMETERS, PerSensor, Sensor, Triad};
 use crate::shown::excerpt;
 
 impl Calibration {
@@ -68,10 +69,10 @@ impl Calibration {
         let error = |found: String, expected: &str, advice: &str| {
             Err(FileError::new(path, Place::File, found, expected, advice))
         };
-        if self.format != FORMAT {
+        if self.format != FORMAT && self.format != FORMAT_WITH_TEMPERATURE {
             return error(
                 format!("format = {:?}", self.format),
-                &format!("{FORMAT:?}"),
+                &format!("{FORMAT:?} or {FORMAT_WITH_TEMPERATURE:?}"),
                 "Give a file that turncal wrote, or convert this one.",
             );
         }
@@ -104,7 +105,8 @@ impl Calibration {
             }
         }
         self.check_parameters(path)?;
-        self.check_covariance(path)
+        self.check_covariance(path)?;
+        self.check_temperature(path)
     }
 
     fn check_parameters(&self, path: &Path) -> Result<(), FileError> {
@@ -170,6 +172,64 @@ impl Calibration {
             }
         }
         Ok(())
+    }
+}
+
+impl Calibration {
+    fn check_temperature(&self, path: &Path) -> Result<(), FileError> {
+        let error = |found: String, expected: &str| {
+            let advice = "Correct the file, or write the calibration again.";
+            Err(FileError::new(path, Place::File, found, expected, advice))
+        };
+        let Some(thermal) = &self.temperature else {
+            return Ok(());
+        };
+        for sensor in Sensor::ALL {
+            let RangeRecord {
+                lowest_degc: lowest,
+                highest_degc: highest,
+                reference_degc: reference,
+                largest_rate_k_per_s: rate,
+            } = *thermal.range.get(sensor);
+            let finite = [lowest, highest, reference, rate]
+                .iter()
+                .all(|v| v.is_finite());
+            if !finite || lowest > highest || rate < 0.0 {
+                return error(
+                    format!(
+                        "temperature.range.{} from {lowest} to {highest} °C",
+                        sensor.name()
+                    ),
+                    "a finite range, its lower end first, and a rate that is not negative",
+                );
+            }
+        }
+        let n = thermal.coefficients.len();
+        let rows = [&thermal.covariance, &thermal.cross];
+        let mut values = thermal.coefficients.iter().map(|c| c.value);
+        let mut inner = rows.into_iter().flatten().flatten();
+        if !values.all(f64::is_finite) || !inner.all(|v| v.is_finite()) {
+            return error(
+                "a number in temperature that is not finite".to_owned(),
+                "finite numbers",
+            );
+        }
+        let covered = thermal.covariance.is_empty()
+            || (thermal.covariance.len() == n && thermal.cross.len() == self.parameters.len());
+        if !covered || !rows.into_iter().flatten().all(|row| row.len() == n) {
+            return error(
+                "temperature.covariance or .cross of another size".to_owned(),
+                "a row of covariance for each coefficient, one of cross for each parameter",
+            );
+        }
+        let anywhere = thermal.state(&PerSensor::default(), &PerSensor::default());
+        match self.in_state(&anywhere) {
+            Ok(_) => Ok(()),
+            Err(found) => error(
+                found.to_string(),
+                "names of parameters and orders from 1 to 5",
+            ),
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! The clock of a log: stamps in any unit, counters, or none.
 
-use super::csv_file::CsvFile;
 use super::error::FileError;
 use super::fields::Fields;
+use super::rows::LogRows;
 use crate::recording::nanoseconds;
 
 /// What the numbers of a time column are.
@@ -67,7 +67,7 @@ impl<'a> Clock<'a> {
     }
 
     /// Begins to read a file.
-    pub fn start(&self, csv: &mut CsvFile) -> Result<Stamps, FileError> {
+    pub fn start(&self, csv: &mut LogRows) -> Result<Stamps, FileError> {
         Ok(Stamps {
             column: self.column.map(|name| csv.column(name)).transpose()?,
             nanoseconds: self.nanoseconds.map(|name| csv.column(name)).transpose()?,
@@ -111,7 +111,7 @@ pub(super) struct Stamps {
 impl Stamps {
     /// Looks at the stamp of the row, which must not be before that of the row before; a later one is
     /// taken.
-    pub fn look(&mut self, csv: &CsvFile) -> Result<Stamp, FileError> {
+    pub fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
         let Some(column) = self.column else {
             let time = (self.let_go + self.of_rows.len()) as f64 * self.period;
             self.of_rows.push((time, csv.line()));
@@ -186,7 +186,7 @@ impl Stamps {
     }
 
     /// The error of a row that has the stamp of the row before, but other values.
-    pub fn same(csv: &CsvFile) -> FileError {
+    pub fn same(csv: &LogRows) -> FileError {
         csv.error_here(
             "the time of the row before again, a duplicate with other values",
             "a later time",

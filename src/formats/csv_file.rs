@@ -9,10 +9,9 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::{FileError, Place, list, nearest};
-use crate::recording::FileColumn;
+use super::error::{FileError, Place};
+use super::names::Names;
 use crate::room;
-use crate::shown::excerpt;
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 
@@ -37,10 +36,9 @@ const FEW_ROWS: usize = 1 << 12;
 pub(super) struct CsvFile {
     file: PathBuf,
     lines: Lines,
-    header: Vec<String>,
+    names: Names,
     units: Option<Vec<String>>,
     decimal_comma: bool,
-    taken: Vec<usize>,
     row: Row,
     rows: usize,
     packed: bool,
@@ -121,9 +119,8 @@ impl CsvFile {
             lines,
             row: Row::new(heading.delimiter.byte()),
             decimal_comma: heading.delimiter.leaves_commas(),
-            header: heading.names,
+            names: Names::new(&heading.names),
             units: heading.units,
-            taken: Vec::new(),
             rows: 0,
             packed: false,
             line: heading.line,
@@ -133,7 +130,12 @@ impl CsvFile {
 
     /// The names of the columns.
     pub fn header(&self) -> &[String] {
-        &self.header
+        self.names.all()
+    }
+
+    /// The file's path.
+    pub fn path(&self) -> &Path {
+        &self.file
     }
 
     /// What comments say of the rate of rows, Hz.
@@ -148,46 +150,8 @@ impl CsvFile {
 
     /// The index of a named column, which nothing else may be.
     pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
-        let mut places = (0..self.header.len()).filter(|&i| self.header[i] == name);
-        let header = || self.header.iter().map(String::as_str);
-        match (places.next(), places.next()) {
-            (Some(index), None) if self.taken.contains(&index) => Err(self.error_here(
-                format_args!("`{name}` named for two quantities"),
-                "a column of its own for each",
-                "Correct `columns` in run.toml.",
-            )),
-            (Some(index), None) => {
-                self.taken.push(index);
-                Ok(index)
-            }
-            (Some(_), Some(_)) => Err(self.error_here(
-                format_args!("two columns named `{name}`"),
-                "one",
-                "Rename one of them.",
-            )),
-            (None, _) => Err(self.error_here(
-                format_args!("the columns {}", list(header())),
-                format_args!("a column named `{}`", excerpt(name)),
-                match nearest(name, header()) {
-                    Some(like) => format!(
-                        "Did you mean `{like}`? Correct `columns` in run.toml or this header."
-                    ),
-                    None => "Correct `columns` in run.toml or this header.".to_owned(),
-                },
-            )),
-        }
-    }
-
-    /// The same of a name that a minus may precede, which turns the sign of the column's values; a column
-    /// that is called so with its minus is itself meant.
-    pub fn signed_column(&mut self, name: &str) -> Result<(usize, FileColumn), FileError> {
-        let literal = self.header.iter().any(|known| known == name);
-        let bare = name.strip_prefix('-').filter(|_| !literal);
-        let column = FileColumn {
-            name: bare.unwrap_or(name).to_owned(),
-            reversed: bare.is_some(),
-        };
-        Ok((self.column(&column.name)?, column))
+        let found = self.names.find(name);
+        found.map_err(|wrong| self.error_here(wrong.found, wrong.expected, wrong.advice))
     }
 
     /// Goes to the next row; false at the end of the file, and at a last row that the end of the file cuts
@@ -201,7 +165,7 @@ impl CsvFile {
         self.rows += 1;
         self.reserve()?;
         let split = self.row.split(self.lines.line());
-        let (found, expected) = (self.row.len(), self.header.len());
+        let (found, expected) = (self.row.len(), self.header().len());
         let is_cut = split == Err(Malformed::Quote) || found < expected;
         if is_cut && !self.lines.is_ended() {
             self.cut = Some(Cut::Row);
@@ -216,7 +180,7 @@ impl CsvFile {
                 "Complete or remove the row.",
             ));
         }
-        let last_is_used = self.taken.contains(&(expected - 1));
+        let last_is_used = self.names.taken().contains(&(expected - 1));
         if !self.lines.is_ended() && last_is_used && !ends_in_delimiter {
             self.cut = Some(Cut::Number);
         }
@@ -245,8 +209,8 @@ impl CsvFile {
         if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
             return Ok(());
         }
-        let a_row = match self.taken.len() {
-            0 => self.header.len() * BYTES_LOOKED_AT,
+        let a_row = match self.names.taken().len() {
+            0 => self.header().len() * BYTES_LOOKED_AT,
             taken if self.packed => taken * BYTES_PACKED,
             taken => taken * BYTES_A_VALUE,
         };
@@ -309,7 +273,7 @@ impl CsvFile {
         };
         let place = Place::Column {
             line: self.line,
-            column: self.header.get(column).cloned().unwrap_or_default(),
+            column: self.header().get(column).cloned().unwrap_or_default(),
         };
         FileError::new(
             &self.file,

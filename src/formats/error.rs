@@ -38,6 +38,19 @@ pub enum Place {
         /// Name in the header.
         column: String,
     },
+    /// A byte of a binary file; the first is 0.
+    Byte(u64),
+    /// A sample of a stream of such a file.
+    Sample {
+        /// Its number, from one.
+        number: u64,
+        /// The stream.
+        stream: String,
+        /// Where it is in the file.
+        byte: u64,
+        /// The column that is at fault, if one is.
+        column: Option<String>,
+    },
 }
 
 impl fmt::Display for Place {
@@ -48,6 +61,22 @@ impl fmt::Display for Place {
             Self::Character { line, column } => write!(f, ", line {line}, column {column}"),
             Self::Column { line, column } => {
                 write!(f, ", line {line}, column `{}`", excerpt(column))
+            }
+            Self::Byte(byte) => write!(f, ", byte {byte}"),
+            Self::Sample {
+                number,
+                stream,
+                byte,
+                column,
+            } => {
+                write!(f, ", `{}`, sample {number}", excerpt(stream))?;
+                if *byte > 0 {
+                    write!(f, " at byte {byte}")?;
+                }
+                match column {
+                    Some(column) => write!(f, ", column `{}`", excerpt(column)),
+                    None => Ok(()),
+                }
             }
         }
     }

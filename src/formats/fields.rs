@@ -169,6 +169,35 @@ impl<'a> Fields<'a> {
         })
     }
 
+    /// An array of tables that must be there and not be empty.
+    pub fn need_tables(
+        &self,
+        name: &str,
+        known: &[&str],
+        meaning: &str,
+    ) -> Result<Vec<Self>, FileError> {
+        let field = self.need(name, meaning)?;
+        let of = |value: &'a Spanned<DeValue<'a>>| match value.get_ref() {
+            DeValue::Table(entries) => Some(Self {
+                document: self.document,
+                name: self.full_name(name),
+                span: Some(value.span()),
+                entries,
+            }),
+            _ => None,
+        };
+        let tables = match field.value.get_ref() {
+            DeValue::Array(values) => values.iter().map(of).collect::<Option<Vec<_>>>(),
+            _ => None,
+        };
+        let tables = tables.filter(|tables| !tables.is_empty());
+        let tables = tables.ok_or_else(|| field.wrong_kind(meaning))?;
+        tables
+            .into_iter()
+            .map(|table| table.with_only(known))
+            .collect()
+    }
+
     /// The names of all fields here, each with its value.
     pub fn all(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> + '_ {
         self.entries.iter().map(|(key, value)| {
@@ -329,6 +358,16 @@ impl<'a> Field<'a> {
             .as_array()
             .and_then(|array| array.iter().map(|value| value.get_ref().as_str()).collect())
             .ok_or_else(|| self.wrong_kind("a list of texts in quotes"))
+    }
+
+    /// Lists of texts in a list; none if it is anything else.
+    pub fn rows_of_texts(&self) -> Option<Vec<Vec<&'a str>>> {
+        let rows = self.value.get_ref().as_array()?.iter();
+        let row = |row: &'a Spanned<DeValue<'a>>| -> Option<Vec<&'a str>> {
+            let texts = row.get_ref().as_array()?.iter();
+            texts.map(|text| text.get_ref().as_str()).collect()
+        };
+        rows.map(row).collect()
     }
 
     /// Three texts.

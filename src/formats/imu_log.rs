@@ -2,20 +2,20 @@
 
 mod long;
 
-use std::path::PathBuf;
-
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
 use super::clock::{Clock, Stamp, Stamps};
-use super::csv_file::CsvFile;
 use super::error::FileError;
+use super::joined::{self, Joined, Part};
+use super::rows::{LogRows, Source};
+use super::temperature::{TemperatureColumns, Temperatures};
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
 use crate::recording::{
     Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
-    TemperatureFacts, stretches_between,
+    stretches_between,
 };
 use long::{LongLog, Sizes, Whole};
 
@@ -50,12 +50,14 @@ impl TimeStamp {
 
 /// What `run.toml` says of the file.
 pub(super) struct ImuLog<'a> {
-    pub file: PathBuf,
+    pub source: Source<'a>,
     pub clock: Clock<'a>,
+    /// Where the accelerometers are, if not in the rows of the gyros.
+    pub accel_from: Option<(Source<'a>, Clock<'a>)>,
     /// Of rows of several instruments those that have this number in this column.
     pub instance: Option<(&'a str, f64)>,
     pub triads: PerSensor<[&'a str; 3]>,
-    pub temperature: Option<&'a str>,
+    pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
     pub axes: BodyAxes,
     pub stamp: TimeStamp,
@@ -120,7 +122,6 @@ struct Held {
     columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     duplicates: Vec<(usize, u64)>,
-    temperatures: Vec<f64>,
 }
 
 impl Held {
@@ -134,7 +135,6 @@ impl Held {
             column.drain(..rows);
             column.shrink_to(2 * column.len());
         }
-        self.temperatures.drain(..rows.min(self.temperatures.len()));
         self.duplicates.retain(|&(row, _)| row > rows);
         self.duplicates.iter_mut().for_each(|(row, _)| *row -= rows);
     }
@@ -146,18 +146,23 @@ struct Read<'a> {
     clock: Uniform,
     facts: [ColumnFacts; 6],
     rows: usize,
-    temperature: Option<TemperatureFacts>,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
 }
 
 /// What the file holds.
-struct Content<'a> {
+struct Content {
     layout: Layout,
     stamps: Stamps,
-    held: Held,
-    long: Option<LongLog<'a>>,
-    duplicates: usize,
+    samples: Samples,
+    temperature: Option<Temperatures>,
+    /// Of the integrals of the accelerometers' columns, in their unit times s.
+    integral_error: [f64; 3],
+}
+
+enum Samples {
+    Held(Held, Uniform),
+    Long(Box<Whole>),
 }
 
 impl ImuLog<'_> {
@@ -179,18 +184,36 @@ impl ImuLog<'_> {
         let Content {
             layout,
             stamps,
-            held,
-            long,
-            duplicates,
+            samples,
+            temperature,
+            integral_error,
         } = self.content(sizes, notes)?;
-        match long {
-            Some(long) => {
-                let whole = long.finish(duplicates)?;
-                notes.extend(stamps.lost_count(whole.samples + duplicates - whole.rows));
-                Ok(self.packed(&layout, whole))
+        let (mut imu, missing) = match samples {
+            Samples::Long(whole) => {
+                let missing = whole.missing;
+                (self.packed(&layout, *whole), missing)
             }
-            None => self.whole(layout, &stamps, held, notes),
+            Samples::Held(held, clock) => self.whole(layout, &stamps, held, clock),
+        };
+        notes.extend(stamps.lost_count(missing));
+        // As bounded as the error of whole pulses, and as independent of how long it is summed over.
+        let error = self
+            .axes
+            .each(Vector3::from(integral_error))
+            .component_div(&self.nominal.accel.0);
+        imu.pulse.accel = imu
+            .pulse
+            .accel
+            .hypot(12f64.sqrt() * error.norm() / 3f64.sqrt());
+        if let Some(temperature) = temperature {
+            let read = temperature.read(&self.source.file.display().to_string());
+            notes.extend(read.notes);
+            imu.temperature = read.temperature;
+            if let Some(log) = &mut imu.log {
+                log.temperature = read.facts;
+            }
         }
+        Ok(imu)
     }
 
     /// The samples of a log that was packed as it was read.
@@ -203,14 +226,13 @@ impl ImuLog<'_> {
             faults,
             bridges,
             rows,
-            temperature,
+            missing: _,
         } = whole;
         let read = Read {
             layout,
             clock,
             facts,
             rows,
-            temperature,
             faults,
             bridges,
         };
@@ -229,11 +251,10 @@ impl ImuLog<'_> {
         layout: Layout,
         stamps: &Stamps,
         held: Held,
-        notes: &mut Vec<String>,
-    ) -> Result<ImuSamples, FileError> {
-        let mut clock = Uniform::new(&self.file, &stamps.of_rows, self.clock.period)?;
+        mut clock: Uniform,
+    ) -> (ImuSamples, usize) {
         let samples = clock.numbers.last().map_or(0, |last| last + 1);
-        notes.extend(stamps.lost_count(samples - clock.numbers.len()));
+        let missing = samples - clock.numbers.len();
         let lines = stamps.of_rows.iter().map(|&(_, line)| line);
         let period = clock.period;
         let units = layout.units(self, period);
@@ -283,11 +304,10 @@ impl ImuLog<'_> {
             clock,
             facts,
             rows: count,
-            temperature: TemperatureFacts::of(&held.temperatures),
             faults,
             bridges,
         };
-        Ok(self.samples(read, samples, series, pulse))
+        (self.samples(read, samples, series, pulse), missing)
     }
 
     fn samples(
@@ -302,7 +322,6 @@ impl ImuLog<'_> {
             clock,
             facts,
             rows,
-            temperature,
             faults,
             bridges,
         } = read;
@@ -325,6 +344,7 @@ impl ImuLog<'_> {
             pulse,
             faults,
             bridges,
+            temperature: None,
             log: Some(LogFacts {
                 rows,
                 jitter_rms: clock.jitter_rms,
@@ -332,18 +352,54 @@ impl ImuLog<'_> {
                 off_stated_period: clock.off_given,
                 columns: of_axes,
                 named: NamedColumns {
-                    time: self.clock.column.map(str::to_owned),
+                    time: self.clock_of_rows().column.map(str::to_owned),
                     triads: layout.triads(),
-                    temperature: self.temperature.map(str::to_owned),
+                    temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
                     axes: self.axes.order(),
                 },
-                temperature,
+                temperature: None,
             }),
         }
     }
 
-    fn layout(&self, csv: &mut CsvFile) -> Result<Layout, FileError> {
-        let names = self.triads.gyro.iter().chain(&self.triads.accel);
+    /// The rows of both triads.
+    fn open(&self) -> Result<LogRows, FileError> {
+        let Some((source, clock)) = &self.accel_from else {
+            return self.source.open();
+        };
+        let parts = PerSensor {
+            gyro: Part {
+                source: &self.source,
+                clock: self.clock,
+                columns: self.triads.gyro,
+                further: self
+                    .temperature
+                    .as_ref()
+                    .map_or(&[], |columns| columns.names()),
+            },
+            accel: Part {
+                source,
+                clock: *clock,
+                columns: self.triads.accel,
+                further: &[],
+            },
+        };
+        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::joined)
+    }
+
+    fn clock_of_rows(&self) -> Clock<'_> {
+        match self.accel_from {
+            Some(_) => joined::clock(self.clock.period),
+            None => self.clock,
+        }
+    }
+
+    fn layout(&self, csv: &mut LogRows) -> Result<Layout, FileError> {
+        let names = match self.accel_from {
+            Some(_) => joined::distinct(&self.triads),
+            None => PerSensor::from_fn(|sensor| self.triads.get(sensor).map(str::to_owned)),
+        };
+        let names = names.gyro.iter().chain(&names.accel);
         let found = names.map(|name| csv.signed_column(name));
         let found = found.collect::<Result<Vec<_>, _>>()?;
         let (places, names): (Vec<_>, Vec<_>) = found.into_iter().unzip();
@@ -361,12 +417,17 @@ impl ImuLog<'_> {
         })
     }
 
-    fn content(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<Content<'_>, FileError> {
-        let mut csv = CsvFile::open(&self.file)?;
-        let mut stamps = self.clock.start(&mut csv)?;
+    fn content(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<Content, FileError> {
+        let mut csv = self.open()?;
+        let clock = self.clock_of_rows();
+        let mut stamps = clock.start(&mut csv)?;
         let layout = self.layout(&mut csv)?;
         let places = layout.places;
-        let temperature = self.temperature.map(|name| csv.column(name)).transpose()?;
+        let temperature = self
+            .temperature
+            .as_ref()
+            .map(|columns| columns.start(&mut csv));
+        let mut temperature = temperature.transpose()?;
 
         let instance = match self.instance {
             Some((name, number)) => Some((csv.column(name)?, number)),
@@ -383,7 +444,7 @@ impl ImuLog<'_> {
                 continue;
             }
             // Rows that another sensor wrote; without a time they would be missing.
-            if self.clock.column.is_some() && places.iter().all(|&place| csv.is_blank(place)) {
+            if clock.column.is_some() && places.iter().all(|&place| csv.is_blank(place)) {
                 blank += 1;
                 continue;
             }
@@ -403,48 +464,57 @@ impl ImuLog<'_> {
             for (column, value) in held.columns.iter_mut().zip(row) {
                 column.push(value);
             }
-            if let Some(place) = temperature {
-                held.temperatures.push(csv.number(place)?);
+            if let (Some(temperature), Some(&(time, _))) = (&mut temperature, stamps.of_rows.last())
+            {
+                temperature.take(&csv, time);
             }
             match &mut long {
-                Some(long) if long.is_full(&held) => long.take(&mut held, &mut stamps, false)?,
+                Some(long) if long.is_full(&held) => long
+                    .take(&mut held, &mut stamps, false)
+                    .map_err(|error| csv.placed(error))?,
                 None if held.len() == sizes.long => {
                     csv.pack();
                     let layout = layout.clone();
-                    long = Some(LongLog::new(self, (layout, sizes), &held, &stamps)?);
+                    let begun = LongLog::new(self, (layout, sizes), &held, &stamps);
+                    long = Some(begun.map_err(|error| csv.placed(error))?);
                 }
                 _ => {}
             }
         }
         notes.extend(csv.cut_off("It is left out"));
+        notes.extend_from_slice(csv.remarks());
         if blank > 0 {
             notes.push(format!(
                 "{blank} row(s) of {} have nothing in the columns of both triads and are passed over.",
-                self.file.display()
+                self.source.file.display()
             ));
         }
-        match &mut long {
-            Some(long) => long.take(&mut held, &mut stamps, true)?,
-            None if held.len() < FEWEST_SAMPLES => {
-                return Err(csv.error(
-                    format_args!("{} samples", held.len()),
-                    format_args!("at least {FEWEST_SAMPLES}"),
-                    "Record a run with dwells and turns.",
-                ));
-            }
-            None => {}
+        if long.is_none() && held.len() < FEWEST_SAMPLES {
+            return Err(csv.error(
+                format_args!("{} samples", held.len()),
+                format_args!("at least {FEWEST_SAMPLES}"),
+                "Record a run with dwells and turns.",
+            ));
         }
+        let samples = match long {
+            Some(mut long) => long
+                .take(&mut held, &mut stamps, true)
+                .and_then(|()| long.finish(duplicates))
+                .map(|whole| Samples::Long(Box::new(whole))),
+            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
+                .map(|clock| Samples::Held(held, clock)),
+        };
         Ok(Content {
+            samples: samples.map_err(|error| csv.placed(error))?,
+            integral_error: csv.integral_error(),
             layout,
             stamps,
-            held,
-            long,
-            duplicates,
+            temperature,
         })
     }
 
     /// A number of a row as it stands.
-    fn value(&self, csv: &CsvFile, column: usize) -> Result<f64, FileError> {
+    fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let value = csv.number(column)?;
         if self.output == Output::Pulse && value.fract() != 0.0 {
             return Err(csv.not(

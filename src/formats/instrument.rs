@@ -10,6 +10,8 @@ use super::error::FileError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
 use super::quantity::{OUTPUTS, units};
+use super::rows::Source;
+use super::temperature::TemperatureColumns;
 use crate::imu::NoiseKeys;
 use crate::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
@@ -41,6 +43,9 @@ impl<'a> InstrumentFields<'a> {
             "imu",
             &[
                 "file",
+                "stream",
+                "salvage",
+                "accel_from",
                 "output",
                 "gyro_unit",
                 "accel_unit",
@@ -51,6 +56,7 @@ impl<'a> InstrumentFields<'a> {
                 "time_stamp",
                 "continuous",
                 "instance",
+                "temperature_unit",
                 "body_axes",
                 "columns",
                 "noise",
@@ -71,13 +77,7 @@ impl<'a> InstrumentFields<'a> {
             &["time", "gyro", "accel", "temperature"],
             "the names of the columns",
         )?;
-        let temperature = match columns.get("temperature") {
-            Some(field) => {
-                notes.push("The temperature column is read but has no effect yet.".to_owned());
-                Some(field.text()?)
-            }
-            None => None,
-        };
+        let temperature = TemperatureColumns::of_fields(&fields, &columns)?;
 
         let instance = match fields.table("instance", &["column", "number"])? {
             Some(of) => Some((
@@ -89,6 +89,14 @@ impl<'a> InstrumentFields<'a> {
             None => None,
         };
         let clock = Clock::of_fields(&fields, &columns)?;
+        let source = Source::of_fields(&fields, directory, None)?;
+        let accel_from = accel_from(&fields, directory, &source, clock)?;
+        if let (Some(_), Some((column, _))) = (&accel_from, instance) {
+            return Err(fields.missing(
+                "stream",
+                &format!("one instrument without `{column}`, as accel_from needs"),
+            ));
+        }
         let follow = clock.period.is_some() && top.get("turntable").is_none();
         if clock.column.is_none() && !follow {
             return Err(columns.missing(
@@ -109,8 +117,9 @@ impl<'a> InstrumentFields<'a> {
         let (noise, motion_noise) = noise(&fields, notes)?;
         Ok(Self {
             log: ImuLog {
-                file: directory.join(fields.need("file", "a file name")?.text()?),
+                source,
                 clock,
+                accel_from,
                 instance,
                 triads: PerSensor {
                     gyro: columns
@@ -158,6 +167,64 @@ impl<'a> InstrumentFields<'a> {
             },
         })
     }
+}
+
+impl<'a> Source<'a> {
+    /// Reads `file`, `stream` and `salvage` of a table; what it does not say is as in the other.
+    pub fn of_fields(
+        fields: &Fields<'a>,
+        directory: &Path,
+        other: Option<&Source<'a>>,
+    ) -> Result<Self, FileError> {
+        let file = match (fields.get("file"), other) {
+            (None, Some(other)) => other.file.clone(),
+            _ => directory.join(fields.need("file", "a file name")?.text()?),
+        };
+        let stream = fields.get("stream").map(|field| field.text()).transpose()?;
+        let salvage = fields
+            .get("salvage")
+            .map(|field| field.flag())
+            .transpose()?;
+        Ok(Self {
+            file,
+            stream: stream.or(other.and_then(|other| other.stream)),
+            salvage: salvage
+                .or(other.map(|other| other.salvage))
+                .unwrap_or(false),
+        })
+    }
+}
+
+/// Where the accelerometers are, if not in the rows of the gyros, and their clock.
+fn accel_from<'a>(
+    imu: &Fields<'a>,
+    directory: &Path,
+    gyro: &Source<'a>,
+    clock: Clock<'a>,
+) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
+    let known = [
+        "file",
+        "stream",
+        "salvage",
+        "time",
+        "time_unit",
+        "sample_period_s",
+    ];
+    let Some(fields) = imu.table("accel_from", &known)? else {
+        return Ok(None);
+    };
+    let source = Source::of_fields(&fields, directory, Some(gyro))?;
+    let mut of_accel = Clock::of_fields(&fields, &fields)?;
+    if of_accel.column.is_none() {
+        (of_accel.column, of_accel.nanoseconds) = (clock.column, clock.nanoseconds);
+    }
+    if fields.get("time_unit").is_none() {
+        of_accel.unit = clock.unit;
+    }
+    if of_accel.column.is_none() {
+        return Err(fields.missing("time", "the column of its time, for two streams need both"));
+    }
+    Ok(Some((source, of_accel)))
 }
 
 /// 1σ of the parameters of the terms that `[imu.terms]` switches on.

@@ -5,6 +5,7 @@
 
 mod axes;
 mod calibration_file;
+mod campaign;
 mod clock;
 mod csv_file;
 mod digest;
@@ -15,21 +16,29 @@ mod fields;
 mod imu_log;
 mod instrument;
 mod job;
+mod joined;
+#[cfg(feature = "certificate")]
+mod laboratory;
 mod lot_directory;
+mod names;
 mod parts;
 mod plausible;
 mod quantity;
 mod read;
+mod rows;
 mod segments;
 mod sheet;
 mod small_file;
 mod specification;
+mod streams;
 mod table_log;
+mod temperature;
 mod uniform;
 mod whole;
 mod write;
 
 pub use crate::imu::NoiseKeys;
+pub use campaign::{Campaign, campaign_text};
 pub use digest::{digest_of_bytes, input_digests};
 pub use error::{FileError, Place};
 pub use job::{JOB_FILE, Job, JobKind, Part};

@@ -69,8 +69,18 @@ impl Run {
         let (segments_file, segment_sigma) = labels(&top, directory)?.unzip();
 
         // The small files' fields are checked before the large files are read.
-        let mut files = vec![path.to_owned(), instrument.log.file.clone()];
-        files.extend(table_log.as_ref().map(|log| log.file.clone()));
+        let mut files = vec![path.to_owned(), instrument.log.source.file.clone()];
+        let accel = instrument
+            .log
+            .accel_from
+            .as_ref()
+            .map(|(source, _)| &source.file);
+        files.extend(
+            accel
+                .filter(|file| **file != instrument.log.source.file)
+                .cloned(),
+        );
+        files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
         let imu = instrument.log.read(&mut notes)?;
         notes.extend(faults::notes(&imu));
@@ -162,7 +172,7 @@ fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String>
 }
 
 /// The name of the directory of a `run.toml`, else the file's own.
-fn name(path: &Path) -> String {
+pub(super) fn name(path: &Path) -> String {
     let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let named = match full.file_name() {
         Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::FileError;
-use super::csv_file::CsvFile;
+use super::rows::{LogRows, Source};
 
 /// The columns of a file of which nothing is known yet.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +20,11 @@ pub(crate) struct Sheet {
 impl Sheet {
     /// Reads a file that has at least this many rows.
     pub fn read(path: &Path, fewest: usize) -> Result<Self, FileError> {
-        let mut csv = CsvFile::open(path)?;
+        Self::of(Source::of_file(path).open()?, fewest)
+    }
+
+    /// Reads rows, of which there are at least so many.
+    pub(super) fn of(mut csv: LogRows, fewest: usize) -> Result<Self, FileError> {
         let names = csv.header().to_vec();
         let units = match csv.units() {
             Some(units) => units.to_vec(),

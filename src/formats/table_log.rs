@@ -1,14 +1,14 @@
 //! The turntable's log: readings of the attitude of its mounting face.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::clock::{Clock, Stamp, Stamps};
-use super::csv_file::CsvFile;
 use super::error::FileError;
 use super::fields::Fields;
 use super::instrument::HALF_TURN;
+use super::rows::{LogRows, Source};
 use crate::attitude;
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
@@ -85,7 +85,7 @@ impl<'a> AttitudeColumns<&'a str> {
         }
     }
 
-    fn find(&self, csv: &mut CsvFile) -> Result<AttitudeColumns<usize>, FileError> {
+    fn find(&self, csv: &mut LogRows) -> Result<AttitudeColumns<usize>, FileError> {
         Ok(match self {
             Self::Quaternion([w, x, y, z]) => AttitudeColumns::Quaternion([
                 csv.column(w)?,
@@ -104,7 +104,7 @@ impl<'a> AttitudeColumns<&'a str> {
 }
 
 impl AttitudeColumns<usize> {
-    fn reading(&self, csv: &CsvFile) -> Result<Matrix3<f64>, FileError> {
+    fn reading(&self, csv: &LogRows) -> Result<Matrix3<f64>, FileError> {
         match self {
             &Self::Quaternion([w, x, y, z]) => {
                 let quaternion = Quaternion::new(
@@ -136,7 +136,7 @@ impl AttitudeColumns<usize> {
     }
 
     /// The angles of the axes; none for a quaternion.
-    fn axes(&self, csv: &CsvFile) -> Result<Option<AxisAngles>, FileError> {
+    fn axes(&self, csv: &LogRows) -> Result<Option<AxisAngles>, FileError> {
         let Self::Angles(angles) = self else {
             return Ok(None);
         };
@@ -150,7 +150,7 @@ impl AttitudeColumns<usize> {
 
 /// What `run.toml` says of the file.
 pub(super) struct TableLogFile<'a> {
-    pub file: PathBuf,
+    pub source: Source<'a>,
     pub clock: Clock<'a>,
     pub attitude: AttitudeColumns<&'a str>,
     pub accuracy: TableAccuracy,
@@ -166,6 +166,8 @@ impl<'a> TableLogFile<'a> {
     ) -> Result<Option<Self>, FileError> {
         let known = [
             "file",
+            "stream",
+            "salvage",
             "columns",
             "time_unit",
             "sample_period_s",
@@ -226,7 +228,7 @@ impl<'a> TableLogFile<'a> {
             Ok(field.positive_to(HALF_TURN)? * ARCSEC)
         };
         Ok(Some(Self {
-            file: directory.join(fields.need("file", "a file name")?.text()?),
+            source: Source::of_fields(&fields, directory, None)?,
             clock,
             attitude,
             accuracy: TableAccuracy {
@@ -239,7 +241,7 @@ impl<'a> TableLogFile<'a> {
 
     /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
-        let mut csv = CsvFile::open(&self.file)?;
+        let mut csv = self.source.open()?;
         let mut stamps = self.clock.start(&mut csv)?;
         let columns = self.attitude.find(&mut csv)?;
 

@@ -118,7 +118,13 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
         period,
         ..
     } = &run.recording.imu;
-    writeln!(file, "t,gx,gy,gz,ax,ay,az")?;
+    let temperature = run.recording.imu.temperature.as_ref();
+    let further = if temperature.is_some() {
+        ",temperature"
+    } else {
+        ""
+    };
+    writeln!(file, "t,gx,gy,gz,ax,ay,az{further}")?;
     for (k, samples) in gyro.iter().zip(accel.iter()).enumerate() {
         write!(file, "{}", nanoseconds(run.recording.imu.time(k)))?;
         for (sensor, sample) in [(Sensor::Gyro, samples.0), (Sensor::Accel, samples.1)] {
@@ -131,6 +137,10 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
                     Output::Rate => write!(file, ",{:e}", value / period)?,
                 }
             }
+        }
+        if let Some(temperature) = temperature {
+            let middle = run.recording.imu.time(k) + 0.5 * period;
+            write!(file, ",{:.4}", temperature.at(middle).gyro[0])?;
         }
         writeln!(file)?;
     }
@@ -204,7 +214,7 @@ accel_unit = {accel_unit}
 sample_period_s = {period:?}
 time_stamp = "start"
 continuous = {continuous}
-columns = {{ time = "t", gyro = ["gx", "gy", "gz"], accel = ["ax", "ay", "az"] }}
+columns = {{ time = "t", gyro = ["gx", "gy", "gz"], accel = ["ax", "ay", "az"]{temperature} }}
 
 [imu.noise]
 angle_random_walk_deg_per_sqrt_h = {angle_walk:?}
@@ -214,6 +224,10 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
             accel_unit = quoted(&run.instrument.unit.accel),
             period = imu.period,
             continuous = imu.continuous,
+            temperature = match imu.temperature {
+                Some(_) => ", temperature = \"temperature\"",
+                None => "",
+            },
             angle_walk = short(noise.gyro.random_walk / DEG_PER_SQRT_H),
             velocity_walk = short(noise.accel.random_walk / MICRO_G_PER_SQRT_HZ),
         ),

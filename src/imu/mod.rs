@@ -15,6 +15,7 @@ mod instrument;
 mod noise_keys;
 mod signal;
 mod terms;
+mod thermal;
 mod triad;
 
 pub use axis_order::AxisOrder;
@@ -24,6 +25,10 @@ pub use instrument::Instrument;
 pub use noise_keys::NoiseKeys;
 pub use signal::{GaussMarkov, MotionNoise, Noise, NoiseSource, Output, Pulses};
 pub use terms::{REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
+pub use thermal::{
+    HIGHEST_ORDER, RATE, THERMAL_FUNCTIONS, ThermalCoefficients, ThermalModel, ThermalRange,
+    ThermalState, ThermalValues, powers,
+};
 pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 
 /// Names of the body axes, in order.

@@ -5,6 +5,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::{Deserialize, Serialize};
 
+use super::thermal::{AccelThermalFile, GyroThermalFile, ThermalVariation};
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
 use crate::imu::{
     ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
@@ -24,6 +25,9 @@ pub struct Instrument {
     pub variation: PerSensor<Variation>,
     /// 1σ of the parameters of its error terms, around zero; zero where it has none.
     pub term_sigma: TermVector,
+    /// How they change with temperature; none where they do not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thermal: Option<PerSensor<ThermalVariation>>,
 }
 
 /// How a triad's scale factors and biases differ between instruments of a grade.
@@ -153,6 +157,12 @@ impl Instrument {
                 },
             },
             term_sigma: terms.in_si(),
+            thermal: (gyro.temperature.is_some() || accel.temperature.is_some()).then(|| {
+                PerSensor {
+                    gyro: gyro.temperature.unwrap_or_default().in_si(),
+                    accel: accel.temperature.unwrap_or_default().in_si(),
+                }
+            }),
         })
     }
 
@@ -239,6 +249,7 @@ struct GyroFile {
     gauss_markov: Option<GyroGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_deg_per_h: SpreadFile,
+    temperature: Option<GyroThermalFile>,
 }
 
 #[derive(Deserialize)]
@@ -250,6 +261,7 @@ struct AccelFile {
     gauss_markov: Option<AccelGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_ug: SpreadFile,
+    temperature: Option<AccelThermalFile>,
 }
 
 #[derive(Deserialize)]

@@ -1,5 +1,7 @@
 //! Turntables and their paths.
 
+use std::num::NonZeroU16;
+
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
@@ -147,7 +149,14 @@ struct AxesFile {
     rate_deg_per_s: Positive,
     acceleration_deg_per_s2: Positive,
     dwell_s: NonNegative,
+    /// How often the steps are gone through.
+    #[serde(default = "once")]
+    repeat: NonZeroU16,
     steps: Vec<AxesStepFile>,
+}
+
+fn once() -> NonZeroU16 {
+    NonZeroU16::MIN
 }
 
 #[derive(Deserialize)]
@@ -168,7 +177,9 @@ impl AxesFile {
         };
         Moves::Axes {
             start: radians(&self.start_deg),
-            steps: self.steps.iter().map(step).collect(),
+            steps: (0..self.repeat.get())
+                .flat_map(|_| self.steps.iter().map(step))
+                .collect(),
         }
     }
 }

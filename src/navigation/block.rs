@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::process_noise::NoiseInputs;
 use super::state::State;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, ThermalState, Triad};
 
 /// Attitude, velocity and position error.
 pub const NAVIGATION: usize = 9;
@@ -36,6 +36,9 @@ pub struct Block {
     pub gravity: SVector<f64, NAVIGATION>,
     /// Transition from the parameter errors of error terms that are on.
     pub terms: Vec<TermColumn>,
+    /// Functions of temperature meanwhile: the transition from a coefficient's error is that from its
+    /// parameter's error times its function. None where parameters do not change with temperature.
+    pub thermal: Option<ThermalState>,
     /// What noise acts on: its covariance follows for any densities.
     pub noise: NoiseInputs,
 }

@@ -8,7 +8,7 @@ use super::process_noise::{NoiseInput, NoiseInputs};
 use super::state::State;
 use super::transition::{Errors, Transition};
 use super::vectors::Vectors;
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{PerSensor, Sensor, ThermalState};
 
 /// The error model of short stretches of samples, one after the other.
 #[derive(Debug, Clone)]
@@ -94,7 +94,12 @@ impl Passage {
     }
 
     /// The block of all that was added, which ends in this computed state.
-    pub fn block(self, state: State, responses: PerSensor<&CorrectedResponse>) -> Block {
+    pub fn block(
+        self,
+        state: State,
+        responses: PerSensor<&CorrectedResponse>,
+        thermal: Option<ThermalState>,
+    ) -> Block {
         let parameters = PerSensor::from_fn(|sensor| {
             let errors = self.inputs.get(sensor);
             let columns = responses.get(sensor).columns();
@@ -111,6 +116,7 @@ impl Passage {
             parameters,
             gravity: self.gravity.times(&SVector::repeat(1.0)),
             terms: terms.collect(),
+            thermal,
             noise: self.noise,
         }
     }

@@ -1,6 +1,7 @@
 //! Strapdown navigation in a frame fixed to the site.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,7 +13,10 @@ use super::state::State;
 use super::sums::Sums;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
-use crate::imu::{PerSensor, Sensed, Sensor, TermResponse, TermVector, Triad};
+use crate::imu::{
+    PerSensor, Sensed, Sensor, TermResponse, TermVector, ThermalCoefficients, ThermalModel,
+    ThermalState, Triad,
+};
 use crate::recording::{ImuSamples, Near};
 
 /// Within this time, s, what happened first is taken to act on all that follows as a whole; the sensitivity of
@@ -32,7 +36,10 @@ pub struct Navigator<'a> {
     gravity: Vector3<f64>,
     earth_rate: Vector3<f64>,
     earth_turn: Matrix3<f64>,
+    /// At the reference temperature.
+    triads: PerSensor<Triad>,
     instrument: PerSensor<Instrument>,
+    thermal: Option<Thermal>,
     terms: TermValues,
     /// Where navigation stands.
     pub state: State,
@@ -54,6 +61,15 @@ impl Default for TermValues {
             values: TermVector::zeros(),
         }
     }
+}
+
+/// How the triads change with temperature.
+#[derive(Debug, Clone)]
+struct Thermal {
+    model: Arc<ThermalModel>,
+    coefficients: PerSensor<ThermalCoefficients>,
+    /// Of the samples that navigation is at.
+    state: ThermalState,
 }
 
 /// A triad, ready for use sample by sample.
@@ -80,9 +96,54 @@ impl<'a> Navigator<'a> {
             gravity: site.gravity_n(),
             earth_rate,
             earth_turn: exp(-earth_rate * imu.period),
+            triads: *triads,
             instrument: instruments(triads, imu.period)?,
+            thermal: None,
             terms: TermValues::default(),
             state,
+        })
+    }
+
+    /// The same with triads that change with temperature; those it has are at the reference.
+    pub fn with_thermal(
+        mut self,
+        model: Arc<ThermalModel>,
+        coefficients: PerSensor<ThermalCoefficients>,
+    ) -> Self {
+        self.thermal = Some(Thermal {
+            model,
+            coefficients,
+            state: ThermalState::default(),
+        });
+        self
+    }
+
+    /// Takes the triads as they are at the temperature in the middle of these samples.
+    pub fn warm(&mut self, samples: &Range<usize>) {
+        let (Some(thermal), Some(temperature)) = (&mut self.thermal, &self.imu.temperature) else {
+            return;
+        };
+        let middle = 0.5 * (self.imu.time(samples.start) + self.imu.time(samples.end));
+        let (t, rate) = (temperature.at(middle), temperature.rate(middle));
+        thermal.state = thermal.model.state(&t, &rate);
+        // Where a sensitivity is singular nothing is finite, and a pass diverges.
+        let singular = Matrix3::repeat(f64::NAN);
+        self.instrument = PerSensor::from_fn(|sensor| {
+            let triad = self.triads().get(sensor).to_owned();
+            let correction = triad.correction().unwrap_or(singular);
+            Instrument::new(&triad, correction, self.imu.period)
+        });
+    }
+
+    /// The triads in use.
+    pub fn triads(&self) -> PerSensor<Triad> {
+        let Some(thermal) = &self.thermal else {
+            return self.triads;
+        };
+        PerSensor::from_fn(|sensor| {
+            let coefficients = thermal.coefficients.get(sensor);
+            let triad = self.triads.get(sensor);
+            triad.warmed(coefficients, thermal.state.get(sensor))
         })
     }
 
@@ -100,6 +161,7 @@ impl<'a> Navigator<'a> {
     /// Goes on with other triads; `None` if the sensitivity of one is singular.
     pub fn set_triads(&mut self, triads: &PerSensor<Triad>) -> Option<()> {
         self.instrument = instruments(triads, self.imu.period)?;
+        self.triads = *triads;
         Some(())
     }
 
@@ -176,9 +238,12 @@ impl<'a> Navigator<'a> {
         let mut passage = Passage::new(&self.earth_rate, &self.terms.on);
         for begin in samples.clone().step_by(few) {
             let part = begin..(begin + few).min(samples.end);
+            self.warm(&part);
             let moments = self.move_through(part.clone());
             passage.add(&moments, self.bridged(&part));
         }
+        // Sensitivities to what changes by parts in a thousand are those in the middle.
+        self.warm(&samples);
         self.block(passage)
     }
 
@@ -312,7 +377,8 @@ impl<'a> Navigator<'a> {
 
     fn block(&self, passage: Passage) -> Block {
         let responses = PerSensor::from_fn(|sensor| &self.instrument.get(sensor).response);
-        passage.block(self.state, responses)
+        let thermal = self.thermal.as_ref().map(|thermal| thermal.state);
+        passage.block(self.state, responses, thermal)
     }
 
     /// Covariance in `n` that interpolation adds to the integrals of both triads' input.
@@ -341,14 +407,20 @@ struct Step {
     sensed: Option<Sensed>,
 }
 
-fn instruments(triads: &PerSensor<Triad>, period: f64) -> Option<PerSensor<Instrument>> {
-    let one = |triad: &Triad| {
-        let correction = triad.correction()?;
-        Some(Instrument {
+impl Instrument {
+    fn new(triad: &Triad, correction: Matrix3<f64>, period: f64) -> Self {
+        Self {
             correction,
             bias: correction * triad.bias * period,
             response: CorrectedResponse::new(triad, &correction),
-        })
+        }
+    }
+}
+
+fn instruments(triads: &PerSensor<Triad>, period: f64) -> Option<PerSensor<Instrument>> {
+    let one = |triad: &Triad| {
+        let correction = triad.correction()?;
+        Some(Instrument::new(triad, correction, period))
     };
     Some(PerSensor {
         gyro: one(&triads.gyro)?,

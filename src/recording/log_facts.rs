@@ -93,7 +93,7 @@ pub struct ColumnFacts {
     pub unit: f64,
 }
 
-/// A column of temperatures.
+/// A column of temperatures, °C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureFacts {
     /// The smallest value.
@@ -158,27 +158,6 @@ impl ColumnFacts {
             largest,
             step,
             unit: later.unit,
-        }
-    }
-}
-
-impl TemperatureFacts {
-    /// Of a column; none if it is empty.
-    pub(crate) fn of(values: &[f64]) -> Option<Self> {
-        (!values.is_empty()).then(|| Self {
-            smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
-            mean: values.iter().sum::<f64>() / values.len() as f64,
-            largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        })
-    }
-
-    /// The same of a column of so many rows that this many more follow.
-    pub(crate) fn and(self, rows: usize, later: &Self, more: usize) -> Self {
-        let (rows, more) = (rows as f64, more as f64);
-        Self {
-            smallest: self.smallest.min(later.smallest),
-            mean: (self.mean * rows + later.mean * more) / (rows + more),
-            largest: self.largest.max(later.largest),
         }
     }
 }

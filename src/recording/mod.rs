@@ -8,6 +8,7 @@ mod near;
 mod samples;
 mod segment;
 mod series;
+mod temperature;
 
 pub use faults::{Bridge, Fault, FaultKind};
 pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
@@ -17,6 +18,7 @@ pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
 pub use series::Series;
 pub(crate) use series::{Packed, Packer, finest_step};
+pub use temperature::{SPACING as TEMPERATURE_SPACING, Temperature};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::{Bridge, Fault, LogFacts, Series};
+use super::{Bridge, Fault, LogFacts, Series, Temperature};
 use crate::imu::{PerSensor, Sensor};
 
 /// The samples of both triads, at one period, in one stretch or several.
@@ -30,6 +30,8 @@ pub struct ImuSamples {
     /// Interpolated samples, those of the same axes together, in order of time; those of one axis do not
     /// overlap.
     pub bridges: Vec<Bridge>,
+    /// The instrument's temperature meanwhile, where it is known.
+    pub temperature: Option<Temperature>,
     /// The file that the samples are from; none if they were made.
     pub log: Option<LogFacts>,
 }
@@ -141,6 +143,7 @@ impl ImuSamples {
             pulse: PerSensor::default(),
             faults: Vec::new(),
             bridges: Vec::new(),
+            temperature: None,
             log: None,
         }
     }

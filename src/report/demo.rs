@@ -39,7 +39,7 @@ pub fn add(document: &mut Document, methods: &[String], missions: &[Flown]) {
     document
         .blocks
         .retain(|(_, block)| !is_position_line(block));
-    document.both(table);
+    document.before_folds(table);
 }
 
 /// The table says more than the line that it takes the place of.

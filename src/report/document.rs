@@ -50,6 +50,8 @@ pub enum Block {
     Text(String, String),
     /// Lines to be copied as they are, below a heading.
     Code(String, String),
+    /// What follows is detail under this heading, up to the next of them: folded away on a page.
+    Fold(String),
 }
 
 /// Pairs of a name and a value below a heading.
@@ -121,12 +123,25 @@ impl Document {
         self.add(Medium::Terminal, block.into());
     }
 
+    /// Begins a part that a page folds away.
+    pub fn fold(&mut self, heading: &str) {
+        self.page(Block::Fold(heading.to_owned()));
+    }
+
+    /// Adds what page and terminal show before all that is folded away.
+    pub fn before_folds(&mut self, block: impl Into<Block>) {
+        let is_fold = |(_, block): &(Medium, Block)| matches!(block, Block::Fold(_));
+        let place = self.blocks.iter().position(is_fold);
+        let place = place.unwrap_or(self.blocks.len());
+        self.blocks.insert(place, (Medium::Both, block.into()));
+    }
+
     fn add(&mut self, medium: Medium, block: Block) {
         let empty = match &block {
             Block::Facts(facts) => facts.rows.is_empty(),
             Block::Table(table) => table.sections.is_empty(),
             Block::List(list) => list.items.is_empty(),
-            Block::Plot(_) => false,
+            Block::Plot(_) | Block::Fold(_) => false,
             Block::Text(_, text) | Block::Code(_, text) => text.is_empty(),
         };
         if !empty {

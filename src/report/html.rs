@@ -29,9 +29,7 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
                 @if !document.conclusions.items.is_empty() {
                     section { (list(&document.conclusions)) }
                 }
-                @for (medium, block) in &document.blocks {
-                    @if *medium != Medium::Terminal { (of_block(block, &mut drawn)) }
-                }
+                @for part in parts(document) { (of_part(&part, &mut drawn)) }
                 footer { "turncal " (env!("CARGO_PKG_VERSION")) }
             }
         }
@@ -39,9 +37,45 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
     page.into_string()
 }
 
+/// Blocks below a fold's heading; those before the first fold have none.
+struct Part<'a> {
+    heading: Option<&'a str>,
+    blocks: Vec<&'a Block>,
+}
+
+fn parts(document: &Document) -> Vec<Part<'_>> {
+    let mut parts = vec![Part {
+        heading: None,
+        blocks: Vec::new(),
+    }];
+    let shown = document.blocks.iter();
+    for (_, block) in shown.filter(|(medium, _)| *medium != Medium::Terminal) {
+        match (block, parts.last_mut()) {
+            (Block::Fold(heading), _) => parts.push(Part {
+                heading: Some(heading),
+                blocks: Vec::new(),
+            }),
+            (block, Some(part)) => part.blocks.push(block),
+            (_, None) => {}
+        }
+    }
+    parts.retain(|part| !part.blocks.is_empty());
+    parts
+}
+
+fn of_part<'a>(part: &Part, drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+    let blocks = html! { @for block in &part.blocks { (of_block(block, drawn)) } };
+    match part.heading {
+        Some(heading) => html! { details { summary { (heading) } (blocks) } },
+        None => blocks,
+    }
+}
+
 fn of_block<'a>(block: &Block, drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
     match block {
-        Block::Facts(of) => html! { section { h2 { (of.heading) } (facts(of)) } },
+        Block::Facts(of) => html! {
+            section { @if !of.heading.is_empty() { h2 { (of.heading) } } (facts(of)) }
+        },
         Block::Table(of) => table(of),
         Block::List(of) => html! { section { (list(of)) } },
         Block::Plot(of) => drawn.next().map_or_else(|| html! {}, |svg| plot(of, svg)),
@@ -49,6 +83,7 @@ fn of_block<'a>(block: &Block, drawn: &mut impl Iterator<Item = &'a String>) -> 
             section { @if !heading.is_empty() { h2 { (heading) } } p.note { (text) } }
         },
         Block::Code(heading, code) => html! { section { h2 { (heading) } pre { (code) } } },
+        Block::Fold(_) => html! {},
     }
 }
 

@@ -26,13 +26,19 @@ pub mod document;
 mod files;
 mod html;
 mod number;
+#[cfg(feature = "certificate")]
+pub mod pdf;
 pub mod plot;
 pub mod svg;
 pub mod terminal;
 
 pub mod accuracy;
 pub mod allan;
+pub mod at_rest;
 pub mod calibration;
+pub mod campaign;
+#[cfg(feature = "certificate")]
+pub mod certificate;
 pub mod check;
 pub mod comparison;
 pub mod conversion;

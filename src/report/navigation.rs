@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::document::{Document, Facts, NONE, Table, cells};
 use super::number::{or_dash, three_digits, value};
-use super::plot::{Panel, Plot, Series};
+use super::plot::{Axis, Panel, Plot, Series};
 use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::BodyFrame;
@@ -195,7 +195,8 @@ impl Navigation<'_> {
         let errors = moments().map(|m| (m.time / HOUR, quantity.error(&m.error)));
         let sigma = moments().filter_map(|m| Some((m.time / HOUR, quantity.sigma(m)?)));
         let error = Series::line(errors).label("error");
-        quantity.panel(self.hours(), &sigma.collect::<Vec<_>>(), vec![error])
+        let time = Axis::hours(self.hours());
+        quantity.panel(time, &sigma.collect::<Vec<_>>(), vec![error])
     }
 
     /// A row a minute: time, errors, predicted σ where there is one.

@@ -3,11 +3,10 @@
 
 use super::document::{Block, Document, Table};
 use super::number::{self, three_digits};
-use super::plot::{Panel, Plot, Point, Series};
+use super::plot::{Axis, Panel, Plot, Point, Series};
 use super::quantity::Quantity;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
-const HOUR: f64 = 3600.0;
 const HEADING: &str = "Navigation with this calibration";
 
 /// The navigation errors that one method's calibration leads to, stationary and level at the run's site.
@@ -19,7 +18,17 @@ pub struct Navigated {
     pub outlook: Vec<Outlook>,
 }
 
-/// Adds the table, and for a terminal its position error in a line.
+/// Adds the position error at the end in a line.
+pub(super) fn in_a_line(
+    document: &mut Document,
+    navigation: Result<&[Navigated], &NavigationStudyError>,
+) {
+    if let Ok(navigated @ [_, ..]) = navigation {
+        document.both(Block::Text(String::new(), line(navigated)));
+    }
+}
+
+/// Adds the table.
 pub(super) fn add(
     document: &mut Document,
     navigation: Result<&[Navigated], &NavigationStudyError>,
@@ -31,7 +40,6 @@ pub(super) fn add(
         }
         Ok([]) => {}
         Ok(navigated) => {
-            document.terminal(Block::Text(String::new(), line(navigated)));
             document.page(table(navigated));
         }
     }
@@ -42,10 +50,23 @@ fn is_known(navigated: &[Navigated]) -> bool {
     moments.any(|moment| moment.error.is_some())
 }
 
-/// Duration.
-fn hours(navigated: &[Navigated]) -> f64 {
+/// Duration, s.
+fn duration(navigated: &[Navigated]) -> f64 {
     let ends = navigated.iter().filter_map(|of| of.outlook.last());
-    ends.map(|end| end.time / HOUR).fold(0.0, f64::max)
+    ends.map(|end| end.time).fold(0.0, f64::max)
+}
+
+/// The unit of time in which it is told: symbol and seconds.
+fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
+    let units = [("h", 3600.0), ("min", 60.0)].into_iter();
+    let mut fits = units.filter(|(_, size)| duration(navigated) >= *size);
+    fits.next().unwrap_or(("s", 1.0))
+}
+
+/// Duration in words.
+fn long(navigated: &[Navigated]) -> String {
+    let (unit, size) = clock(navigated);
+    format!("{} {unit}", number::value(duration(navigated) / size, 10.0))
 }
 
 /// Error and its σ in the usual unit.
@@ -59,15 +80,19 @@ fn line(navigated: &[Navigated]) -> String {
     let [.., horizontal] = Quantity::ALL;
     let ends = navigated.iter().filter_map(|of| {
         let (error, sigma) = both(horizontal, of.outlook.last()?);
-        let sigma = three_digits(sigma);
+        let (unit, scale) = horizontal.readable_unit(error.unwrap_or(sigma).abs());
+        let sigma = three_digits(sigma * scale);
         Some(match error {
-            Some(error) => format!("{} {} nmile (σ {sigma})", of.method, three_digits(error)),
-            None => format!("{} σ {sigma} nmile", of.method),
+            Some(error) => {
+                let error = three_digits(error * scale);
+                format!("{} {error} {unit} (σ {sigma})", of.method)
+            }
+            None => format!("{} σ {sigma} {unit}", of.method),
         })
     });
     format!(
-        "Position error after {} h of navigation, stationary and level: {}",
-        number::value(hours(navigated), 10.0),
+        "Position error after {} of navigation, stationary and level: {}",
+        long(navigated),
         ends.collect::<Vec<_>>().join(", ")
     )
 }
@@ -101,10 +126,10 @@ fn table(navigated: &[Navigated]) -> Table {
         .section(position)
         .section(attitude)
         .note(format!(
-            "{} h stationary and level at the site of the run, heading North, from perfect alignment, height \
-             held. σ: predicted from the covariance of the calibration by the linear error model; of horizontal \
+            "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
+             held: as long as predicted errors stay small (1° and 1 % of the Earth's radius). σ: predicted from the covariance of the calibration by the linear error model; of horizontal \
              errors the root of the mean square.",
-            number::value(hours(navigated), 10.0)
+            long(navigated)
         ));
     table.note(match known {
         true => "Errors are computed minus true. Drift: position error at the end over the time.",
@@ -113,7 +138,8 @@ fn table(navigated: &[Navigated]) -> Table {
 }
 
 fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
-    let hours = hours(navigated);
+    let (unit_of_time, size_of_time) = clock(navigated);
+    let time = duration(navigated) / size_of_time;
     let numbers: Vec<(Option<f64>, Option<f64>)> = navigated
         .iter()
         .map(|navigated| {
@@ -125,7 +151,7 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
                     let errors = navigated.outlook.iter().filter_map(|m| both(quantity, m).0);
                     (errors.max_by(|a, b| a.abs().total_cmp(&b.abs())), None)
                 }
-                Of::Drift => (error.map(|x| x / hours), sigma.map(|x| x / hours)),
+                Of::Drift => (error.map(|x| x / time), sigma.map(|x| x / time)),
             }
         })
         .collect();
@@ -143,8 +169,11 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
             unit.to_owned(),
             scale,
         ),
-        // In nautical miles others need no second look.
-        Of::Drift => ("drift".to_owned(), format!("{}/h", quantity.unit()), 1.0),
+        // In nautical miles an hour others need no second look.
+        Of::Drift if unit_of_time == "h" => {
+            ("drift".to_owned(), format!("{}/h", quantity.unit()), 1.0)
+        }
+        Of::Drift => ("drift".to_owned(), format!("{unit}/{unit_of_time}"), scale),
     };
     let shown = |x: Option<f64>| number::or_dash(x, |x| three_digits(x * scale));
     let mut row = vec![name, unit];
@@ -183,14 +212,15 @@ pub(super) fn figure(navigated: &[Navigated]) -> Option<Plot> {
 
 fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
     let known = is_known(navigated);
+    let (unit, second) = clock(navigated);
     let sigma = |of: &Navigated, sign: f64| -> Vec<Point> {
         let moments = of.outlook.iter();
-        let points = moments.map(|m| (m.time / HOUR, sign * both(quantity, m).1));
+        let points = moments.map(|m| (m.time / second, sign * both(quantity, m).1));
         points.collect()
     };
     let lines = navigated.iter().flat_map(|of| {
         let errors = of.outlook.iter();
-        let errors = errors.filter_map(|m| Some((m.time / HOUR, both(quantity, m).0?)));
+        let errors = errors.filter_map(|m| Some((m.time / second, both(quantity, m).0?)));
         let lines = match known {
             true => vec![Series::line(errors).label(of.method)],
             false => {
@@ -208,5 +238,6 @@ fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
         lines.into_iter().map(styled)
     });
     let band = navigated.last().map_or_else(Vec::new, |of| sigma(of, 1.0));
-    quantity.panel(hours(navigated), &band, lines.collect())
+    let x = Axis::time(unit, duration(navigated) / second);
+    quantity.panel(x, &band, lines.collect())
 }

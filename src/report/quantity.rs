@@ -155,8 +155,8 @@ impl Quantity {
         si / self.unit_value()
     }
 
-    /// Lines against hours over a band of ±σ, all given in the usual unit and drawn in a readable one.
-    pub(super) fn panel(self, hours: f64, sigma: &[Point], mut lines: Vec<Series>) -> Panel {
+    /// Lines against time over a band of ±σ, all given in the usual unit and drawn in a readable one.
+    pub(super) fn panel(self, time: Axis, sigma: &[Point], mut lines: Vec<Series>) -> Panel {
         let size = |points: &[Point]| points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
         let of_line = |series: &Series| match &series.shape {
             Shape::Line(points) => size(points),
@@ -198,7 +198,7 @@ impl Quantity {
             .filter(|(sign, _)| *sign >= lowest)
             .filter_map(|(sign, name)| Some(Series::name(sigma(sign).last()?.1, name)));
         let title = format!("{}, {unit}{kind}", self.name());
-        Panel::new(title, Axis::hours(hours), y)
+        Panel::new(title, time, y)
             .with(Series::band(sigma(lowest), sigma(1.0)))
             .with(Series::zero())
             .with_all(names)

@@ -40,6 +40,7 @@ impl Synthetic {
             outcome: Some(&self.outcome),
             findings: &self.outcome.findings,
             effects: &[],
+            budget: None,
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {
@@ -169,6 +170,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         prior_sigma,
         prior_mean,
         auxiliary: Default::default(),
+        thermal: None,
+        own: Vec::new(),
+        alone: Vec::new(),
+        warming: Vec::new(),
         gravity: (run.site.gravity, 0.0),
         aiding: run.aiding(),
         prior_attitudes: vec![AttitudePrior {
@@ -184,11 +189,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
                 attitude: Vec::new(),
             }],
         },
-        linearised_at: Linearisation {
-            triads: truth,
-            terms: TermVector::zeros(),
-            initial_attitudes: vec![Matrix3::identity()],
-        },
+        linearised_at: Linearisation::new(truth, TermVector::zeros(), vec![Matrix3::identity()]),
         passes: vec![
             pass(true, 812.0, 9.1e5, 4),
             pass(false, 3.1, 7310.0, 9),

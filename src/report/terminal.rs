@@ -33,7 +33,7 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
             Block::List(of) => list(of, "  ", width),
             Block::Text(heading, text) => paragraphs(&[heading, text]),
             Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
-            Block::Plot(_) => continue,
+            Block::Plot(_) | Block::Fold(_) => continue,
         });
     }
     parts.push(list(&document.conclusions, "  ", width));

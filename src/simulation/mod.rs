@@ -3,21 +3,27 @@
 //! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its
 //! readings draw from generators of their own, so that changing one leaves the others as they were.
 
+mod campaign;
 mod increments;
 mod scenario;
+mod thermal;
 
 use nalgebra::{Matrix3, SVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+pub use campaign::SimulatedCampaign;
 pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
+pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::exp;
+use crate::calibration::ParameterVector;
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
 };
+use crate::navigation::samples_of;
 use crate::recording::{ImuSamples, Recording, TableLog};
 use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::turntable::{
@@ -30,14 +36,34 @@ use crate::turntable::{Imperfection, Motion, Moves, TableError};
 pub struct Simulated {
     /// What a laboratory would have recorded.
     pub run: Run,
-    /// The instrument's true parameters.
+    /// The instrument's true parameters; where they change with temperature, those at the reference of
+    /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
+    /// The same but for what is this recording's own.
+    pub common: PerSensor<Triad>,
     /// Those of its error terms.
     pub terms: TermVector,
     /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
+    /// How they change with temperature, where they do.
+    pub thermal: Option<ThermalTruth>,
     /// What a sample holds when the run is written to a file.
     pub output: Output,
+}
+
+impl Simulated {
+    /// The true triads at the mean temperature of the recording.
+    pub fn truth_here(&self) -> PerSensor<Triad> {
+        let imu = &self.run.recording.imu;
+        match (&self.thermal, &imu.temperature) {
+            (Some(thermal), Some(temperature)) => {
+                let middle = 0.5 * (imu.start() + imu.end());
+                let at = temperature.at(middle).gyro[0];
+                thermal.at(&self.truth, at, 0.0)
+            }
+            _ => self.truth,
+        }
+    }
 }
 
 /// What draws random numbers, each from a stream of its own.
@@ -56,12 +82,24 @@ enum Draws {
 impl Draws {
     const COUNT: u64 = 8;
 
+    /// Of what temperature adds; apart from all others, which stay as they were.
+    fn thermal(seed: u64, stream: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ THERMAL);
+        rng.set_stream(stream);
+        rng
+    }
+
     fn generator(self, seed: u64, stream: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream.wrapping_mul(Self::COUNT) + self as u64);
         rng
     }
 }
+
+/// Makes another seed of one: `thermal!` in ASCII.
+const THERMAL: u64 = 0x7468_6572_6d61_6c21;
+/// Within this time, s, no instrument's temperature makes a difference.
+const WARMED_EVERY: f64 = 0.1;
 
 fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| StandardNormal.sample(rng))
@@ -74,11 +112,26 @@ impl Scenario {
     /// # Errors
     /// If the path is beyond the table.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
+        self.simulate_recording(seed, stream, stream, &ParameterVector::zeros())
+    }
+
+    /// The same of the instrument of one stream with all else from another, as of one of its recordings, in which
+    /// its parameters differ by `own`.
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn simulate_recording(
+        &self,
+        seed: u64,
+        instrument: u64,
+        stream: u64,
+        own: &ParameterVector,
+    ) -> Result<Simulated, TableError> {
         let mut rng = Draws::Imperfection.generator(seed, stream);
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
         let motion = Motion::new(&self.table, &self.path, &imperfection)?;
         let read = Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))?;
-        let terms = self.draw_terms(&mut Draws::Terms.generator(seed, stream));
+        let terms = self.draw_terms(&mut Draws::Terms.generator(seed, instrument));
         let ideal = true_increments(&motion, &self.site, &self.integrator, &terms);
 
         let truth = PerSensor::from_fn(|sensor| {
@@ -86,8 +139,19 @@ impl Scenario {
                 Sensor::Gyro => Draws::GyroTruth,
                 Sensor::Accel => Draws::AccelTruth,
             };
-            self.draw_truth(sensor, &mut draws.generator(seed, stream))
+            self.draw_truth(sensor, &mut draws.generator(seed, instrument))
         });
+        let common = truth;
+        let truth = campaign::changed(truth, own);
+        let thermal = self.instrument.thermal.as_ref().map(|variation| {
+            let mut rng = Draws::thermal(seed, instrument);
+            let form = self.installation.form;
+            ThermalTruth::draw(variation, form, self.reference_temperature(), &mut rng)
+        });
+        let warming = self
+            .chamber
+            .as_ref()
+            .map(|chamber| chamber.instrument(motion.duration()));
         let nominal = PerSensor::from_fn(|sensor| {
             let per_unit = match self.output {
                 Output::Pulse => 1.0 / self.instrument.pulse.get(sensor),
@@ -110,15 +174,23 @@ impl Scenario {
             .to_owned()
         });
         let sensed = |sensor: Sensor, draws: Draws, ideal: &[Vector3<f64>]| {
-            self.sensed(
-                truth.get(sensor),
-                sensor,
-                ideal,
-                draws.generator(seed, stream),
-            )
+            let at = |time: f64| match (&thermal, &warming) {
+                (Some(thermal), Some(warming)) => {
+                    let (temperature, rate) = warming.at(time);
+                    *thermal.at(&truth, temperature, rate).get(sensor)
+                }
+                _ => *truth.get(sensor),
+            };
+            self.sensed(&at, sensor, ideal, draws.generator(seed, stream))
         };
+        let temperature = self.chamber.as_ref().zip(warming.as_ref());
+        let temperature = temperature.and_then(|(chamber, warming)| {
+            let mut rng = Draws::thermal(seed, !stream);
+            warming.recorded(motion.duration(), chamber.sensor_noise, &mut rng)
+        });
         let imu = ImuSamples {
             pulse,
+            temperature,
             ..ImuSamples::made(
                 0.0,
                 self.integrator.period,
@@ -165,8 +237,10 @@ impl Scenario {
         Ok(Simulated {
             run,
             truth,
+            common,
             terms,
             geometry: self.geometry(&imperfection),
+            thermal,
             output: self.output,
         })
     }
@@ -197,20 +271,27 @@ impl Scenario {
 
     fn sensed(
         &self,
-        triad: &Triad,
+        triad_at: &dyn Fn(f64) -> Triad,
         sensor: Sensor,
         ideal: &[Vector3<f64>],
         mut rng: ChaCha8Rng,
     ) -> Vec<Vector3<f64>> {
         let period = self.integrator.period;
-        let sensitivity = triad.sensitivity();
-        let bias = triad.bias * period;
+        let mut triad = triad_at(0.0);
+        let (mut sensitivity, mut bias) = (triad.sensitivity(), triad.bias * period);
+        let warms = self.chamber.is_some();
+        let every = samples_of(WARMED_EVERY, period);
         let pulse = *self.instrument.pulse.get(sensor);
         let mut noise = NoiseSource::new(*self.instrument.noise.get(sensor), period, &mut rng);
         let mut pulses = Pulses::default();
         ideal
             .iter()
-            .map(|u| {
+            .enumerate()
+            .map(|(k, u)| {
+                if warms && k % every == 0 {
+                    triad = triad_at((k as f64 + 0.5 * every as f64) * period);
+                    (sensitivity, bias) = (triad.sensitivity(), triad.bias * period);
+                }
                 let increment = sensitivity * u + bias + noise.draw(&mut rng);
                 match self.output {
                     Output::Pulse => pulses.count(increment / pulse) * pulse,

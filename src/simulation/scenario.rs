@@ -5,18 +5,21 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::Integrator;
+use super::{Chamber, Integrator};
 use crate::calibration::ErrorTerm;
 use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, usual_axis_error, usual_variation};
 use crate::earth::Site;
 use crate::imu::BodyFrame;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
 use crate::models::{
-    self, Finite, InstallationModel, Instrument, ModelError, OneOrThree, Place, Positive, Room,
+    self, Finite, InstallationModel, Instrument, ModelError, NonNegative, OneOrThree, Place,
+    Positive, Room,
 };
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
+/// At which instruments are what their model says, °C.
+const ROOM_TEMPERATURE: f64 = 25.0;
 /// Steps of the true motion in one sample of the IMU.
 const STEPS: u32 = 4;
 /// The longest record that is simulated in memory; it takes some gigabytes.
@@ -52,6 +55,9 @@ pub struct Scenario {
     pub integrator: Integrator,
     /// Readings of the table per second.
     pub reading_rate: f64,
+    /// The climatic chamber that it stands in; none at an even temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chamber: Option<Chamber>,
     /// Seed to use where none is asked for.
     pub seed: u64,
 }
@@ -101,6 +107,11 @@ impl Scenario {
                 steps: STEPS,
             },
             reading_rate: file.turntable.reading_rate_hz.0,
+            chamber: file
+                .chamber
+                .map(ChamberFile::in_si)
+                .transpose()
+                .map_err(|message| text.inconsistent(message))?,
             seed: file.seed,
         };
         scenario
@@ -171,6 +182,11 @@ impl Scenario {
                 term.parameters().any(|k| sigma[k] > 0.0)
             }
         }
+    }
+
+    /// The temperature at which its instrument is as drawn, °C.
+    pub fn reference_temperature(&self) -> f64 {
+        ROOM_TEMPERATURE
     }
 
     /// How long a run takes, s.
@@ -253,6 +269,7 @@ struct ScenarioFile {
     turntable: TurntableFile,
     #[serde(default)]
     truth: TruthFile,
+    chamber: Option<ChamberFile>,
 }
 
 #[derive(Deserialize)]
@@ -336,6 +353,39 @@ struct TurntableFile {
 
 fn ten_hertz() -> Positive {
     Positive(10.0)
+}
+
+/// A climatic chamber.
+#[derive(Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChamberFile {
+    /// Time in s and temperature in °C.
+    profile: Vec<(Finite, Finite)>,
+    #[serde(default)]
+    time_constant_s: NonNegative,
+    #[serde(default)]
+    sensor_noise_k: NonNegative,
+}
+
+impl ChamberFile {
+    pub fn in_si(self) -> Result<Chamber, String> {
+        let profile: Vec<(f64, f64)> = self.profile.iter().map(|(t, v)| (t.0, v.0)).collect();
+        if profile.is_empty() || !profile.is_sorted_by(|a, b| a.0 < b.0) {
+            return Err("profile: expected at least one [time in s, temperature in °C], each later than the one \
+                        before"
+                .to_owned());
+        }
+        if let Some((_, value)) = profile.iter().find(|(_, value)| value.abs() > 150.0) {
+            return Err(format!(
+                "profile: found {value} °C, expected a chamber within ±150 °C"
+            ));
+        }
+        Ok(Chamber {
+            profile,
+            time_constant: self.time_constant_s.0,
+            sensor_noise: self.sensor_noise_k.0,
+        })
+    }
 }
 
 #[derive(Default, Deserialize)]

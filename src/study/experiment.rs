@@ -248,6 +248,7 @@ impl ExperimentStudy {
             Situation::Moving => Mission {
                 motion: Motion::Moving(self.trajectory.clone()),
                 intervals: self.intervals,
+                interval: super::navigation::INTERVAL,
             },
         }
     }

@@ -1,6 +1,7 @@
 //! Studies: what many simulated runs say.
 
 pub mod accuracy;
+pub mod campaign;
 pub mod experiment;
 pub mod navigation;
 mod ratio;
@@ -8,6 +9,7 @@ mod shard;
 pub mod table1;
 
 pub use accuracy::{Accuracy, AccuracyStudy, Figures, GroupAccuracy, NavigationAccuracy};
+pub use campaign::{CampaignAccuracy, CampaignStudy};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};

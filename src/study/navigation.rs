@@ -3,6 +3,7 @@
 
 mod course;
 mod outlook;
+mod warming;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
@@ -21,6 +22,7 @@ use crate::navigation::{
 use course::Course;
 
 pub use outlook::Outlook;
+pub use warming::{Warming, WarmingError, WarmingPair};
 
 /// Time in s between two moments of a result.
 pub const INTERVAL: f64 = 60.0;
@@ -52,8 +54,10 @@ pub enum Motion {
 pub struct Mission {
     /// How it moves.
     pub motion: Motion,
-    /// How many intervals of [`INTERVAL`] it lasts.
+    /// How many intervals it lasts.
     pub intervals: u32,
+    /// Time between two moments of the result, s; [`INTERVAL`] but for what lasts minutes or less.
+    pub interval: f64,
 }
 
 /// A calibration and the truth, in one body frame and one installation form.
@@ -108,6 +112,9 @@ pub enum NavigationStudyError {
         /// Which triad.
         sensor: Sensor,
     },
+    /// Calibrations that cannot be navigated with while they warm up.
+    #[error(transparent)]
+    Warming(#[from] WarmingError),
     /// Roll and heading are one.
     #[error("at a pitch of ±90° roll and heading are not apart: give a pitch within ±89°")]
     Upright,
@@ -200,6 +207,7 @@ impl Mission {
                 height: site.height,
             }),
             intervals,
+            interval: INTERVAL,
         }
     }
 
@@ -234,16 +242,25 @@ impl Mission {
         start: &ErrorVector,
         pair: &Pair,
     ) -> Result<Vec<Epoch>, NavigationStudyError> {
-        let sensed = pair.sensed()?;
+        self.errors_by(start, |_| pair.sensed())
+    }
+
+    /// The same where what is sensed is new in each interval, told by number.
+    fn errors_by(
+        &self,
+        start: &ErrorVector,
+        sensed: impl Fn(u32) -> Result<PerSensor<Sensed>, NavigationStudyError>,
+    ) -> Result<Vec<Epoch>, NavigationStudyError> {
         let steps = match &self.motion {
             Motion::Standing(_) => STANDING_STEPS,
             Motion::Moving(_) => MOVING_STEPS,
         };
-        let period = INTERVAL / f64::from(steps);
+        let period = self.interval / f64::from(steps);
         let mut course = Course::new(&self.motion, period);
         let mut navigation = Strapdown::new(course.truth().with_errors(start), period)?;
         let mut moments = vec![moment(0.0, &navigation, course.truth())];
         for interval in 1..=self.intervals {
+            let sensed = sensed(interval)?;
             for _ in 0..steps {
                 let ideal = course.advance();
                 let truth = course.truth();
@@ -257,7 +274,7 @@ impl Mission {
                 };
                 navigation.advance(&increments, held)?;
             }
-            let time = f64::from(interval) * INTERVAL;
+            let time = f64::from(interval) * self.interval;
             moments.push(moment(time, &navigation, course.truth()));
         }
         Ok(moments)
@@ -288,7 +305,7 @@ impl Mission {
             Motion::Standing(_) => 1,
             Motion::Moving(_) => LINEAR_STEPS,
         };
-        let step = INTERVAL / f64::from(steps);
+        let step = self.interval / f64::from(steps);
         // Each step is linearised in its middle.
         let mut course = Course::new(&self.motion, 0.5 * step);
         let mut sensitivity = start;
@@ -309,7 +326,7 @@ impl Mission {
                 sensitivity.advance(&linear.transition, &linear.sensed);
                 steady = is_steady.then_some(linear);
             }
-            let time = f64::from(interval) * INTERVAL;
+            let time = f64::from(interval) * self.interval;
             exposures.push(exposure(time, &sensitivity, course.truth())?);
         }
         Ok(exposures)

@@ -28,16 +28,16 @@ fn sensitivity(triad: &TriadRecord) -> Matrix3<f64> {
 }
 
 /// `N` of one triad.
-fn output(triad: &TriadRecord, u: Vector3<f64>) -> Vector3<f64> {
+pub fn output(triad: &TriadRecord, u: Vector3<f64>) -> Vector3<f64> {
     sensitivity(triad) * u + Vector3::from(triad.bias)
 }
 
-fn halves(six: &[f64; 6]) -> [Vector3<f64>; 2] {
+pub fn halves(six: &[f64; 6]) -> [Vector3<f64>; 2] {
     [0, 3].map(|k| Vector3::from_column_slice(&six[k..k + 3]))
 }
 
 /// A calibration of counts with every kind of error and test vectors.
-fn record() -> Calibration {
+pub fn record() -> Calibration {
     let gyro = TriadRecord {
         scale: [2.0651e6, 2.0598e6, 2.0634e6],
         installation: [
@@ -110,7 +110,7 @@ fn assert_calibrates(evaluate: impl Fn(&[f64; 6]) -> Vec<f64>) {
 }
 
 /// The numbers between brackets or braces, in order.
-fn numbers(text: &str) -> Vec<f64> {
+pub fn numbers(text: &str) -> Vec<f64> {
     text.split(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)))
         .filter_map(|word| word.parse().ok())
         .collect()
@@ -207,7 +207,7 @@ fn the_octave_function_gives_the_test_vectors() {
 }
 
 /// Keys of nested YAML mappings, joined by points, with the numbers below each.
-fn yaml(text: &str) -> BTreeMap<String, Vec<f64>> {
+pub fn yaml(text: &str) -> BTreeMap<String, Vec<f64>> {
     let mut path: Vec<(usize, String)> = Vec::new();
     let mut values = BTreeMap::<String, Vec<f64>>::new();
     for line in text.lines() {
@@ -236,7 +236,7 @@ fn yaml(text: &str) -> BTreeMap<String, Vec<f64>> {
 }
 
 /// The numbers of the comment that begins like this, in all its brackets.
-fn comment(text: &str, begin: &str) -> Vec<f64> {
+pub fn comment(text: &str, begin: &str) -> Vec<f64> {
     let line = text.lines().find(|l| l.starts_with(&format!("# {begin}")));
     let line = line.unwrap_or_else(|| panic!("no `{begin}` in {text}"));
     let lists = line.split('[').skip(1).filter_map(|l| l.split(']').next());
@@ -244,7 +244,7 @@ fn comment(text: &str, begin: &str) -> Vec<f64> {
 }
 
 /// What the comment says raw output is divided by, gyros first.
-fn divisors(text: &str) -> [Vector3<f64>; 2] {
+pub fn divisors(text: &str) -> [Vector3<f64>; 2] {
     halves(&comment(text, "divide the raw").try_into().unwrap())
 }
 
@@ -295,7 +295,7 @@ fn kalibrs_equations_measure_the_raw_output_of_the_test_vectors() {
 #[test]
 fn kalibr_holds_g_sensitivity_and_names_the_terms_that_it_does_not_hold() {
     let record = with_terms(record());
-    let Exported { text, notes } = exported(&record, Format::Kalibr);
+    let Exported { text, notes, .. } = exported(&record, Format::Kalibr);
     let divisors = divisors(&text);
     let [rate, force] = halves(&INPUTS[2]);
     let sensed = rate + Vector3::new(3e-7 * force.y, 0.0, -2e-7 * force.z);
@@ -341,7 +341,7 @@ fn kf_gins_compensates(text: &str, n: [Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
 #[test]
 fn kf_gins_gives_the_test_vectors_but_for_the_misalignment_that_the_file_states() {
     let record = record();
-    let Exported { text, notes } = exported(&record, Format::KfGins);
+    let Exported { text, notes, .. } = exported(&record, Format::KfGins);
     // The largest off-diagonal entry, of gyro y.
     assert!(
         notes[0].contains(&format!("{:.1} arcsec", 1.3e-3 / ARCSEC)),

@@ -16,6 +16,8 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
         "signal-hook",
         "terminal_size",
     ];
+    let of_logs = ["bzip2-rs", "lz4_flex", "ruzstd"];
+    let of_certificates = ["krilla", "ttf-parser"];
     let tree = |features: &[&str]| {
         let output = Command::new(env!("CARGO"))
             .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
@@ -29,11 +31,20 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
         let names = text.lines().filter_map(|line| line.split(' ').next());
         names.map(str::to_owned).collect::<Vec<String>>()
     };
-    let found = |names: Vec<String>| {
-        let of = of_interface.into_iter();
-        of.filter(|name| names.iter().any(|found| found == name))
-            .count()
+    let count = |of: &[&str], names: &[String]| {
+        let found = of
+            .iter()
+            .filter(|name| names.iter().any(|found| found == *name));
+        found.count()
     };
+    let found = |names: Vec<String>| count(&of_interface, &names);
+    assert_eq!(count(&of_logs, &tree(&["--no-default-features"])), 0);
+    assert_eq!(count(&of_logs, &tree(&[])), of_logs.len());
+    assert_eq!(
+        count(&of_certificates, &tree(&["--no-default-features"])),
+        0
+    );
+    assert_eq!(count(&of_certificates, &tree(&[])), of_certificates.len());
     assert_eq!(found(tree(&["--no-default-features"])), 0);
     assert_eq!(
         found(tree(&["--no-default-features", "--features", "report"])),

@@ -58,14 +58,9 @@ pub(super) fn triads_and_attitudes(
         dwells.map(|d| d.mean(Sensor::Gyro, stretch.run)).collect()
     };
     let rests: Vec<Vec<MeanOutput>> = stretches.iter().map(rests).collect();
-    let mut at = Linearisation {
-        triads: *triads,
-        terms: TermVector::zeros(),
-        initial_attitudes: directions(triads)?
-            .iter()
-            .map(|up| level(&up[0].direction))
-            .collect(),
-    };
+    let initial = directions(triads)?;
+    let initial = initial.iter().map(|up| level(&up[0].direction)).collect();
+    let mut at = Linearisation::new(*triads, TermVector::zeros(), initial);
     // Within Earth rate the output at rest is the bias.
     let outputs: Vector3<f64> = rests.iter().flatten().map(|rest| rest.output).sum();
     at.triads.gyro.bias = outputs / rests.iter().map(Vec::len).sum::<usize>() as f64;

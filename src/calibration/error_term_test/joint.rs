@@ -11,6 +11,7 @@ use super::super::parameters::{PARAMETERS, ParameterVector};
 use super::super::pass::{Gate, Mode, PassResult, Tried, pass_trying};
 use super::super::problem::Problem;
 use super::evidence::Evidence;
+use super::left_off::LeftOff;
 
 /// How well a calibration fits, and variance of the parameters of both triads.
 pub(super) struct Fit {
@@ -101,6 +102,30 @@ impl Joint {
             fit.variance[p] += by.dot(&(&covariance * &by));
         }
         Some(fit)
+    }
+
+    /// What a term that is off changes the parameters by; none where it is not tried.
+    pub fn left_off(&self, term: ErrorTerm) -> Option<LeftOff> {
+        let tried = self.tried.as_ref()?;
+        let numbers = self.numbers(&[term]);
+        let sigma = |i: usize| self.prior_sigma[numbers[i]];
+        let effect = DMatrix::from_fn(PARAMETERS, numbers.len(), |p, i| {
+            tried.of_parameters[(p, numbers[i])]
+        });
+        let usual = ParameterVector::from_fn(|p, _| {
+            let row = effect.row(p);
+            let of = row.iter().enumerate();
+            of.map(|(i, x)| (x * sigma(i)).powi(2)).sum::<f64>().sqrt()
+        });
+        let (_, covariance) = self.estimate(tried, &numbers)?;
+        let score = DVector::from_fn(numbers.len(), |i, _| tried.score[numbers[i]]);
+        let mean = &effect * (&covariance * score);
+        let shown = ParameterVector::from_fn(|p, _| {
+            let of = effect.row(p);
+            let variance = (of * &covariance * of.transpose())[(0, 0)];
+            variance.max(0.0).sqrt().hypot(mean[p])
+        });
+        (!numbers.is_empty()).then_some(LeftOff { usual, shown })
     }
 
     /// What a term explains where these others are on.

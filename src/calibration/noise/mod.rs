@@ -19,6 +19,7 @@ mod source;
 pub(super) use fit::LOG_SIGMA;
 pub(super) use learn::{Learnt, learn};
 pub use policy::NoisePolicy;
+pub(super) use replay::{Event, Script};
 pub use report::{NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;
 

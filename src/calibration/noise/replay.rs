@@ -3,43 +3,60 @@
 
 use super::super::error::CalibrationError;
 use super::super::layout::Layout;
-use super::super::linearisation::{AttitudePrior, Linearisation};
+use super::super::linearisation::{AttitudePrior, Linearisation, Start};
 use super::super::model::Model;
-use super::super::parameters::to_vector;
 use super::super::pass::{
-    Filter, Innovations, Measurement, Observer, ScalarInnovation, Seen, Segment, Taken, Verdict,
-    begin, moves, navigator, segments,
+    Filter, Innovations, Measurement, Observer, PriorErrors, ScalarInnovation, Seen, Segment,
+    Taken, Verdict, begin, moves, navigator, segments,
 };
 use super::super::problem::{Problem, Stretch};
 use crate::imu::{PerSensor, Sensor};
 use crate::navigation::{Block, State};
 
 /// What a pass does at one point of linearisation, whatever the noise.
-pub(super) struct Script<'a> {
+pub(in crate::calibration) struct Script<'a> {
     at: &'a Linearisation,
     priors: &'a [AttitudePrior],
     /// Of each stretch.
     events: Vec<Vec<Event>>,
 }
 
-enum Event {
+pub(in crate::calibration) enum Event {
     Move(Box<Block>),
     Rest(Box<Rest>),
 }
 
 /// A part of a dwell.
-struct Rest {
+pub(in crate::calibration) struct Rest {
     /// Whether it is the dwell's first.
     first: bool,
     new_position: bool,
     /// Computed state at its begin; where the pass linearises instead is the segment's.
     from: State,
-    segment: Segment,
+    pub segment: Segment,
+}
+
+impl Rest {
+    /// What a filter of this model does before it takes in what is observed.
+    pub fn begin(&self, filter: &mut Filter, model: &Model, stretch: &Stretch) {
+        if self.first {
+            filter.come_to_rest(&self.from);
+        }
+        filter.refer(&self.from, &self.segment.begin);
+        if self.first {
+            filter.begin_to_hold();
+        }
+        if self.new_position {
+            filter.redraw_table(model.position_sigma);
+            let variance = stretch.variance.position;
+            filter.update(&Measurement::position(&self.segment.begin, variance));
+        }
+    }
 }
 
 /// What the noise of moves grows with, over all moves.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Moves {
+pub(in crate::calibration) struct Moves {
     /// s
     pub duration: f64,
     /// ∫|ω − ω_ie|² dt and ∫|f + g|² dt.
@@ -47,7 +64,7 @@ pub(super) struct Moves {
 }
 
 /// A replay's innovations.
-pub(super) struct Replay {
+pub(in crate::calibration) struct Replay {
     /// Of observations that were let in, in order.
     pub scalars: Vec<ScalarInnovation>,
     /// Squared whitened innovation of every observation of three components, let in or not.
@@ -72,7 +89,7 @@ impl<'a> Script<'a> {
         let layout = Layout::new(&problem.model);
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
         let events = stretches.map(|(stretch, initial)| {
-            let mut navigator = navigator(stretch, at, initial, &layout)?;
+            let mut navigator = navigator(stretch, at, initial, (&problem.model, &layout))?;
             let mut held = *initial;
             let mut events = Vec::new();
             let mut next = 0;
@@ -91,8 +108,9 @@ impl<'a> Script<'a> {
                     next += part.len();
                     let of = (problem, stretch);
                     let from = navigator.state;
-                    if let Some((_, at_rest)) = part.first() {
-                        navigator.state = at_rest.tied(&from, &at.triads.accel);
+                    if let (Some((begin, at_rest)), Some((end, _))) = (part.first(), part.last()) {
+                        navigator.warm(&(begin.samples.start..end.samples.end));
+                        navigator.state = at_rest.tied(&from, &navigator.triads().accel);
                     }
                     if first {
                         held = navigator.state.attitude;
@@ -115,6 +133,30 @@ impl<'a> Script<'a> {
         })
     }
 
+    /// A filter of a model before the first stretch.
+    pub fn filter(&self, model: &Model) -> Filter {
+        Filter::new(model, &PriorErrors::at(model, self.at))
+    }
+
+    /// Where it linearises.
+    pub fn at(&self) -> &'a Linearisation {
+        self.at
+    }
+
+    /// Each stretch of the problem with what happens in it and how it starts.
+    pub fn stretches<'p>(
+        &'p self,
+        problem: &'p Problem<'a>,
+    ) -> impl Iterator<Item = (&'p Stretch<'a>, Start, &'p [Event])> {
+        let stretches = problem.stretches().iter().zip(self.priors);
+        let of_each = self.events.iter().zip(&self.at.initial_attitudes);
+        stretches
+            .zip(of_each)
+            .map(|((stretch, prior), (events, initial))| {
+                (stretch, stretch.start(prior, initial), events.as_slice())
+            })
+    }
+
     /// What noise of moves grows with.
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();
@@ -135,22 +177,18 @@ impl<'a> Script<'a> {
     /// three components whether it is let in; those beyond its end are.
     pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
         let model = &problem.model;
-        let parameters = model.prior_mean - to_vector(&self.at.triads);
         let mut pass = Pass {
             model,
             accepted,
-            filter: Filter::new(model, &parameters, &-self.at.terms),
+            filter: self.filter(model),
             replay: Replay {
                 scalars: Vec::new(),
                 distances: Vec::new(),
             },
         };
         let mut before = None;
-        let stretches = problem.stretches().iter().zip(self.priors);
-        let of_each = self.events.iter().zip(&self.at.initial_attitudes);
-        for ((stretch, prior), (events, initial)) in stretches.zip(of_each) {
-            let start = stretch.start(prior, initial);
-            begin(&mut pass.filter, model, before, stretch, &start);
+        for (stretch, start, events) in self.stretches(problem) {
+            begin(&mut pass.filter, model, before, stretch, &start, self.at);
             before = Some(stretch);
             for event in events {
                 match event {
@@ -174,18 +212,7 @@ struct Pass<'a> {
 impl Pass<'_> {
     fn rest(&mut self, stretch: &Stretch, rest: &Rest) -> Result<(), CalibrationError> {
         let (filter, segment) = (&mut self.filter, &rest.segment);
-        if rest.first {
-            filter.come_to_rest(&rest.from);
-        }
-        filter.refer(&rest.from, &segment.begin);
-        if rest.first {
-            filter.begin_to_hold();
-        }
-        if rest.new_position {
-            filter.redraw_table(self.model.position_sigma);
-            let variance = stretch.variance.position;
-            filter.update(&Measurement::position(&segment.begin, variance));
-        }
+        rest.begin(filter, self.model, stretch);
         let mut decided = Decided {
             stretch,
             model: self.model,

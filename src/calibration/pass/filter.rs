@@ -1,10 +1,14 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
+mod back;
 mod propagation;
 mod standing;
+mod tape;
 mod update;
 
+pub(in crate::calibration) use back::{Effect, Followed, Told};
 pub(in crate::calibration) use standing::{Innovations, Observer, Taken, Verdict};
+pub(in crate::calibration) use tape::{Driver, Operation};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -13,10 +17,10 @@ use super::sensitivity::Sensitivity;
 use crate::attitude::skew;
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
-use crate::calibration::linearisation::Start;
+use crate::calibration::linearisation::{Linearisation, Start};
 use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
-use crate::imu::{PerSensor, TermVector};
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector, to_vector};
+use crate::imu::{PerSensor, TermVector, ThermalCoefficients};
 use crate::navigation::{ProcessNoise, State};
 
 /// Mean and covariance of the errors.
@@ -30,23 +34,33 @@ pub(in crate::calibration) struct Filter {
     turning: f64,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
+    /// 1σ by which each parameter differs between recordings.
+    own_sigma: ParameterVector,
     /// What auxiliary parameters that are tried would do.
     pub sensitivity: Option<Sensitivity>,
+    /// What was done to the errors, where that is kept.
+    tape: Option<Vec<Operation>>,
 }
 
 impl Filter {
-    /// Before the first stretch begins: `parameters` and `terms` are the means of their errors.
-    pub fn new(model: &Model, parameters: &ParameterVector, terms: &TermVector) -> Self {
+    /// Before the first stretch begins, with the means of what is constant.
+    pub fn new(model: &Model, errors: &PriorErrors) -> Self {
         let layout = Layout::new(model);
         let n = layout.size();
         let (mut x, mut p) = (DVector::zeros(n), DMatrix::zeros(n, n));
         for (state, index) in layout.parameters() {
-            x[state] = parameters[index];
+            x[state] = errors.parameters[index];
             p[(state, state)] = model.prior_sigma[index].powi(2);
         }
         for (state, index) in layout.terms() {
-            x[state] = terms[index];
+            x[state] = errors.terms[index];
             p[(state, state)] = model.term_sigma[index].powi(2);
+        }
+        if let Some(thermal) = model.thermal.as_deref() {
+            for (state, coefficient) in layout.thermal() {
+                x[state] = coefficient.of(&errors.thermal);
+                p[(state, state)] = coefficient.of(&thermal.sigma).powi(2);
+            }
         }
         if let Some(base) = layout.table_base() {
             for axis in 0..3 {
@@ -68,7 +82,9 @@ impl Filter {
             turning: model.turning_at_rest,
             noise: model.process_noise(),
             varying,
+            own_sigma: model.own_sigma,
             sensitivity: None,
+            tape: None,
         }
     }
 
@@ -80,10 +96,17 @@ impl Filter {
         self
     }
 
-    /// A stretch begins: navigation errors and the table's position start anew, `anew` tells whether the
+    /// A stretch begins: navigation errors and the table's position start anew. In another recording the
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, as in another recording; `gravity` is its 1σ at another site.
-    pub fn begin(&mut self, start: &Start, table_sigma: f64, anew: bool, gravity: Option<f64>) {
+    /// 4th ed., §3.8) does, too, and what is of the recording, whose means `anew` tells; `gravity` is its 1σ at
+    /// another site.
+    pub fn begin(
+        &mut self,
+        start: &Start,
+        table_sigma: f64,
+        anew: Option<&ParameterVector>,
+        gravity: Option<f64>,
+    ) {
         let initial = self.layout.initial_attitude();
         for axis in 0..3 {
             for (first, mean, sigma) in [
@@ -100,15 +123,24 @@ impl Filter {
             let variance = start.attitude_sigma[axis].powi(2);
             self.p[(ATTITUDE + axis, initial + axis)] = variance;
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Drawn {
+                    states: vec![ATTITUDE + axis, initial + axis],
+                    sigma: start.attitude_sigma[axis],
+                });
+            }
         }
         self.redraw_table(table_sigma);
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
             self.redraw(state, 0.0, sigma);
         }
-        if anew {
+        if let Some(means) = anew {
             for k in 0..self.varying.len() {
                 let (state, sigma, _) = self.varying[k];
                 self.redraw(state, 0.0, sigma);
+            }
+            for (state, index) in self.layout.own().collect::<Vec<_>>() {
+                self.redraw(state, means[index], self.own_sigma[index]);
             }
         }
     }
@@ -118,6 +150,10 @@ impl Filter {
         self.x[state] = mean;
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.redraw(state);
+        }
+        if let Some(tape) = &mut self.tape {
+            let states = vec![state];
+            tape.push(Operation::Drawn { states, sigma });
         }
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
@@ -149,6 +185,9 @@ impl Filter {
     pub fn come_to_rest(&mut self, computed: &State) {
         for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
             let turn = skew(-computed);
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Turned { first, by: turn });
+            }
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;
@@ -241,6 +280,15 @@ impl Filter {
         all
     }
 
+    /// Mean of the errors of the coefficients of temperature; zero where off.
+    pub fn thermal(&self) -> PerSensor<ThermalCoefficients> {
+        let mut all = PerSensor::<ThermalCoefficients>::default();
+        for (state, coefficient) in self.layout.thermal() {
+            *coefficient.of_mut(&mut all) = self.x[state];
+        }
+        all
+    }
+
     /// Mean and covariance of the errors of what is constant throughout a recording.
     pub fn constants(&self) -> Posterior {
         let states: Vec<usize> = self.layout.constants().collect();
@@ -276,6 +324,34 @@ impl Filter {
     /// Mean of the initial attitude error φ₀ of this stretch.
     pub fn initial_attitude(&self) -> Vector3<f64> {
         self.at(self.layout.initial_attitude())
+    }
+}
+
+/// Means of the errors of what is constant, where a pass linearises away from the prior's mean.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct PriorErrors {
+    pub parameters: ParameterVector,
+    pub terms: TermVector,
+    pub thermal: PerSensor<ThermalCoefficients>,
+}
+
+impl PriorErrors {
+    /// Where a pass begins with what is known.
+    pub fn none() -> Self {
+        Self {
+            parameters: ParameterVector::zeros(),
+            terms: TermVector::zeros(),
+            thermal: PerSensor::default(),
+        }
+    }
+
+    /// At a point of linearisation.
+    pub fn at(model: &Model, at: &Linearisation) -> Self {
+        Self {
+            parameters: model.prior_mean - to_vector(&at.triads),
+            terms: -at.terms,
+            thermal: PerSensor::from_fn(|sensor| -at.thermal.get(sensor)),
+        }
     }
 }
 

@@ -51,10 +51,18 @@ pub(super) struct Given<const G: usize> {
 }
 
 impl<const G: usize> Given<G> {
+    /// Exactly this.
+    pub fn certain() -> Self {
+        Self {
+            mean: [0.0; G],
+            roots: [[0.0; G]; G],
+        }
+    }
+
     pub fn new(mean: [f64; G], covariance: [[f64; G]; G]) -> Self {
         let mut roots = [[0.0; G]; G];
         let factor = factor(covariance, [0.0; G]);
-        for (root, (row, _)) in roots.iter_mut().zip(factor) {
+        for (root, (_, row, _)) in roots.iter_mut().zip(factor) {
             *root = row;
         }
         Self { mean, roots }
@@ -68,15 +76,18 @@ struct Information<const G: usize> {
 }
 
 /// An innovation, and what taking it in needs.
+#[derive(Clone)]
 pub(super) struct Look<const M: usize, const G: usize> {
     /// In units of its own σ, its components independent.
     pub whitened: Vector3<f64>,
     /// Lower triangular root of its covariance, on the diagonal.
     pub sigma: Vector3<f64>,
+    /// Lower triangular root of the covariance of the observation where `g` is given.
+    pub root: Matrix3<f64>,
     /// Given `g`: rows of `g` and residuals, whitened, and what they gain of the navigation errors.
-    rows: [[f64; G]; 3],
+    pub rows: [[f64; G]; 3],
     residual: Vector3<f64>,
-    gain: [[f64; M]; 3],
+    pub gain: [[f64; M]; 3],
     /// The rows times the roots of what is known of `g`.
     by_roots: [[f64; G]; 3],
 }
@@ -167,6 +178,7 @@ impl<const M: usize, const G: usize> Local<M, G> {
         whitened.norm_squared().is_finite().then_some(Look {
             whitened,
             sigma: root.diagonal().component_mul(&root_of_given.diagonal()),
+            root,
             rows,
             residual,
             gain,
@@ -189,6 +201,14 @@ impl<const M: usize, const G: usize> Local<M, G> {
             }
         }
         self.given.take(look.rows, look.residual, look.by_roots);
+    }
+
+    /// Rows of what is measured of `g`, each with the component that it took out: the rows after it have
+    /// none of that.
+    pub fn measured(self) -> Vec<(usize, [f64; G])> {
+        let Information { matrix, vector } = self.information;
+        let rows = factor(matrix, vector);
+        rows.map(|(pivot, row, _)| (pivot, row)).collect()
     }
 
     pub fn outcome(self) -> Outcome {
@@ -239,17 +259,24 @@ impl<const G: usize> Information<G> {
     /// Rows of `g` with what each measures, of σ 1, that say the same.
     fn rows(self) -> Vec<(Vec<f64>, f64)> {
         let rows = factor(self.matrix, self.vector);
-        rows.map(|(row, value)| (row.into(), value)).collect()
+        rows.map(|(_, row, value)| (row.into(), value)).collect()
     }
 }
 
-/// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector: Cholesky's
+/// Roots r of a covariance, `Σ r rᵀ` over these.
+pub(super) fn roots<const N: usize>(covariance: [[f64; N]; N]) -> Vec<[f64; N]> {
+    let rows = factor(covariance, [0.0; N]);
+    rows.map(|(_, row, _)| row).collect()
+}
+
+/// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector, each after the component
+/// that it takes out: Cholesky's
 /// factorisation, the largest of what is left first, until rounding is all that is left (Golub and Van Loan,
 /// *Matrix Computations*, 4th ed., §4.2.8).
 fn factor<const N: usize>(
     mut matrix: [[f64; N]; N],
     mut vector: [f64; N],
-) -> impl Iterator<Item = ([f64; N], f64)> {
+) -> impl Iterator<Item = (usize, [f64; N], f64)> {
     let diagonal: [f64; N] = std::array::from_fn(|k| matrix[k][k]);
     let mut left: Vec<usize> = (0..N).filter(|&k| diagonal[k] > 0.0).collect();
     std::iter::from_fn(move || {
@@ -272,7 +299,7 @@ fn factor<const N: usize>(
             add(&mut matrix[component], -weight, &row);
             vector[component] -= weight * value;
         }
-        Some((row, value))
+        Some((pivot, row, value))
     })
 }
 

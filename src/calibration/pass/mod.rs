@@ -1,8 +1,8 @@
 //! One pass of the filter over all stretches: with feedback as it goes, or linearised at a given point.
 
+mod earlier;
 mod filter;
 mod gate;
-mod initial_attitude;
 mod local;
 mod measurement;
 mod mode;
@@ -12,20 +12,20 @@ mod segment;
 mod sensitivity;
 mod stretch;
 
-use super::auxiliary::auxiliary_vector;
 use super::error::CalibrationError;
 use super::linearisation::{AttitudePrior, Linearisation, Start};
 use super::model::Model;
-use super::parameters::{ParameterVector, to_vector};
 use super::problem::{Problem, Stretch};
-use crate::imu::TermVector;
-pub(super) use filter::{Filter, Innovations, Observer, Taken, Verdict};
-use initial_attitude::InitialAttitude;
+use earlier::Earlier;
+pub(super) use filter::{
+    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Taken, Told,
+    Verdict,
+};
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
 use posteriors::Posteriors;
-pub use result::Epoch;
 use result::Sums;
+pub use result::{Epoch, Own};
 pub(super) use result::{PassResult, Tried};
 pub(super) use segment::{Seen, Segment, moves, segments};
 use stretch::OneStretch;
@@ -52,21 +52,22 @@ pub(super) fn pass_trying(
     let model = &problem.model;
     // The prior keeps its own mean, wherever the pass linearises; a pass with feedback begins at the
     // point it is given and finds its way from there.
-    let (parameters, terms) = match mode {
-        Mode::Feedback => (ParameterVector::zeros(), TermVector::zeros()),
-        Mode::Held(_) => (model.prior_mean - to_vector(&at.triads), -at.terms),
+    let errors = match mode {
+        Mode::Feedback => PriorErrors::none(),
+        Mode::Held(_) => PriorErrors::at(model, at),
     };
     let mut sums = Sums {
         at: at.clone(),
-        filter: Filter::new(model, &parameters, &terms).trying(tried),
+        filter: Filter::new(model, &errors).trying(tried),
         innovations: Vec::new(),
         history: Vec::new(),
         posteriors: Posteriors::default(),
         cost: 0.0,
         log_determinant: 0.0,
+        attitudes: Vec::new(),
+        own: Vec::new(),
     };
     let mut before = None;
-    let mut attitudes = Vec::new();
     for (number, (stretch, prior)) in problem.stretches().iter().zip(priors).enumerate() {
         let known = match mode {
             // The given point is where it begins.
@@ -77,7 +78,7 @@ pub(super) fn pass_trying(
             Mode::Held(_) => *prior,
         };
         let start = stretch.start(&known, &at.initial_attitudes[number]);
-        begin(&mut sums.filter, model, before, stretch, &start);
+        begin(&mut sums.filter, model, before, stretch, &start, at);
         if before.is_none() {
             sums.posteriors.begin(sums.filter.constants());
         }
@@ -85,12 +86,17 @@ pub(super) fn pass_trying(
         let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
         one.run()?;
         sums = one.sums;
-        if number + 1 < problem.stretches().len() {
-            attitudes.push(InitialAttitude::of(&sums.filter, mode));
+        let (filter, next) = (&sums.filter, problem.stretches().get(number + 1));
+        let initial = filter.layout.initial_attitude();
+        let initial: Vec<usize> = (initial..initial + 3).collect();
+        sums.attitudes.push(Earlier::of(filter, mode, &initial));
+        let own: Vec<usize> = filter.layout.own().map(|(state, _)| state).collect();
+        let ends = next.is_none_or(|next| next.recording != stretch.recording);
+        if ends && !own.is_empty() {
+            sums.own.push(Earlier::of(filter, mode, &own));
         }
     }
-    let prior_sigma = auxiliary_vector(&model.geometry.vector(), &model.term_sigma);
-    Ok(sums.result(prior_sigma, &attitudes))
+    Ok(sums.result(model))
 }
 
 /// A stretch begins after another: what is of another recording or site starts anew.
@@ -100,9 +106,11 @@ pub(super) fn begin(
     before: Option<&Stretch>,
     stretch: &Stretch,
     start: &Start,
+    at: &Linearisation,
 ) {
     let anew = before.is_none_or(|before| before.recording != stretch.recording);
+    let anew = anew.then(|| -at.own(stretch.recording));
     let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
     let gravity = moved.then_some(stretch.run.site.gravity_sigma);
-    filter.begin(start, model.position_sigma, anew, gravity);
+    filter.begin(start, model.position_sigma, anew.as_ref(), gravity);
 }

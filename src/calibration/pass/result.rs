@@ -2,20 +2,22 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::earlier::Earlier;
 use super::filter::Filter;
-use super::initial_attitude::InitialAttitude;
 use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
-use crate::calibration::auxiliary::{Auxiliary, AuxiliaryVector};
+use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::innovation::Innovation;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
+use crate::calibration::model::Model;
 use crate::calibration::observability::AttitudeCovariance;
 use crate::calibration::parameters::{
     PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };
-use crate::imu::TermVector;
+use crate::calibration::thermal::{Coefficient, Thermal};
+use crate::imu::{PerSensor, TermVector, ThermalCoefficients};
 use crate::turntable::TABLE_GEOMETRY;
 
 /// Estimate and σ at one time of a pass.
@@ -39,6 +41,10 @@ pub(in crate::calibration) struct PassResult {
     pub covariance: ParameterMatrix,
     /// Parameters of error terms and table.
     pub auxiliary: Auxiliary,
+    /// How parameters change with temperature, where they do.
+    pub thermal: Option<Thermal>,
+    /// By how much each recording differs from what all have in common; none where nothing does.
+    pub own: Vec<Own>,
     /// Mean and 1σ of the error of gravity, true − stated, m/s².
     pub gravity: (f64, f64),
     /// Of the initial attitude of the last stretch.
@@ -70,6 +76,15 @@ pub(in crate::calibration) struct Tried {
     pub of_parameters: DMatrix<f64>,
 }
 
+/// By how much the parameters of a recording differ from what all recordings have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Own {
+    /// Normalised as the parameters.
+    pub values: ParameterVector,
+    /// 1σ of each; zero where it is common to all.
+    pub sigma: ParameterVector,
+}
+
 /// What a pass has come to so far.
 #[derive(Debug, Clone)]
 pub(super) struct Sums {
@@ -80,6 +95,10 @@ pub(super) struct Sums {
     pub posteriors: Posteriors,
     pub cost: f64,
     pub log_determinant: f64,
+    /// What is of each recording that has ended.
+    pub own: Vec<Earlier>,
+    /// Initial attitude of each stretch that has ended.
+    pub attitudes: Vec<Earlier>,
 }
 
 impl Sums {
@@ -91,11 +110,7 @@ impl Sums {
         }
     }
 
-    pub fn result(
-        mut self,
-        prior_sigma: AuxiliaryVector,
-        earlier: &[InitialAttitude],
-    ) -> PassResult {
+    pub fn result(mut self, model: &Model) -> PassResult {
         let tried = self.filter.sensitivity.take().map(|sensitivity| {
             let states = self.filter.layout.parameters();
             let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();
@@ -112,12 +127,31 @@ impl Sums {
         });
         let filter = &self.filter;
         let form = self.at.triads.gyro.form;
-        let errors = earlier.iter().map(|attitude| attitude.smoothed(filter));
-        let errors = errors.chain([filter.initial_attitude()]);
+        let own = self.own.iter().enumerate().map(|(recording, own)| {
+            let (mean, covariance) = own.smoothed(filter);
+            let mut own = Own {
+                values: self.at.own(recording),
+                sigma: ParameterVector::zeros(),
+            };
+            for (k, (_, index)) in filter.layout.own().enumerate() {
+                own.values[index] += mean[k];
+                own.sigma[index] = covariance[(k, k)].max(0.0).sqrt();
+            }
+            own
+        });
+        let own: Vec<Own> = own.collect();
+        let errors = self.attitudes.iter().map(|attitude| {
+            let (mean, _) = attitude.smoothed(filter);
+            Vector3::from_column_slice(mean.as_slice())
+        });
         let attitudes = self.at.initial_attitudes.iter().zip(errors);
         let estimate = Linearisation {
             triads: from_vector(form, &(to_vector(&self.at.triads) + filter.parameters())),
             terms: self.at.terms + filter.terms(),
+            thermal: PerSensor::from_fn(|sensor| {
+                self.at.thermal.get(sensor) + filter.thermal().get(sensor)
+            }),
+            own: own.iter().map(|own| own.values).collect(),
             initial_attitudes: attitudes
                 .map(|(at, error): (&Matrix3<f64>, _)| from_tilt_and_heading(&error) * at)
                 .collect(),
@@ -134,7 +168,9 @@ impl Sums {
         PassResult {
             estimate,
             covariance: filter.parameter_covariance(),
-            auxiliary: auxiliary(filter, &self.at.terms, prior_sigma),
+            auxiliary: auxiliary(filter, &self.at.terms, model),
+            thermal: thermal(filter, &self.at.thermal, model),
+            own,
             gravity: filter.gravity(),
             attitude_covariance,
             attitude_sigma,
@@ -177,6 +213,16 @@ impl PassResult {
                 self.auxiliary.cross[(index, i)] = covariance(parameter, row);
             }
         }
+        if let Some(thermal) = &mut self.thermal {
+            for (k, (row, _)) in layout.thermal().enumerate() {
+                for (l, (column, _)) in layout.thermal().enumerate() {
+                    thermal.covariance[(k, l)] = covariance(row, column);
+                }
+                for (parameter, index) in layout.parameters() {
+                    thermal.cross[(index, k)] = covariance(parameter, row);
+                }
+            }
+        }
         if let Some(gravity) = layout.gravity() {
             self.gravity.1 = covariance(gravity, gravity).sqrt();
         }
@@ -184,10 +230,10 @@ impl PassResult {
 }
 
 /// Estimates of error terms and table, those of terms off `at` where the pass linearises.
-fn auxiliary(filter: &Filter, at: &TermVector, prior_sigma: AuxiliaryVector) -> Auxiliary {
+fn auxiliary(filter: &Filter, at: &TermVector, model: &Model) -> Auxiliary {
     let layout = &filter.layout;
     let mut auxiliary = Auxiliary {
-        prior_sigma,
+        prior_sigma: auxiliary_vector(&model.geometry.vector(), &model.term_sigma),
         ..Auxiliary::default()
     };
     let states = auxiliary_states(layout);
@@ -202,6 +248,26 @@ fn auxiliary(filter: &Filter, at: &TermVector, prior_sigma: AuxiliaryVector) -> 
         }
     }
     auxiliary
+}
+
+/// Estimates of the coefficients of temperature, where there are any.
+fn thermal(filter: &Filter, at: &PerSensor<ThermalCoefficients>, model: &Model) -> Option<Thermal> {
+    let of_model = model.thermal.as_deref()?;
+    let (states, coefficients): (Vec<usize>, Vec<Coefficient>) = filter.layout.thermal().unzip();
+    let n = states.len();
+    let mut cross = DMatrix::zeros(PARAMETERS, n);
+    for (parameter, index) in filter.layout.parameters() {
+        for (k, &state) in states.iter().enumerate() {
+            cross[(index, k)] = filter.covariance(parameter, state);
+        }
+    }
+    Some(Thermal {
+        model: of_model.clone(),
+        values: DVector::from_fn(n, |k, _| coefficients[k].of(at) + filter.mean(states[k])),
+        covariance: DMatrix::from_fn(n, n, |i, j| filter.covariance(states[i], states[j])),
+        cross,
+        coefficients,
+    })
 }
 
 /// State and index among the auxiliary parameters of each that is on.

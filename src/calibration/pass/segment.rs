@@ -119,6 +119,10 @@ impl Segment {
             steps: Vec::with_capacity(steps.len()),
         };
         let imu = &stretch.run.recording.imu;
+        let ends = steps.first().zip(steps.last());
+        let whole = ends.map_or(0..0, |((first, _), (last, _))| {
+            first.samples.start..last.samples.end
+        });
         // What the last model is of: so many samples, none of them interpolated.
         let mut alike = None;
         for (step, at_rest) in steps {
@@ -136,8 +140,10 @@ impl Segment {
                     false => navigator.state.attitude,
                 };
                 alike = (!bridged).then_some(samples.len());
+                navigator.warm(&whole);
                 segment.models.push(navigator.standing(&attitude, samples));
             }
+            navigator.warm(&step.samples);
             navigator.stand(&at_rest.sums);
             let computed = &navigator.state;
             let seen = problem.observed(step).filter_map(|kind| {

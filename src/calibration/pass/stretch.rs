@@ -12,6 +12,7 @@ use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
+use crate::calibration::model::Model;
 use crate::calibration::parameters::{from_vector, to_vector};
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::schedule::{AtRest, Step};
@@ -52,7 +53,7 @@ pub(in crate::calibration) fn navigator<'a>(
     stretch: &Stretch<'a>,
     at: &Linearisation,
     initial: &Matrix3<f64>,
-    layout: &Layout,
+    (model, layout): (&Model, &Layout),
 ) -> Result<Navigator<'a>, CalibrationError> {
     let run = stretch.run;
     let tried = layout.tried_terms();
@@ -62,9 +63,14 @@ pub(in crate::calibration) fn navigator<'a>(
         values: at.terms,
     };
     let start = State::at_rest(*initial);
-    let navigator = Navigator::new(&run.recording.imu, &run.site, &at.triads, start);
-    let navigator = navigator.ok_or_else(|| singular(&at.triads))?;
-    Ok(navigator.with_terms(terms))
+    let triads = at.in_recording(stretch.recording);
+    let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, start);
+    let navigator = navigator.ok_or_else(|| singular(&triads))?;
+    let navigator = navigator.with_terms(terms);
+    Ok(match &model.thermal {
+        Some(thermal) => navigator.with_thermal(thermal.clone(), at.thermal),
+        None => navigator,
+    })
 }
 
 impl<'a> OneStretch<'a> {
@@ -76,7 +82,8 @@ impl<'a> OneStretch<'a> {
         sums: Sums,
     ) -> Result<Self, CalibrationError> {
         let initial = sums.at.initial_attitudes[number];
-        let navigator = navigator(stretch, &sums.at, &initial, &sums.filter.layout)?;
+        let of = (&problem.model, &sums.filter.layout);
+        let navigator = navigator(stretch, &sums.at, &initial, of)?;
         Ok(Self {
             problem,
             stretch,
@@ -178,14 +185,15 @@ impl<'a> OneStretch<'a> {
         first: bool,
         new_position: bool,
     ) -> Result<bool, CalibrationError> {
-        let Some(&(_, at_rest)) = steps.first() else {
+        let (Some(&(begin, at_rest)), Some((end, _))) = (steps.first(), steps.last()) else {
             return Ok(true);
         };
+        self.navigator.warm(&(begin.samples.start..end.samples.end));
         let (problem, stretch) = (self.problem, self.stretch);
         let filter = &mut self.sums.filter;
         let held = matches!(self.mode, Mode::Held(_));
         if held {
-            let tied = at_rest.tied(&self.navigator.state, &self.sums.at.triads.accel);
+            let tied = at_rest.tied(&self.navigator.state, &self.navigator.triads().accel);
             if first {
                 filter.come_to_rest(&self.navigator.state);
             }

@@ -6,8 +6,8 @@ use turncal::formats::JobKind;
 use turncal::imu::BodyFrame;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
-use turncal::simulation::Scenario;
-use turncal::study::AccuracyStudy;
+use turncal::simulation::{Scenario, SimulatedCampaign};
+use turncal::study::{AccuracyStudy, CampaignStudy};
 
 use super::super::error_term::TermArgument;
 use super::super::estimation::{Aiding, Installation, Noise};
@@ -22,17 +22,19 @@ use super::super::sharding::Sharding;
 /// calibrates each by the filter and, on the paper's static positions, by the closed form. Shows the
 /// RMS error of each group, and of the position after 40 h of navigation, against the Cramér–Rao bound
 /// and against the closed form, and whether the filter's σ are true (NEES, NIS, position errors within
-/// their predicted σ). A run on which the filter fails is counted, not dropped.
+/// their predicted σ). Of a campaign it shows parameters at the reference temperature, coefficients and the
+/// orders that were chosen. A run on which the filter fails is counted, not dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
   turncal study accuracy nineteen-position --runs 200 -o nineteen
+  turncal study accuracy five-soaks --runs 200
   turncal study accuracy --installation three-angle \\
       --truth-installation three-angle
   turncal study accuracy real-table --unmodelled table-base,table-axes
   turncal study accuracy --with accel-second-order,size-effect")]
 pub struct Accuracy {
-    /// Scenario: a TOML file or an embedded name
+    /// Scenario or campaign: a TOML file or an embedded name
     #[arg(default_value = "demo")]
     scenario: String,
     /// Another path for it: a TOML file or an embedded name
@@ -57,6 +59,9 @@ pub struct Accuracy {
     /// Which noise the filter uses; what a scenario states is right
     #[arg(long, value_enum, default_value_t = Noise::Stated)]
     noise: Noise,
+    /// In a campaign, do not let biases follow the rate of temperature
+    #[arg(long)]
+    without_rate: bool,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
@@ -71,6 +76,9 @@ pub struct Accuracy {
 
 impl Accuracy {
     pub fn run(&self) -> anyhow::Result<()> {
+        if SimulatedCampaign::is_named(&self.scenario) {
+            return self.campaign();
+        }
         let mut scenario = Scenario::load(&self.scenario)?;
         scenario.body_frame = match self.aiding {
             Aiding::Table => BodyFrame::Table,
@@ -109,5 +117,22 @@ impl Accuracy {
         let accuracy = study.run(&|| runs.one_done())?;
         drop(runs);
         begun.deliver(&report::accuracy::document(&accuracy))
+    }
+
+    fn campaign(&self) -> anyhow::Result<()> {
+        let campaign = SimulatedCampaign::load(&self.scenario)?;
+        let study = CampaignStudy {
+            form: self.installation.into(),
+            noise: self.noise.into(),
+            runs: self.runs,
+            seed: self.seed.unwrap_or(campaign.scenario.seed),
+            rate: !self.without_rate,
+            campaign,
+        };
+        let begun = self.delivery.begin(&[Path::new(&self.scenario)])?;
+        let runs = Runs::new(self.runs);
+        let accuracy = study.run(&|| runs.one_done())?;
+        drop(runs);
+        begun.deliver(&report::campaign::document(&accuracy))
     }
 }

@@ -5,20 +5,27 @@ mod columns;
 mod motion;
 mod name;
 mod noise;
+mod streams;
 mod text;
 mod time;
 mod turns;
+mod two_files;
 mod units;
 
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::formats::{FileError, Sheet};
-use crate::imu::PerSensor;
+use crate::formats::rows::Source;
+use crate::formats::{FileError, Place, Sheet, write_rows};
+use crate::imu::{PerSensor, Sensor};
 use crate::noise::NoiseFigures;
 use columns::Columns;
 use motion::Motion;
+use streams::{Streams, Written};
 use time::Clock;
 use units::Quantities;
 
@@ -30,6 +37,8 @@ const USUAL_PERIOD: f64 = 0.01;
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
+    /// Of a log of streams, and what they hold.
+    streams: Option<Streams>,
     /// The column that tells several instruments apart, with the number of the one that is taken.
     instance: Option<(usize, f64)>,
     columns: Columns,
@@ -51,8 +60,64 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if it cannot be read or has hardly any rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
-        let mut sheet = Sheet::read(path, FEWEST_ROWS)?;
-        let instance = columns::instance(&sheet);
+        Self::of_stream(path, None)
+    }
+
+    /// The same of one stream of a log of several.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read or has hardly any rows.
+    pub fn of_stream(path: &Path, stream: Option<&str>) -> Result<Self, FileError> {
+        match Streams::of_file(path, stream)? {
+            Some((streams, sheet)) => Ok(Self::of_sheet(sheet, Some(streams))),
+            None => Ok(Self::of_sheet(Sheet::read(path, FEWEST_ROWS)?, None)),
+        }
+    }
+
+    /// Looks at two files of rows, of gyros and of accelerometers; how the latter is to be called in the draft.
+    ///
+    /// # Errors
+    /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
+    pub fn of_two_files(gyro: &Path, accel: &Path, accel_name: &str) -> Result<Self, FileError> {
+        let (streams, sheet) = Streams::of_two_files(gyro, accel, accel_name)?;
+        Ok(Self::of_sheet(sheet, Some(streams)))
+    }
+
+    /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory
+    /// that is there; a damaged log only if what is whole of it is to be used.
+    ///
+    /// # Errors
+    /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
+    pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
+        let Some(streams) = &mut self.streams else {
+            return Err(FileError::new(
+                log,
+                Place::File,
+                "rows of text",
+                "a log of another program",
+                "`turncal init` drafts a run.toml for it as it is.",
+            ));
+        };
+        let source = |stream| Source {
+            file: log.to_owned(),
+            stream: Some(stream),
+            salvage,
+        };
+        rows_as_text(&source(&streams.gyro), &directory.join(GYRO_FILE))?;
+        if let Some(accel) = &streams.accel {
+            rows_as_text(&source(accel), &directory.join(ACCEL_FILE))?;
+        }
+        let accel = streams.accel.is_some().then(|| ACCEL_FILE.to_owned());
+        streams.written = Some(Written { accel });
+        let path = directory.join("run.toml");
+        std::fs::write(&path, self.to_toml(GYRO_FILE)).map_err(|error| unwritten(&path, &error))
+    }
+
+    fn of_sheet(mut sheet: Sheet, streams: Option<Streams>) -> Self {
+        let instance = match streams {
+            Some(_) => None,
+            None => columns::instance(&sheet),
+        };
         if let Some((column, number)) = instance {
             sheet.retain(|columns, row| columns[column][row] == number);
         }
@@ -83,7 +148,11 @@ impl Draft {
             ))
         };
         let noise = triads.as_ref().and_then(noise).unwrap_or_default();
-        Ok(Self {
+        if let Some(streams) = streams.as_ref().filter(|streams| streams.accel.is_none()) {
+            columns.names = streams.columns(Sensor::Gyro);
+        }
+        Self {
+            streams,
             rest: motion.as_ref().map(|motion| motion.rest.amax()),
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
             instance,
@@ -92,7 +161,54 @@ impl Draft {
             quantities,
             offset,
             noise,
-        })
+        }
+    }
+}
+
+/// Of the gyros, and of accelerometers in the same stream.
+const GYRO_FILE: &str = "imu.csv.gz";
+const ACCEL_FILE: &str = "accelerometers.csv.gz";
+
+fn unwritten(path: &Path, error: &io::Error) -> FileError {
+    FileError::io(
+        path,
+        "write the file",
+        error,
+        "Make room or choose another place.",
+    )
+}
+
+/// Every column of a stream, with all digits.
+fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
+    let rows = RefCell::new(source.open()?);
+    let stopped = RefCell::new(None);
+    let content = |file: &mut dyn Write| -> io::Result<()> {
+        let mut rows = rows.borrow_mut();
+        let mut csv = csv::Writer::from_writer(file);
+        csv.write_record(rows.header())?;
+        let columns = rows.header().len();
+        loop {
+            match rows.advance() {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) => {
+                    *stopped.borrow_mut() = Some(error);
+                    break;
+                }
+            }
+            let field = |k| match rows.number(k) {
+                Ok(number) => number.to_string(),
+                Err(_) => String::new(),
+            };
+            csv.write_record((0..columns).map(field))?;
+        }
+        csv.flush()
+    };
+    let written = File::create(path).and_then(|file| write_rows(path, file, &content));
+    written.map_err(|error| unwritten(path, &error))?;
+    match stopped.into_inner() {
+        Some(error) => Err(error),
+        None => Ok(()),
     }
 }
 

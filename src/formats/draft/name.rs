@@ -45,6 +45,15 @@ pub(super) struct Name {
     pub unit: Option<&'static str>,
 }
 
+/// The body axes of the program whose columns have such names; none if it is not known.
+pub(super) fn axes_of_program(columns: &[String]) -> Option<&'static str> {
+    let has = |name: &str| columns.iter().any(|column| column == name);
+    // PX4's sensor_combined and ArduPilot's IMU: front, right, down.
+    let is_autopilot =
+        has("accelerometer_m_s2[0]") || has("TimeUS") && (has("GyrX") || has("AccX"));
+    is_autopilot.then_some("frd")
+}
+
 /// The unit that a text names.
 pub(super) fn unit(text: &str) -> Option<&'static str> {
     let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
@@ -130,7 +139,8 @@ impl Name {
         let whole = self.whole();
         let is = |all: &[&str]| all.contains(&whole.as_str());
         // The instrument's own time before that of whoever received it.
-        if whole.ends_with("headerstamp") {
+        let ends = ["headerstamp", "timestampsample", "sampleus"];
+        if ends.iter().any(|end| whole.ends_with(end)) {
             4
         } else if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
             3

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::Draft;
+use super::name::axes_of_program;
 use super::units::short;
 use crate::imu::{NoiseKeys, Output, Sensor};
 use crate::noise::NoiseFigures;
@@ -68,6 +69,9 @@ impl Draft {
             .to_owned();
         // Writing to a string cannot fail.
         let _ = write!(text, "\n[imu]\nfile = {}\n", quoted(file));
+        if let Some(streams) = &self.streams {
+            streams.write(&mut text);
+        }
         self.rows(&mut text);
         self.noise_table(&mut text);
         for sensor in Sensor::ALL {
@@ -103,7 +107,16 @@ impl Draft {
             );
         }
         let clock = &self.clock;
-        if clock.unit != "s" {
+        let unit = self
+            .streams
+            .as_ref()
+            .filter(|streams| streams.accel.is_some());
+        let unit = unit
+            .map(|streams| streams.time.gyro.1)
+            .filter(|unit| !unit.is_empty());
+        if let Some(unit) = unit {
+            line(text, "time_unit", &quoted(unit), "as the file says");
+        } else if clock.unit != "s" {
             line(text, "time_unit", &quoted(clock.unit), &clock.why);
         }
         match clock.period {
@@ -141,12 +154,21 @@ impl Draft {
         } else {
             line(text, "continuous", "true", &self.gaps());
         }
-        line(
-            text,
-            "body_axes",
-            "\"rfu\"",
-            "guessed: x right, y front, z up; else \"frd\" or \"flu\"",
-        );
+        let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
+        match of_streams.or_else(|| axes_of_program(&self.columns.names)) {
+            Some(axes) => line(
+                text,
+                "body_axes",
+                &quoted(axes),
+                "as programs that write such logs have them",
+            ),
+            None => line(
+                text,
+                "body_axes",
+                "\"rfu\"",
+                "guessed: x right, y front, z up; else \"frd\" or \"flu\"",
+            ),
+        }
         if let Some((column, number)) = self.instance {
             let of = format!(
                 "{{ column = {}, number = {number} }}",
@@ -174,6 +196,14 @@ impl Draft {
     }
 
     fn columns(&self, text: &mut String) {
+        if let Some(streams) = self
+            .streams
+            .as_ref()
+            .filter(|streams| streams.accel.is_some())
+        {
+            streams.write_columns(text);
+            return;
+        }
         let columns = &self.columns;
         let named = |triad: &[usize; 3]| {
             let names = triad.map(|k| quoted(&columns.names[k]));
@@ -360,7 +390,7 @@ impl Draft {
     }
 }
 
-fn line(text: &mut String, key: &str, value: &str, why: &str) {
+pub(super) fn line(text: &mut String, key: &str, value: &str, why: &str) {
     let _ = writeln!(text, "{key} = {value}  # {why}");
 }
 
@@ -381,6 +411,6 @@ fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }

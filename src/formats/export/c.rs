@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Exported;
 use super::source::{Document, Source};
+use super::thermal;
 use crate::imu::Sensor;
 
 pub(super) fn write(source: &Source) -> Exported {
@@ -33,6 +34,8 @@ pub(super) fn write(source: &Source) -> Exported {
          the same array",
     );
     file.line(FUNCTION);
+    thermal::c(source, &mut file);
+    file.line("#endif");
     file.finish()
 }
 
@@ -53,8 +56,7 @@ static inline void turncal_calibrate(const double raw[6], double calibrated[6])
         }
     }
 }
-
-#endif";
+";
 
 fn list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     let values: Vec<String> = values.into_iter().map(|v| format!("{v:e}")).collect();

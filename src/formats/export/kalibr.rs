@@ -81,7 +81,7 @@ pub(super) fn write(source: &Source) -> Exported {
 }
 
 /// Above the diagonal there is only rounding.
-fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
+pub(super) fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
     matrix.fill_upper_triangle(0.0, 1);
     matrix
 }
@@ -99,7 +99,7 @@ fn matrix(file: &mut Document, name: &str, matrix: &Matrix3<f64>) {
     }
 }
 
-fn noise(file: &mut Document, source: &Source) {
+pub(super) fn noise(file: &mut Document, source: &Source) {
     let missing = match source.run {
         Some(_) => "[imu.noise] of the run does not state it",
         None => "`turncal allan` finds it; or export with --run RUN.toml",

@@ -12,15 +12,20 @@ use crate::run::Run;
 pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,\
                           accel_y_m_s2,accel_z_m_s2";
 
-/// Writes a row a sample, [`HEADER`] first. A row holds means over its sample, so it is itself a record
+/// Writes a row a sample, [`HEADER`] first, of a calibration that changes with temperature `in_range` after it: whether
+/// it holds at the temperature of the row. A row holds means over its sample, so it is itself a record
 /// of `output = "rate"` in `rad/s` and `m/s^2`.
 pub fn sample_rows(file: &mut dyn Write, correction: &Correction, run: &Run) -> io::Result<()> {
-    writeln!(file, "{HEADER}")?;
+    let changes = correction.changes();
+    writeln!(file, "{HEADER}{}", if changes { ",in_range" } else { "" })?;
     for sample in correction.samples(run) {
         let [start, end] = [sample.start, sample.end].map(nanoseconds);
         write!(file, "{start},{end}")?;
         for value in sample.rate.iter().chain(&sample.force) {
             write!(file, ",{value:e}")?;
+        }
+        if changes {
+            write!(file, ",{}", u8::from(sample.in_range))?;
         }
         writeln!(file)?;
     }

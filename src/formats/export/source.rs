@@ -255,9 +255,20 @@ impl Document {
         self.text.push('\n');
     }
 
+    /// A line before all others.
+    pub fn begin(&mut self, line: &str) {
+        self.text.insert_str(0, &format!("{line}\n"));
+    }
+
+    /// Puts all so far between these, which only end a comment together.
+    pub fn enclose(&mut self, open: &str, close: &str) {
+        self.text = format!("{open}\n{}{close}\n", self.text.replace("--", "- -"));
+    }
+
     pub fn finish(self) -> Exported {
         Exported {
             text: self.text,
+            binary: None,
             notes: self.notes,
         }
     }

@@ -8,9 +8,7 @@ use crate::formats::error::FileError;
 use crate::formats::uniform::{Following, Uniform};
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
-use crate::recording::{
-    Bridge, ColumnFacts, Fault, FaultKind, Packed, Packer, TemperatureFacts, finest_step,
-};
+use crate::recording::{Bridge, ColumnFacts, Fault, FaultKind, Packed, Packer, finest_step};
 
 /// How many rows are held.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +49,6 @@ pub(super) struct LongLog<'a> {
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
     rows: usize,
-    temperature: Option<TemperatureFacts>,
 }
 
 /// What a long log has come to.
@@ -62,9 +59,10 @@ pub(super) struct Whole {
     pub samples: usize,
     pub faults: Vec<Fault>,
     pub bridges: Vec<Bridge>,
-    /// Rows of the file, and how many of them are of a sample of their own.
+    /// Rows of the file.
     pub rows: usize,
-    pub temperature: Option<TemperatureFacts>,
+    /// Samples without one.
+    pub missing: usize,
 }
 
 impl<'a> LongLog<'a> {
@@ -75,7 +73,7 @@ impl<'a> LongLog<'a> {
         held: &Held,
         stamps: &Stamps,
     ) -> Result<Self, FileError> {
-        let (clock, numbers) = Following::new(&log.file, &stamps.of_rows, log.clock.period)?;
+        let (clock, numbers) = Following::new(&log.source.file, &stamps.of_rows, log.clock.period)?;
         let step = |column: usize| match log.output {
             Output::Pulse => 1.0,
             Output::Increment | Output::Rate => finest_step(&held.columns[column]),
@@ -93,7 +91,6 @@ impl<'a> LongLog<'a> {
             faults: Vec::new(),
             bridges: Vec::new(),
             rows: 0,
-            temperature: None,
         })
     }
 
@@ -174,13 +171,6 @@ impl<'a> LongLog<'a> {
             }
             None => facts,
         });
-        if let Some(temperatures) = held.temperatures.get(new.clone()) {
-            let of = TemperatureFacts::of(temperatures);
-            self.temperature = match (self.temperature, of) {
-                (Some(before), Some(of)) => Some(before.and(self.rows, &of, new.len())),
-                (before, of) => before.or(of),
-            };
-        }
         self.rows += new.len();
         self.next = until;
         self.taken = end;
@@ -266,7 +256,7 @@ impl<'a> LongLog<'a> {
             faults,
             bridges,
             rows: self.rows + duplicates,
-            temperature: self.temperature,
+            missing: self.next - self.rows,
         })
     }
 }

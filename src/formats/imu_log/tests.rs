@@ -5,7 +5,7 @@ use super::*;
 use crate::formats::clock::TimeUnit;
 use crate::recording::FaultKind;
 
-const ROWS: usize = 90_000;
+const ROWS: usize = 50_000;
 const PERIOD: f64 = 0.01;
 
 /// A noisy swing of six axes about different levels, on no grid.
@@ -19,19 +19,19 @@ fn value(row: usize, column: usize) -> f64 {
 
 /// Rows of a log of which some are missing, one is there twice, and a spike is where parts may meet.
 fn log(file: &std::path::Path) {
-    let mut text = "t,a,b,c,d,e,f,k\n".to_owned();
-    for row in (0..ROWS).filter(|row| row % 97 != 13 && !(70_000..70_300).contains(row)) {
+    let mut text = "t,a,b,c,d,e,f\n".to_owned();
+    for row in (0..ROWS).filter(|row| row % 97 != 13 && !(40_000..40_300).contains(row)) {
         let line = |text: &mut String| {
             write!(text, "{:.2}", 5.0 + row as f64 * PERIOD).unwrap();
             for column in 0..6 {
-                let spike = if (row, column) == (32_768, 2) {
+                let spike = if (row, column) == (23_433, 2) {
                     0.1
                 } else {
                     0.0
                 };
                 write!(text, ",{:e}", value(row, column) + spike).unwrap();
             }
-            writeln!(text, ",{}", 20.0 + row as f64 * 1e-5).unwrap();
+            text.push('\n');
         };
         line(&mut text);
         if row == 1234 {
@@ -43,19 +43,20 @@ fn log(file: &std::path::Path) {
 
 fn read(file: &std::path::Path, sizes: Sizes) -> ImuSamples {
     let log = ImuLog {
-        file: file.to_owned(),
+        source: Source::of_file(file),
         clock: Clock {
             column: Some("t"),
             nanoseconds: None,
             unit: TimeUnit::PerSecond(1.0),
             period: Some(PERIOD),
         },
+        accel_from: None,
         instance: None,
         triads: PerSensor {
             gyro: ["a", "-b", "c"],
             accel: ["d", "e", "f"],
         },
-        temperature: Some("k"),
+        temperature: None,
         output: Output::Increment,
         axes: BodyAxes::Frd,
         stamp: TimeStamp::End,
@@ -91,11 +92,18 @@ fn a_log_read_in_parts_is_the_one_read_at_once() {
     };
     assert_eq!(count(FaultKind::Spike), 1);
     assert_eq!(count(FaultKind::Duplicate), 1);
-    assert!(count(FaultKind::Missing) > 900);
-    assert_eq!(packed.bridges.len(), whole.bridges.len());
-    for (a, b) in packed.bridges.iter().zip(&whole.bridges) {
-        assert_eq!((&a.samples, a.axes), (&b.samples, b.axes));
-    }
+    assert!(count(FaultKind::Missing) > 500);
+    let bridged = |imu: &ImuSamples| {
+        let each = imu.bridges.iter().flat_map(|bridge| {
+            let axes: Vec<_> = bridge.each().collect();
+            let of = axes.into_iter();
+            of.map(|(sensor, axis, _)| (sensor as usize, axis, bridge.samples.clone()))
+        });
+        let mut each: Vec<_> = each.collect();
+        each.sort_by_key(|(sensor, axis, samples)| (*sensor, *axis, samples.start));
+        each
+    };
+    assert_eq!(bridged(&packed), bridged(&whole));
     assert_eq!(packed.stretches.len(), 2);
     for (a, b) in packed.stretches.iter().zip(&whole.stretches) {
         assert_eq!(a.samples, b.samples);
@@ -117,7 +125,4 @@ fn a_log_read_in_parts_is_the_one_read_at_once() {
     let facts = |imu: &ImuSamples| imu.log.clone().unwrap();
     let (packed, whole) = (facts(&packed), facts(&whole));
     assert_eq!((packed.rows, &packed.columns), (whole.rows, &whole.columns));
-    let (a, b) = (packed.temperature.unwrap(), whole.temperature.unwrap());
-    assert_eq!((a.smallest, a.largest), (b.smallest, b.largest));
-    assert!((a.mean - b.mean).abs() < 1e-9);
 }

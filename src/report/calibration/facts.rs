@@ -8,14 +8,23 @@ use crate::units::{
     ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
 };
 
+/// What was calibrated, by what its run says of it.
+pub(super) fn item(report: &Report) -> Facts {
+    let meta = &report.run.recording.meta;
+    let first = ["instrument", "serial", "date"];
+    let others = meta.keys().map(String::as_str);
+    let names = first
+        .into_iter()
+        .chain(others.filter(|name| !first.contains(name)));
+    let rows = names.filter_map(|name| Some((name, meta.get(name)?.clone())));
+    Facts::new("", rows)
+}
+
 /// What was recorded, where, and what was known before.
 pub(super) fn run(report: &Report) -> Facts {
     let run = report.run;
     let (imu, site) = (&run.recording.imu, &run.site);
     let mut facts = Facts::new("Run", [("run", run.recording.name.clone())]);
-    for (name, value) in &run.recording.meta {
-        facts.push(name, value.clone());
-    }
     let place = format!(
         "latitude {}°, longitude {}°, height {} m, gravity {} m/s²",
         value(site.latitude / DEGREE, 1e-4),

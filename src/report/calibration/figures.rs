@@ -2,7 +2,6 @@
 
 use super::super::group::{Group, axis_name, short_name};
 use super::super::number::{count, value};
-use super::super::outlook;
 use super::super::plot::{Axis, Color, Mark, Matrix, Panel, Plot, Series};
 use super::report::Report;
 use super::{methods, path};
@@ -21,18 +20,21 @@ impl Report<'_> {
     /// Every figure that there is something to show in.
     pub(super) fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
-        plots.extend(outlook::figure(self.navigation.unwrap_or_default()));
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
             (Some(truth), methods @ [_, ..]) => Some(methods::errors(methods, &truth)),
             (None, &[(_, closed), (_, filter)]) => Some(methods::differences(closed, filter)),
             _ => None,
         });
-        if let Some(outcome) = self.outcome {
+        // Recordings have each their own time.
+        let one = |outcome: &&Outcome| outcome.alone.len() < 2;
+        if let Some(outcome) = self.outcome.filter(one) {
             plots.extend(self.sigma(outcome));
             plots.extend(self.estimates(outcome));
             plots.extend(self.innovations(outcome));
         }
-        plots.push(path::figure(self));
+        if self.outcome.as_ref().is_none_or(one) {
+            plots.push(path::figure(self));
+        }
         plots.extend(self.estimate().and_then(correlation));
         plots
     }

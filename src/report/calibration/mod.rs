@@ -1,13 +1,16 @@
 //! The report of a calibration, and of both methods side by side.
 
+mod budget;
 mod facts;
 mod figures;
 mod methods;
 mod path;
 mod report;
 mod tables;
+mod temperature;
 #[cfg(test)]
 mod tests;
+mod verdict;
 
 use super::document::{Document, Table};
 use super::number::{count, three_digits, value};
@@ -20,29 +23,44 @@ impl Report<'_> {
     /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
-        document.lead = self.lead();
+        document.lead = vec![self.verdict()];
+        document.lead.extend(self.lead());
         document.warnings.items = self.warnings();
-        if document.warnings.items.is_empty() && self.outcome.is_some() {
-            document.lead.push("No warnings.".to_owned());
-        }
+        document.page(facts::item(self));
+        document.both(self.groups());
+        outlook::in_a_line(&mut document, self.navigation);
+        document.fold("Every parameter");
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }
-        document.both(self.groups());
+        document.fold("Residuals, consistency, error terms");
         document.both(
             self.quality
                 .map_or_else(Table::default, |of| tables::residuals(of, self.table())),
         );
         if let Some(outcome) = self.outcome {
+            temperature::add(&mut document, outcome);
             document.page(tables::consistency(outcome));
             document.page(tables::passes(outcome));
             document.both(effects::costs(self.effects));
             document.both(effects::explained(self.effects));
         }
+        if let (Some(of), Some(estimate)) = (self.budget, self.estimate()) {
+            document.fold("Uncertainty budget");
+            document.page(budget::table(of, estimate));
+            document.page(budget::figure(of, estimate));
+            document.page(budget::left_off(self.effects, estimate));
+        }
+        document.fold("Navigation");
         outlook::add(&mut document, self.navigation);
+        if let Some(plot) = outlook::figure(self.navigation.unwrap_or_default()) {
+            document.page(plot);
+        }
+        document.fold("Figures");
         for plot in self.figures() {
             document.page(plot);
         }
+        document.fold("Observability, model, method and run");
         if let Some(outcome) = self.outcome {
             document.page(tables::weakest(outcome));
         }
@@ -59,12 +77,18 @@ impl Report<'_> {
     /// What ran on what.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
-        let mut run = format!(
-            "Run {}: {} s, {} samples at {} Hz, {} dwells; body frame: {}",
-            self.run.recording.name,
-            value(imu.duration(), 10.0),
-            count(imu.len()),
-            three_digits(1.0 / imu.period),
+        let mut run = match self.outcome.map_or(0, |outcome| outcome.alone.len()) {
+            0 | 1 => format!(
+                "Run {}: {} s, {} samples at {} Hz",
+                self.run.recording.name,
+                value(imu.duration(), 10.0),
+                count(imu.len()),
+                three_digits(1.0 / imu.period),
+            ),
+            recordings => format!("Campaign of {recordings} recordings of one instrument"),
+        };
+        run += &format!(
+            ", {} dwells; body frame: {}",
             self.dwells.len(),
             self.body_frame.words(),
         );

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::super::outlook::Navigated;
 use crate::calibration::result::TermRecord;
-use crate::calibration::{ErrorTermTest, Finding, ParameterVector, Quality};
+use crate::calibration::{Budget, ErrorTermTest, Finding, ParameterVector, Quality};
 use crate::calibration::{Estimate, Outcome, to_vector};
 use crate::imu::{BodyFrame, PerSensor, Triad};
 use crate::recording::TableLog;
@@ -30,6 +30,8 @@ pub struct Report<'a> {
     pub findings: &'a [Finding],
     /// What error terms did to it, or would do.
     pub effects: &'a [ErrorTermTest],
+    /// Where the uncertainty of the filter's result comes from.
+    pub budget: Option<&'a Budget>,
     /// The closed form's result, if there is one.
     pub closed_form: Option<ClosedForm<'a>>,
     /// The true triads, where they are known.

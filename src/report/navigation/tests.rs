@@ -15,6 +15,7 @@ fn mission() -> Mission {
             height: 0.0,
         }),
         intervals: 120,
+        interval: 60.0,
     }
 }
 

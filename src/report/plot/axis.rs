@@ -65,11 +65,19 @@ impl Axis {
 
     /// Hours from zero on, with ticks at whole ones or even parts.
     pub fn hours(hours: f64) -> Self {
-        let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0, 48.0, 96.0];
-        let step = steps.into_iter().find(|step| hours / step <= 12.0);
+        Self::time("h", hours)
+    }
+
+    /// Time in a unit from zero on, with ticks at whole ones or even parts.
+    pub fn time(unit: &str, end: f64) -> Self {
+        let steps: &[f64] = match unit {
+            "h" => &[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0, 48.0, 96.0],
+            _ => &[0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0],
+        };
+        let step = steps.iter().copied().find(|step| end / step <= 12.0);
         Self {
-            step: step.filter(|_| hours > 0.0),
-            ..Self::linear("time, h").between(0.0, hours)
+            step: step.filter(|_| end > 0.0),
+            ..Self::linear(&format!("time, {unit}")).between(0.0, end)
         }
     }
 

@@ -40,6 +40,8 @@ pub enum Shape {
         /// Whether they are shaded.
         filled: bool,
     },
+    /// Filled rectangles of this half width: middle, lower and upper end of each.
+    Blocks(f64, Vec<(f64, f64, f64)>),
     /// A line across the panel at this height.
     Level(f64),
     /// A line from bottom to top.
@@ -121,6 +123,10 @@ impl Shape {
             Self::Intervals(of) => of
                 .iter()
                 .flat_map(|&(x, low, high)| [(x, low), (x, high)])
+                .unzip(),
+            Self::Blocks(half, of) => of
+                .iter()
+                .flat_map(|&(x, low, high)| [(x - half, low), (x + half, high)])
                 .unzip(),
             Self::Bars {
                 tops, half, base, ..

@@ -64,6 +64,18 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
                 }
                 on.stroke(&corners, color, pen.width)
             }),
+        Shape::Blocks(half, of) => of
+            .iter()
+            .filter(|(_, low, high)| low.is_finite() && high > low)
+            .try_for_each(|&(x, low, high)| {
+                let corners = [
+                    (x - half, low),
+                    (x - half, high),
+                    (x + half, high),
+                    (x + half, low),
+                ];
+                on.area(&corners.map(|corner| frame.at(corner)), color)
+            }),
         Shape::Level(y) => {
             let y = frame.at_y(*y);
             on.line(&[(left, y), (right, y)], pen)

@@ -11,7 +11,7 @@ use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::{InstallationForm, PerSensor};
 use crate::models::{self, ModelError, Place};
 use crate::simulation::Scenario;
-use crate::study::navigation::{FORTY_HOURS, Mission, Motion, NavigationStudyError};
+use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion, NavigationStudyError};
 
 /// The trajectory of the mission that moves.
 const TRAJECTORY: &str = "flight";
@@ -96,6 +96,7 @@ impl Journey {
                 Mission {
                     motion: Motion::Moving(trajectory.at_latitude(site.latitude)),
                     intervals: FORTY_HOURS,
+                    interval: INTERVAL,
                 }
             }
         })

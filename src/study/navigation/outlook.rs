@@ -2,11 +2,13 @@
 
 use nalgebra::SVector;
 
-use super::{Mission, NavigationStudyError, Pair};
+use super::{INTERVAL, Mission, NavigationStudyError, Pair};
 use crate::calibration::Estimate;
+use crate::earth::{SEMI_MAJOR_AXIS, Site};
 use crate::imu::{PerSensor, Triad};
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
+use crate::units::DEGREE;
 
 /// What is known of the navigation error at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +22,71 @@ pub struct Outlook {
     pub error: Option<NavigationError>,
 }
 
+/// An attitude error up to which errors add to each other, rad: beyond it the linear model, by which σ are
+/// predicted, is off by more than a hundredth of them.
+const SMALL: f64 = DEGREE;
+/// A position error up to which gravity and the frame are those of the true position, as a part of the
+/// Earth's radius.
+const NEAR: f64 = 0.01;
+/// Whole durations, s: seconds, minutes, hours.
+const DURATIONS: [f64; 17] = [
+    1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0, 7200.0,
+    14_400.0, 36_000.0, 144_000.0,
+];
+/// At least so many moments make a curve.
+const MOMENTS: f64 = 20.0;
+
 impl Mission {
+    /// Standing level at a site for as long as suits the grade: up to the longest whole duration after which every
+    /// estimate's predicted errors are still small, hours for one of navigation grade and seconds for a poor one.
+    ///
+    /// # Errors
+    /// As for [`Self::navigate`].
+    pub fn suited(site: &Site, estimates: &[&Estimate]) -> Result<Self, NavigationStudyError> {
+        let duration = estimates
+            .iter()
+            .try_fold(f64::INFINITY, |shortest, estimate| {
+                Ok::<_, NavigationStudyError>(shortest.min(Self::useful(site, estimate)?))
+            })?;
+        Ok(Self::lasting(
+            site,
+            duration.min(DURATIONS[DURATIONS.len() - 1]),
+        ))
+    }
+
+    /// Standing level for so many seconds.
+    fn lasting(site: &Site, duration: f64) -> Self {
+        let interval = INTERVAL.min(duration / MOMENTS);
+        Self {
+            interval,
+            ..Self::standing_level(site, (duration / interval).round() as u32)
+        }
+    }
+
+    /// The longest whole duration after which an estimate's predicted errors are small; the shortest if none is.
+    fn useful(site: &Site, estimate: &Estimate) -> Result<f64, NavigationStudyError> {
+        let small = |moment: &Outlook| {
+            let attitude = moment.sigma.fixed_rows::<3>(0).amax();
+            let position = moment.sigma.fixed_rows::<2>(6).norm();
+            attitude <= SMALL && position <= NEAR * SEMI_MAJOR_AXIS
+        };
+        // A poor one needs no forty hours to be found poor.
+        let mut useful = DURATIONS[0];
+        for longest in [60.0, 3600.0, DURATIONS[DURATIONS.len() - 1]] {
+            let outlook = Self::lasting(site, longest).outlook(estimate, None)?;
+            let last = outlook.iter().take_while(|moment| small(moment)).last();
+            let last = last.map_or(0.0, |moment| moment.time * (1.0 + 1e-9));
+            let whole = DURATIONS
+                .into_iter()
+                .filter(|&whole| whole <= last.min(longest));
+            useful = whole.fold(useful, f64::max);
+            if last < longest {
+                break;
+            }
+        }
+        Ok(useful)
+    }
+
     /// What an estimate leads to, at the start and after each interval. The truth may have any
     /// installation form.
     ///
@@ -65,6 +131,31 @@ mod tests {
     use crate::earth::Site;
     use crate::imu::InstallationForm;
     use crate::units::{DEG_PER_H, DEGREE, PPM};
+
+    #[test]
+    fn a_mission_suits_the_grade_of_the_poorest_estimate() {
+        let site = Site::with_normal_gravity(0.6, 0.0, 0.0);
+        let of_bias = |deg_per_h: f64| {
+            let mut sigma = ParameterVector::zeros();
+            sigma.fixed_rows_mut::<3>(9).fill(deg_per_h * DEG_PER_H);
+            Estimate {
+                triads: PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General)),
+                covariance: ParameterMatrix::from_diagonal(&sigma.component_mul(&sigma)),
+            }
+        };
+        let [navigation, tactical, mems, poor] = [0.003, 1.0, 30.0, 36_000.0].map(of_bias);
+        let duration = |estimates: &[&Estimate]| {
+            let mission = Mission::suited(&site, estimates).unwrap();
+            assert!(mission.intervals >= 20);
+            f64::from(mission.intervals) * mission.interval
+        };
+        // Heading is off by a degree after an hour of 1°/h.
+        assert_eq!(duration(&[&navigation]).round(), 144_000.0);
+        assert_eq!(duration(&[&tactical]).round(), 1800.0);
+        assert_eq!(duration(&[&mems]).round(), 60.0);
+        assert!(duration(&[&poor]) < 1.0 + 1e-9);
+        assert_eq!(duration(&[&navigation, &mems]).round(), 60.0);
+    }
 
     #[test]
     fn an_outlook_is_what_the_general_form_navigates_to_whatever_the_form_of_the_estimate() {

@@ -25,6 +25,7 @@ fn standing(intervals: u32) -> Mission {
             height: 500.0,
         }),
         intervals,
+        interval: INTERVAL,
     }
 }
 
@@ -32,6 +33,7 @@ fn moving(name: &str, intervals: u32) -> Mission {
     Mission {
         motion: Motion::Moving(trajectory(name, &Place::Embedded).unwrap().0),
         intervals,
+        interval: INTERVAL,
     }
 }
 

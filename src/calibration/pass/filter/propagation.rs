@@ -1,6 +1,9 @@
 //! The covariance over a block of navigation.
 
+use nalgebra::DMatrix;
+
 use super::Filter;
+use super::tape::Operation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::imu::{PerSensor, Sensor};
@@ -21,21 +24,12 @@ impl Filter {
         let turn = self.layout.turn_at_rest();
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
         let moving: Vec<usize> = (0..NAVIGATION).chain(turn).collect();
-        // The turn has the noise of the attitude, and its own.
+        // The turn does what the attitude does.
         let own = |place: usize| match place.checked_sub(NAVIGATION) {
             Some(axis) => ATTITUDE + axis,
             None => place,
         };
-        let of_navigation = block.noise.covariance(&self.noise);
-        let mut noise = [[0.0; MOVING]; MOVING];
-        for (row, of_row) in noise.iter_mut().enumerate() {
-            for (column, noise) in of_row.iter_mut().enumerate() {
-                *noise = of_navigation[(own(row), own(column))];
-            }
-            if row >= NAVIGATION {
-                of_row[row] += self.turning.powi(2) * block.duration;
-            }
-        }
+        let noise = self.noise_of_move::<MOVING>(block);
         let phi = self.moving_rows::<MOVING>(block);
         let on = self.layout.terms().count();
         let tried = self.layout.tried_terms().zip(&block.terms[on..]);
@@ -90,6 +84,12 @@ impl Filter {
                 self.p[(at_row, at_column)] = corner[column][row];
             }
         }
+        if let Some(tape) = &mut self.tape {
+            tape.push(Operation::Carried {
+                moving: moving.to_vec(),
+                transition: DMatrix::from_fn(MOVING, phi.len(), |row, k| phi[k][row]),
+            });
+        }
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.propagate(phi, |place| moving[place], tried);
         }
@@ -128,14 +128,26 @@ impl Filter {
         let terms = block.terms.iter().take(on);
         let terms = terms.map(|term| term.column.column(0));
         let gravity = self.layout.gravity().map(|_| block.gravity.column(0));
+        let thermal = self.layout.thermal().map(|(_, coefficient)| {
+            let weight = block.thermal.as_ref();
+            let weight = weight.map_or(0.0, |state| coefficient.weight(state));
+            of_triad(coefficient.sensor, coefficient.parameter) * weight
+        });
         // A bias does the same whether it varies or stays.
         let varying = self.layout.varying_biases();
         let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        let driving = navigation.chain(parameters).chain(terms);
-        let driving = driving.chain(gravity).chain(varying);
-        driving
-            .map(|column| std::array::from_fn(|row| column[row]))
-            .collect()
+        let own = self.layout.own().map(|(_, index)| {
+            let (sensor, parameter) = sensor_and_parameter(index);
+            of_triad(sensor, parameter)
+        });
+        let mut columns: Vec<[f64; NAVIGATION]> = Vec::new();
+        let of = |column: &dyn Fn(usize) -> f64| std::array::from_fn(column);
+        let constants = navigation.chain(parameters).chain(terms);
+        columns.extend(constants.map(|column| of(&|row| column[row])));
+        columns.extend(thermal.map(|column| of(&|row| column[row])));
+        let rest = gravity.into_iter().chain(varying).chain(own);
+        columns.extend(rest.map(|column| of(&|row| column[row])));
+        columns
     }
 
     /// Varying biases forget as time goes by, and are driven.
@@ -143,6 +155,13 @@ impl Filter {
         for &(state, sigma, correlation_time) in &self.varying {
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Varied {
+                    state,
+                    keep,
+                    variance: sigma.powi(2) * (1.0 - keep * keep),
+                });
+            }
             if let Some(sensitivity) = &mut self.sensitivity {
                 sensitivity.scale(state, keep);
             }

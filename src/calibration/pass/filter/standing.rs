@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::super::local::{Given, Local, Observed, Outcome, StepModel};
+use super::super::local::{Given, Local, Look, Observed, Outcome, StepModel};
 use super::super::measurement::ScalarInnovation;
 use super::super::segment::{Seen, Segment, Standing};
 use super::Filter;
@@ -75,13 +75,24 @@ impl Filter {
         };
         let moving = self.moving();
         let map = self.map(segment, first, &moving, G);
-        let mut begins = [None; M];
-        for (component, &state) in given_at_begin(&moving).enumerate() {
-            if let Some(place) = moving.iter().position(|&moving| moving == state) {
-                begins[place] = Some(component);
-            }
+        let mut local = Local::<M, G>::new(self.given(&map), begins(&moving));
+        match self.through(&mut local, segment, observer, &mut |_| {}) {
+            Taken::Whole => {}
+            other => return other,
         }
-        let mut local = Local::<M, G>::new(self.given(&map), begins);
+        self.take_in::<M>(&local.outcome(), &map, &moving);
+        Taken::Whole
+    }
+
+    /// A filter of a part alone through all of it; `done` is told of each thing that it does.
+    pub(super) fn through<const M: usize, const G: usize>(
+        &self,
+        local: &mut Local<M, G>,
+        segment: &Segment,
+        observer: &mut impl Observer,
+        done: &mut impl FnMut(Done<M, G>),
+    ) -> Taken {
+        let moving = self.moving();
         let models: Vec<StepModel<M>> = segment
             .models
             .iter()
@@ -103,6 +114,7 @@ impl Filter {
                 }
             }
             local.propagate(&models[*model]);
+            done(Done::Step(*model));
             for seen in seen {
                 let (state, minus) = match seen.kind {
                     Observation::Velocity => (VELOCITY, None),
@@ -124,18 +136,24 @@ impl Filter {
                     scalars: look.scalars(),
                 };
                 match observer.judge(innovations) {
-                    Verdict::Accepted => local.take(&look),
+                    Verdict::Accepted => {
+                        local.take(&look);
+                        done(Done::Observed {
+                            state,
+                            seen,
+                            look: &look,
+                        });
+                    }
                     Verdict::Rejected => {}
                     Verdict::Abandoned => return Taken::Abandoned,
                 }
             }
         }
-        self.take_in::<M>(&local.outcome(), &map, &moving);
         Taken::Whole
     }
 
     /// The states that move in a dwell: navigation errors, the turn at rest, varying biases.
-    fn moving(&self) -> Vec<usize> {
+    pub(super) fn moving(&self) -> Vec<usize> {
         let turn = self.layout.turn_at_rest();
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
         let varying = self.layout.varying_biases().map(|(state, ..)| state);
@@ -209,7 +227,11 @@ impl Filter {
         )
     }
 
-    fn step_model<const M: usize>(&self, block: &Block, moving: &[usize]) -> StepModel<M> {
+    pub(super) fn step_model<const M: usize>(
+        &self,
+        block: &Block,
+        moving: &[usize],
+    ) -> StepModel<M> {
         let given = moving.len() - 3;
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
         let biases = M - self.varying.len();
@@ -314,6 +336,29 @@ impl Filter {
             self.x[state] += offset;
         }
     }
+}
+
+/// What a filter of a part alone has done.
+pub(super) enum Done<'a, const M: usize, const G: usize> {
+    /// It went on over a step, by this of the segment's models.
+    Step(usize),
+    /// It took in what is observed of three errors from a state on.
+    Observed {
+        state: usize,
+        seen: &'a Seen,
+        look: &'a Look<M, G>,
+    },
+}
+
+/// Which component of `g` each moving state is when a part begins, if any.
+pub(super) fn begins<const M: usize>(moving: &[usize]) -> [Option<usize>; M] {
+    let mut begins = [None; M];
+    for (component, &state) in given_at_begin(moving).enumerate() {
+        if let Some(place) = moving.iter().position(|&moving| moving == state) {
+            begins[place] = Some(component);
+        }
+    }
+    begins
 }
 
 /// The moving states that are in `g`.

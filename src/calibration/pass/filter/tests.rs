@@ -17,19 +17,27 @@ const STATES: usize = NAVIGATION + PARAMETERS + 6;
 
 type StateMatrix = SMatrix<f64, STATES, STATES>;
 
+/// Of the parameters alone.
+fn errors(parameters: ParameterVector) -> PriorErrors {
+    PriorErrors {
+        parameters,
+        ..PriorErrors::none()
+    }
+}
+
 fn filter() -> Filter {
     let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
     let mut model = Model::new(&run, &Options::default());
     model.prior_sigma.fill(7e-3);
     let parameters = ParameterVector::from_element(1e-4);
-    let mut filter = Filter::new(&model, &parameters, &TermVector::zeros());
+    let mut filter = Filter::new(&model, &errors(parameters));
     let start = Start {
         attitude: Vector3::new(1e-5, 2e-5, 3e-5),
         attitude_sigma: Vector3::repeat(3e-4),
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, true, None);
+    filter.begin(&start, 5e-6, Some(&ParameterVector::zeros()), None);
     assert_eq!(filter.layout.size(), STATES);
     filter
 }
@@ -67,6 +75,7 @@ fn block(seed: f64) -> Block {
             accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
         },
         gravity: SVector::from_fn(|row, _| wave(row, 1)),
+        thermal: None,
         terms: Vec::new(),
         noise: noise_input(1e-8, &wave),
     }
@@ -149,14 +158,14 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
         });
     }
     let mean = ParameterVector::from_element(1e-4);
-    let mut filter = Filter::new(&model, &mean, &TermVector::zeros());
+    let mut filter = Filter::new(&model, &errors(mean));
     let start = Start {
         attitude: Vector3::zeros(),
         attitude_sigma: Vector3::repeat(3e-4),
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, true, None);
+    filter.begin(&start, 5e-6, Some(&ParameterVector::zeros()), None);
     let varying: Vec<usize> = filter.layout.varying_biases().map(|(s, ..)| s).collect();
     assert_eq!(varying.len(), 6);
     for k in 0..5 {
@@ -328,9 +337,14 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         let (model, stretch) = (&problem.model, &problem.stretches()[0]);
         let triads = crate::calibration::from_vector(model.form, &model.prior_mean);
         let prior = AttitudePrior::of_alignment(Matrix3::identity(), 0.01);
-        let mut filter = Filter::new(model, &ParameterVector::zeros(), &TermVector::zeros());
+        let mut filter = Filter::new(model, &PriorErrors::none());
         let start = stretch.start(&prior, &Matrix3::identity());
-        filter.begin(&start, model.position_sigma, true, None);
+        filter.begin(
+            &start,
+            model.position_sigma,
+            Some(&ParameterVector::zeros()),
+            None,
+        );
         let at = State::at_rest(Matrix3::identity());
         let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, at);
         let mut navigator = navigator.unwrap();

@@ -2,6 +2,7 @@
 
 use super::super::measurement::{Measurement, ScalarInnovation};
 use super::Filter;
+use super::tape::Operation;
 
 impl Filter {
     /// Takes in a measurement, one scalar after the other.
@@ -40,6 +41,13 @@ impl Filter {
         }
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.update([row, tried], &gain, scalar);
+        }
+        if let Some(tape) = &mut self.tape {
+            tape.push(Operation::Taken {
+                row: row.to_vec(),
+                gain: gain.clone(),
+                variance: variance_of_noise,
+            });
         }
         // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
         let columns = self.p.as_mut_slice().chunks_exact_mut(n);

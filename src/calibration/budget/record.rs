@@ -1,0 +1,94 @@
+//! A budget as a calibration's file holds it.
+
+use serde::{Deserialize, Serialize};
+
+use super::super::error_term_test::ErrorTermTest;
+use super::super::parameters::ParameterVector;
+use super::Budget;
+
+/// Standard uncertainties of the estimated parameters by source, in their order and units.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BudgetRecord {
+    /// What each source adds; squares add to the variances.
+    pub sources: Vec<BudgetPartRecord>,
+    /// Effective degrees of freedom; none where infinite.
+    pub degrees_of_freedom: Vec<Option<f64>>,
+    /// Coverage factor for 95.45 %.
+    pub coverage_factor: Vec<f64>,
+    /// Error terms that are not estimated, in no sum.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_off: Vec<LeftOffRecord>,
+}
+
+/// What one source adds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BudgetPartRecord {
+    /// Its name, such as `table position`.
+    pub source: String,
+    /// Standard uncertainty of each parameter.
+    pub u: Vec<f64>,
+    /// Degrees of freedom with which it is known; none where infinite.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// What an error term that is not estimated may have done.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LeftOffRecord {
+    /// Its name, such as `size-effect`.
+    pub term: String,
+    /// What it changes each parameter by, 1σ, where it is as large as is usual; three digits.
+    pub usual: Vec<f64>,
+    /// RMS of that where it is also as the record shows it; three digits.
+    pub shown: Vec<f64>,
+}
+
+impl Budget {
+    /// As a record of these parameters, each with the factor that brings it to the file's unit.
+    pub(in super::super) fn record(
+        &self,
+        estimated: &[usize],
+        factor: impl Fn(usize) -> f64,
+        tests: &[ErrorTermTest],
+    ) -> BudgetRecord {
+        let of = |all: &ParameterVector| -> Vec<f64> {
+            let in_unit = |&i: &usize| three_digits((all[i] * factor(i)).abs());
+            estimated.iter().map(in_unit).collect()
+        };
+        let finite = |freedom: f64| Some(freedom).filter(|freedom| freedom.is_finite());
+        BudgetRecord {
+            sources: self
+                .parts
+                .iter()
+                .map(|part| BudgetPartRecord {
+                    source: part.source.name().to_owned(),
+                    u: estimated
+                        .iter()
+                        .map(|&i| part.covariance[(i, i)].max(0.0).sqrt() * factor(i).abs())
+                        .collect(),
+                    degrees_of_freedom: finite(part.degrees_of_freedom),
+                })
+                .collect(),
+            degrees_of_freedom: estimated
+                .iter()
+                .map(|&i| finite(self.degrees_of_freedom(i)))
+                .collect(),
+            coverage_factor: estimated.iter().map(|&i| self.coverage_factor(i)).collect(),
+            left_off: tests
+                .iter()
+                .filter_map(|test| {
+                    let left_off = test.left_off?;
+                    Some(LeftOffRecord {
+                        term: test.term.name().to_owned(),
+                        usual: of(&left_off.usual),
+                        shown: of(&left_off.shown),
+                    })
+                })
+                .collect(),
+        }
+    }
+}
+
+fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,256 @@
+//! Where the uncertainty of an estimate comes from.
+
+use serde::{Deserialize, Serialize};
+
+use super::super::layout::{Layout, POSITION, VELOCITY};
+use super::super::noise::Source;
+use super::super::outcome::Outcome;
+use super::super::pass::Driver;
+use crate::imu::{Sensor, Term};
+use crate::turntable::AxisError;
+
+/// The end of a 95 % interval, in σ.
+const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;
+
+/// A source of uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BudgetSource {
+    /// Angle random walk.
+    GyroNoise,
+    /// Velocity random walk.
+    AccelNoise,
+    /// Attitude noise of moves.
+    GyroMoves,
+    /// Velocity noise of moves.
+    AccelMoves,
+    /// Gauss–Markov biases of the gyros.
+    GyroWander,
+    /// Gauss–Markov biases of the accelerometers.
+    AccelWander,
+    /// Samples that were missing and are interpolated.
+    Interpolated,
+    /// Whole pulses, of both triads.
+    Pulses,
+    /// White velocity at standstill.
+    VelocityAtRest,
+    /// White attitude at standstill, without a table.
+    AttitudeAtRest,
+    /// Turning at standstill, without a table.
+    Turning,
+    /// Velocity at the first sample, and position in every dwell: the IMU's distance from the table's
+    /// centre.
+    Place,
+    /// Position errors of the table, new at every position.
+    TablePosition,
+    /// Readings of the table.
+    TableReading,
+    /// Level of the table's base.
+    TableLevel,
+    /// North of the table's base.
+    TableNorth,
+    /// Axes of the table that are not at right angles.
+    TableSquareness,
+    /// Wobble of its axes.
+    TableWobble,
+    /// Encoder errors that repeat with angle.
+    TableEncoder,
+    /// Gravity at the site.
+    Gravity,
+    /// What was known of the attitude at the first sample.
+    InitialAttitude,
+    /// What was known of the parameters.
+    Prior,
+    /// What was known of how parameters change with temperature.
+    Temperature,
+    /// By how much the instrument differs between recordings.
+    Recording,
+    /// What was known of second order of the accelerometers, which is estimated.
+    AccelSecondOrder,
+    /// Of their asymmetry.
+    AccelAsymmetry,
+    /// Of their size effect.
+    SizeEffect,
+    /// Of the time between gyros and accelerometers.
+    TimeOffset,
+    /// Of the g-sensitivity of the gyros.
+    GSensitivity,
+    /// Of the asymmetry of the gyros.
+    GyroAsymmetry,
+    /// Of their second order.
+    GyroSecondOrder,
+    /// Of their nonlinearity.
+    GyroNonlinearity,
+    /// Of third order of the accelerometers.
+    AccelThirdOrder,
+    /// Of their cross coupling.
+    AccelCrossCoupling,
+    /// Second order of the installation form in angles that are hardly known.
+    Curvature,
+    /// By how much dwells scatter more than all noise says.
+    DwellScatter,
+}
+
+impl BudgetSource {
+    /// What an engineer calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GyroNoise => "gyro white noise",
+            Self::AccelNoise => "accel white noise",
+            Self::GyroMoves => "gyro noise of moves",
+            Self::AccelMoves => "accel noise of moves",
+            Self::GyroWander => "gyro bias variation",
+            Self::AccelWander => "accel bias variation",
+            Self::Interpolated => "interpolated samples",
+            Self::Pulses => "pulses",
+            Self::VelocityAtRest => "velocity at standstill",
+            Self::AttitudeAtRest => "attitude at standstill",
+            Self::Turning => "turning at standstill",
+            Self::Place => "place of the IMU",
+            Self::TablePosition => "table position",
+            Self::TableReading => "table reading",
+            Self::TableLevel => "table level",
+            Self::TableNorth => "table north",
+            Self::TableSquareness => "squareness of the table's axes",
+            Self::TableWobble => "wobble of the table's axes",
+            Self::TableEncoder => "table encoders",
+            Self::Gravity => "gravity",
+            Self::InitialAttitude => "initial attitude",
+            Self::Prior => "prior",
+            Self::Temperature => "prior of temperature coefficients",
+            Self::Recording => "differences between recordings",
+            Self::AccelSecondOrder => "prior of accel-second-order",
+            Self::AccelAsymmetry => "prior of accel-asymmetry",
+            Self::SizeEffect => "prior of size-effect",
+            Self::TimeOffset => "prior of time-offset",
+            Self::GSensitivity => "prior of g-sensitivity",
+            Self::GyroAsymmetry => "prior of gyro-asymmetry",
+            Self::GyroSecondOrder => "prior of gyro-second-order",
+            Self::GyroNonlinearity => "prior of gyro-nonlinearity",
+            Self::AccelThirdOrder => "prior of accel-third-order",
+            Self::AccelCrossCoupling => "prior of accel-cross-coupling",
+            Self::Curvature => "second order of unknown angles",
+            Self::DwellScatter => "scatter of dwells",
+        }
+    }
+
+    /// What draws a state anew, or is known of it before.
+    pub(super) fn of_state(layout: &Layout, state: usize) -> Self {
+        let within = |first: Option<usize>| {
+            first.and_then(|first| state.checked_sub(first).filter(|&axis| axis < 3))
+        };
+        let varying = layout
+            .varying_biases()
+            .find(|&(varying, ..)| varying == state);
+        if let Some((_, sensor, _)) = varying {
+            return Self::of_driver(Driver::Wander(sensor));
+        }
+        if (VELOCITY..POSITION + 3).contains(&state) {
+            return Self::Place;
+        }
+        if let Some(axis) = within(layout.table_base()) {
+            return match axis {
+                2 => Self::TableNorth,
+                _ => Self::TableLevel,
+            };
+        }
+        if within(layout.table_position()).is_some() {
+            return Self::TablePosition;
+        }
+        if within(layout.turn_at_rest()).is_some() {
+            return Self::Turning;
+        }
+        if layout.gravity() == Some(state) {
+            return Self::Gravity;
+        }
+        if let Some((_, index)) = layout.table_axes().find(|&(axis, _)| axis == state) {
+            let kinds = AxisError::ALL.into_iter();
+            let kind = kinds
+                .filter(|kind| kind.range().contains(&index))
+                .next_back();
+            return match kind {
+                Some(AxisError::Tilt) => Self::TableSquareness,
+                Some(AxisError::Wobble) => Self::TableWobble,
+                _ => Self::TableEncoder,
+            };
+        }
+        if let Some((_, index)) = layout.terms().find(|&(term, _)| term == state) {
+            return Term::of(index).map_or(Self::Prior, Self::of_term);
+        }
+        if layout.thermal().any(|(thermal, _)| thermal == state) {
+            return Self::Temperature;
+        }
+        if layout.own().any(|(own, _)| own == state) {
+            return Self::Recording;
+        }
+        match layout.parameters().any(|(parameter, _)| parameter == state) {
+            true => Self::Prior,
+            false => Self::InitialAttitude,
+        }
+    }
+
+    fn of_term(term: Term) -> Self {
+        match term {
+            Term::AccelSecondOrder => Self::AccelSecondOrder,
+            Term::AccelAsymmetry => Self::AccelAsymmetry,
+            Term::SizeEffect => Self::SizeEffect,
+            Term::TimeOffset => Self::TimeOffset,
+            Term::GSensitivity => Self::GSensitivity,
+            Term::GyroAsymmetry => Self::GyroAsymmetry,
+            Term::GyroSecondOrder => Self::GyroSecondOrder,
+            Term::GyroNonlinearity => Self::GyroNonlinearity,
+            Term::AccelThirdOrder => Self::AccelThirdOrder,
+            Term::AccelCrossCoupling => Self::AccelCrossCoupling,
+        }
+    }
+
+    pub(super) fn of_driver(driver: Driver) -> Self {
+        match driver {
+            Driver::White(Sensor::Gyro) => Self::GyroNoise,
+            Driver::White(Sensor::Accel) => Self::AccelNoise,
+            Driver::Moves(Sensor::Gyro) => Self::GyroMoves,
+            Driver::Moves(Sensor::Accel) => Self::AccelMoves,
+            Driver::Wander(Sensor::Gyro) => Self::GyroWander,
+            Driver::Wander(Sensor::Accel) => Self::AccelWander,
+            Driver::Turning => Self::Turning,
+            Driver::Interpolated => Self::Interpolated,
+        }
+    }
+
+    /// What is learnt of it from a record, if anything is.
+    fn learnt(self) -> &'static [Source] {
+        match self {
+            Self::GyroNoise => &[Source::AngleRandomWalk],
+            Self::AccelNoise => &[Source::VelocityRandomWalk],
+            Self::GyroMoves => &[Source::GyroMotion, Source::GyroMoving],
+            Self::AccelMoves => &[Source::AccelMotion, Source::AccelMoving],
+            Self::GyroWander => &[Source::GyroGaussMarkov],
+            Self::AccelWander => &[Source::AccelGaussMarkov],
+            Self::VelocityAtRest => &[Source::Velocity],
+            Self::AttitudeAtRest => &[Source::Attitude],
+            Self::Turning => &[Source::Turning],
+            Self::TablePosition => &[Source::TablePosition],
+            Self::TableReading => &[Source::TableReading],
+            _ => &[],
+        }
+    }
+
+    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2), Δu from the upper
+    /// end of the interval of what was learnt, for the lower one may be nothing at all; of several the
+    /// least, and not less than one.
+    pub(super) fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
+        if self == Self::DwellScatter {
+            let parameters = outcome.estimate.estimated().count().max(1);
+            let scores = outcome.dwell_scatter.map_or(0, |scatter| scatter.count);
+            return (scores as f64 / parameters as f64).max(1.0);
+        }
+        let learnt = outcome.noise.sources.iter();
+        let of_own = learnt.filter(|figures| self.learnt().contains(&figures.source));
+        let freedoms = of_own.filter_map(|figures| {
+            let [_, high] = figures.interval?;
+            let relative = (high / figures.used).ln() / END_OF_INTERVAL;
+            (figures.used > 0.0 && relative > 0.0).then(|| (0.5 / relative.powi(2)).max(1.0))
+        });
+        freedoms.fold(f64::INFINITY, f64::min)
+    }
+}

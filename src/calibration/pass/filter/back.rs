@@ -1,0 +1,311 @@
+//! Errors of an estimate followed back through what a filter did.
+//!
+//! `λᵀ e` is what errors e of the states make of an error of the estimate. Every operation of a linear filter
+//! makes of e another e and adds noise to it; read backwards it makes of λ another λ, and λ times the root
+//! of the covariance of that noise is what the noise does to the estimate (adjoint of the filter: Bryson and
+//! Ho, *Applied Optimal Control*, §12.7; Gelb, *Applied Optimal Estimation*, §7.1 for error budgets).
+
+use super::super::local::{Given, Local, Look, StepModel, roots};
+use super::super::segment::{Seen, Segment};
+use super::standing::{Done, Observer, Taken, begins};
+use super::tape::{Driver, Operation};
+use super::{ATTITUDE, Filter, NAVIGATION};
+use crate::calibration::parameters::PARAMETERS;
+use crate::navigation::Block;
+
+/// What an error of one σ does to each parameter.
+pub(in crate::calibration) type Effect = [f64; PARAMETERS];
+
+/// λ of every state, and who is told of noise.
+pub(in crate::calibration) struct Followed {
+    /// For each state, by parameter.
+    pub of_states: Vec<Effect>,
+}
+
+impl Followed {
+    /// Errors of the estimated parameters themselves.
+    pub fn of(filter: &Filter) -> Self {
+        let mut of_states = vec![[0.0; PARAMETERS]; filter.layout.size()];
+        for (state, index) in filter.layout.parameters() {
+            of_states[state][index] = 1.0;
+        }
+        Self { of_states }
+    }
+
+    /// What the states that an operation moved become of, by its moving states; they are taken out.
+    fn taken_out(&mut self, moving: &[usize]) -> Vec<Effect> {
+        let out = |&state: &usize| std::mem::replace(&mut self.of_states[state], [0.0; PARAMETERS]);
+        moving.iter().map(out).collect()
+    }
+
+    /// Follows back one operation; returns what its noise, of unit variance each, does: one effect for
+    /// what is drawn or taken, the effects of the moving states for what is carried.
+    pub fn back(&mut self, operation: &Operation) -> Vec<Effect> {
+        match operation {
+            Operation::Drawn { states, sigma } => {
+                let mut effect = [0.0; PARAMETERS];
+                for of_state in self.taken_out(states) {
+                    add(&mut effect, *sigma, &of_state);
+                }
+                vec![effect]
+            }
+            Operation::Turned { first, by } => {
+                for row in 0..3 {
+                    let of_row = self.of_states[first + row];
+                    for column in 0..3 {
+                        let of_attitude = &mut self.of_states[ATTITUDE + column];
+                        add(of_attitude, by[(row, column)], &of_row);
+                    }
+                }
+                Vec::new()
+            }
+            Operation::Varied {
+                state,
+                keep,
+                variance,
+            } => {
+                let of_state = &mut self.of_states[*state];
+                let effect = of_state.map(|x| x * variance.sqrt());
+                of_state.iter_mut().for_each(|x| *x *= keep);
+                vec![effect]
+            }
+            Operation::Taken {
+                row,
+                gain,
+                variance,
+            } => {
+                let mut of_noise = [0.0; PARAMETERS];
+                for (of_state, gain) in self.of_states.iter().zip(gain) {
+                    add(&mut of_noise, -gain, of_state);
+                }
+                for (of_state, weight) in self.of_states.iter_mut().zip(row) {
+                    if *weight != 0.0 {
+                        add(of_state, *weight, &of_noise);
+                    }
+                }
+                vec![of_noise.map(|x| x * variance.sqrt())]
+            }
+            Operation::Carried { moving, transition } => {
+                let out = self.taken_out(moving);
+                for (of_moving, row) in out.iter().zip(transition.row_iter()) {
+                    for (of_state, weight) in self.of_states.iter_mut().zip(row.iter()) {
+                        if *weight != 0.0 {
+                            add(of_state, *weight, of_moving);
+                        }
+                    }
+                }
+                out
+            }
+        }
+    }
+}
+
+/// Who is told what noise within a part of a dwell does.
+pub(in crate::calibration) trait Told {
+    /// Noise of an observation, of unit variance, does this by axis.
+    fn observed(&mut self, seen: &Seen, effects: &[Effect; 3]);
+    /// Noise of a driver, of unit variance, does this.
+    fn driven(&mut self, driver: Driver, effect: &Effect);
+}
+
+impl Filter {
+    /// Follows errors back through a part of a dwell: `at_end` is what errors of its moving states at its end
+    /// do, `of_measured` what noise of each row does that it measured.
+    pub fn back_through(
+        &self,
+        segment: &Segment,
+        observer: &mut impl Observer,
+        drivers: &[(Driver, Self)],
+        effects: [&[Effect]; 2],
+        told: &mut impl Told,
+    ) -> Taken {
+        let turn = self.layout.turn_at_rest().map_or(0, |_| 3);
+        match turn + self.varying.len() {
+            0 => self.back_with::<9, 15>(segment, observer, drivers, effects, told),
+            3 => self.back_with::<12, 18>(segment, observer, drivers, effects, told),
+            6 => self.back_with::<15, 21>(segment, observer, drivers, effects, told),
+            _ => self.back_with::<18, 24>(segment, observer, drivers, effects, told),
+        }
+    }
+
+    fn back_with<const M: usize, const G: usize>(
+        &self,
+        segment: &Segment,
+        observer: &mut impl Observer,
+        drivers: &[(Driver, Self)],
+        [at_end, of_measured]: [&[Effect]; 2],
+        told: &mut impl Told,
+    ) -> Taken {
+        let moving = self.moving();
+        let mut local = Local::<M, G>::new(Given::certain(), begins(&moving));
+        let mut done = Vec::new();
+        let mut keep = |what: Done<M, G>| {
+            done.push(match what {
+                Done::Step(model) => Kept::Step(model),
+                Done::Observed { state, seen, look } => Kept::Observed {
+                    state,
+                    seen: *seen,
+                    look: Box::new(look.clone()),
+                },
+            });
+        };
+        match self.through(&mut local, segment, observer, &mut keep) {
+            Taken::Whole => {}
+            other => return other,
+        }
+        // Σ rᵀ ν over all observations is Rᵀ times the noise of the rows R that are measured.
+        let rows = local.measured();
+        let mut of_sum = [[0.0; PARAMETERS]; G];
+        for (n, (pivot, row)) in rows.iter().enumerate().rev() {
+            let mut effect = of_measured.get(n).copied().unwrap_or([0.0; PARAMETERS]);
+            for (later, _) in &rows[n + 1..] {
+                add(&mut effect, -row[*later], &of_sum[*later]);
+            }
+            of_sum[*pivot] = effect.map(|x| x / row[*pivot]);
+        }
+        let mut of_errors = [[0.0; PARAMETERS]; M];
+        for (own, at_end) in of_errors.iter_mut().zip(at_end) {
+            *own = *at_end;
+        }
+        let models: Vec<StepModel<M>> = segment
+            .models
+            .iter()
+            .map(|block| self.step_model(block, &moving))
+            .collect();
+        let of_drivers = self.drivers::<M>(segment, &moving, drivers);
+        for kept in done.iter().rev() {
+            match kept {
+                Kept::Step(model) => {
+                    for (driver, root) in &of_drivers[*model] {
+                        told.driven(*driver, &combined(root, &of_errors));
+                    }
+                    let mut before = [[0.0; PARAMETERS]; M];
+                    for &(row, column, phi) in &models[*model].transition {
+                        add(&mut before[column], phi, &of_errors[row]);
+                    }
+                    of_errors = before;
+                }
+                Kept::Observed { state, seen, look } => {
+                    let effects = of_observation(look, &of_errors, &of_sum);
+                    for (axis, effect) in effects.iter().enumerate() {
+                        add(&mut of_errors[state + axis], 1.0, effect);
+                    }
+                    told.observed(seen, &effects);
+                }
+            }
+        }
+        Taken::Whole
+    }
+
+    /// What noise of a block of a move does, `effects` what the navigation errors at its end do, and after them
+    /// those of the turn at rest.
+    pub fn back_through_noise(
+        &self,
+        block: &Block,
+        drivers: &[(Driver, Self)],
+        effects: &[Effect],
+        told: &mut impl Told,
+    ) {
+        match self.layout.turn_at_rest() {
+            Some(_) => told_of::<{ NAVIGATION + 3 }>(block, drivers, effects, told),
+            None => told_of::<NAVIGATION>(block, drivers, effects, told),
+        }
+    }
+
+    /// Roots of the noise that each driver adds in a step, by model of the segment.
+    fn drivers<const M: usize>(
+        &self,
+        segment: &Segment,
+        moving: &[usize],
+        drivers: &[(Driver, Self)],
+    ) -> Vec<Vec<(Driver, [f64; M])>> {
+        let models = segment.models.iter().map(|block| {
+            let of = |filter: &Self| filter.step_model::<M>(block, moving).noise;
+            alone(drivers, of)
+        });
+        models.collect()
+    }
+}
+
+fn told_of<const MOVING: usize>(
+    block: &Block,
+    drivers: &[(Driver, Filter)],
+    effects: &[Effect],
+    told: &mut impl Told,
+) {
+    for (driver, root) in alone(drivers, |filter| filter.noise_of_move::<MOVING>(block)) {
+        told.driven(driver, &combined(&root, effects));
+    }
+}
+
+/// Roots of the noise of each driver less that of interpolated samples, which all have.
+fn alone<const N: usize>(
+    drivers: &[(Driver, Filter)],
+    noise: impl Fn(&Filter) -> [[f64; N]; N],
+) -> Vec<(Driver, [f64; N])> {
+    let interpolated = drivers
+        .iter()
+        .find(|(driver, _)| *driver == Driver::Interpolated);
+    let common = interpolated.map_or([[0.0; N]; N], |(_, filter)| noise(filter));
+    let own = drivers.iter().flat_map(|(driver, filter)| {
+        let mut own = noise(filter);
+        if *driver != Driver::Interpolated {
+            let both = own.iter_mut().flatten().zip(common.iter().flatten());
+            both.for_each(|(own, common)| *own -= common);
+        }
+        roots(own).into_iter().map(|root| (*driver, root))
+    });
+    own.collect()
+}
+
+/// What errors of these sizes do.
+fn combined(sizes: &[f64], effects: &[Effect]) -> Effect {
+    let mut sum = [0.0; PARAMETERS];
+    for (size, effect) in sizes.iter().zip(effects) {
+        add(&mut sum, *size, effect);
+    }
+    sum
+}
+
+/// What a filter of a part alone did.
+enum Kept<const M: usize, const G: usize> {
+    Step(usize),
+    Observed {
+        state: usize,
+        seen: Seen,
+        look: Box<Look<M, G>>,
+    },
+}
+
+/// What noise of each component of an observation does, of errors that are what they are after it.
+fn of_observation<const M: usize, const G: usize>(
+    look: &Look<M, G>,
+    of_errors: &[Effect; M],
+    of_sum: &[Effect; G],
+) -> [Effect; 3] {
+    let mut effects = [[0.0; PARAMETERS]; 3];
+    for (k, effect) in effects.iter_mut().enumerate() {
+        for (of_sum, weight) in of_sum.iter().zip(&look.rows[k]) {
+            add(effect, *weight, of_sum);
+        }
+        for (of_error, gain) in of_errors.iter().zip(&look.gain[k]) {
+            add(effect, -gain, of_error);
+        }
+    }
+    // What was taken in is L⁻¹ of the observation.
+    for k in (0..3).rev() {
+        let (before, from) = effects.split_at_mut(k);
+        from[0].iter_mut().for_each(|x| *x /= look.root[(k, k)]);
+        for (j, effect) in before.iter_mut().enumerate() {
+            add(effect, -look.root[(k, j)], &from[0]);
+        }
+    }
+    effects
+}
+
+#[inline]
+fn add(sum: &mut Effect, weight: f64, other: &Effect) {
+    for k in 0..PARAMETERS {
+        sum[k] += weight * other[k];
+    }
+}

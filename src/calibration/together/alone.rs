@@ -1,0 +1,174 @@
+//! Each recording of a problem calibrated alone.
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+use rayon::prelude::*;
+
+use super::super::coarse::coarse_start;
+use super::super::error::CalibrationError;
+use super::super::estimate::Estimate;
+use super::super::gauss_newton::from_coarse_start;
+use super::super::linearisation::AttitudePrior;
+use super::super::model::Model;
+use super::super::parameters::{ParameterVector, parameter};
+use super::super::problem::Problem;
+use super::solved;
+use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange, ThermalState};
+
+/// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
+/// more.
+const BEYOND_NOISE: f64 = 10.0;
+
+/// A recording within this part of the range is at one temperature.
+const PART_OF_RANGE: f64 = 0.1;
+
+/// What a recording alone says.
+#[derive(Debug, Clone)]
+pub struct Alone {
+    /// Its name.
+    pub name: String,
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
+    pub temperature: Option<PerSensor<[f64; 3]>>,
+    /// The span of its temperatures, K.
+    pub span: f64,
+    /// Calibration at that temperature, with stated noise; none where it gave none.
+    pub estimate: Option<Estimate>,
+    /// Where its temperature stands for all of it: the functions of temperature then.
+    pub(super) state: Option<ThermalState>,
+    pub(super) start: ParameterVector,
+    pub(super) priors: Vec<AttitudePrior>,
+    pub(super) initial_attitudes: Vec<Matrix3<f64>>,
+}
+
+impl Alone {
+    /// Mean temperature of all axes over its dwells, °C.
+    pub fn mean_temperature(&self) -> Option<f64> {
+        let PerSensor { gyro, accel } = self.temperature?;
+        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
+    }
+}
+
+/// Each recording alone, on as many threads as there are.
+pub(super) fn each(problem: &Problem) -> Result<Vec<Alone>, CalibrationError> {
+    let runs = problem.runs().count();
+    (0..runs)
+        .into_par_iter()
+        .map(|number| of(&problem.recording(number)))
+        .collect()
+}
+
+fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
+    let run = problem.run();
+    let mut model = problem.model.clone();
+    let thermal = model.thermal.take();
+    model.own_sigma.fill(0.0);
+    let plain = problem.with_model(model);
+    let temperature = run.recording.imu.temperature.as_ref();
+    let span = temperature.map_or(0.0, |temperature| {
+        Sensor::ALL
+            .map(|sensor| {
+                let [low, high] = temperature.range(sensor);
+                high - low
+            })
+            .into_iter()
+            .fold(0.0, f64::max)
+    });
+    let middle = temperature.map(|temperature| {
+        let imu = &run.recording.imu;
+        let times: Vec<f64> = plain
+            .dwells()
+            .map(|dwell| 0.5 * (imu.time(dwell.samples.start) + imu.time(dwell.samples.end)))
+            .collect();
+        PerSensor::from_fn(|sensor| {
+            [0, 1, 2].map(|axis| {
+                let values = times.iter().map(|&t| temperature.at(t).get(sensor)[axis]);
+                values.sum::<f64>() / times.len().max(1) as f64
+            })
+        })
+    });
+    let state = thermal.as_ref().zip(middle.as_ref());
+    let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
+    let alone = |start, priors, initial_attitudes, estimate| Alone {
+        name: run.recording.name.clone(),
+        temperature: middle,
+        span,
+        estimate,
+        state,
+        start,
+        priors,
+        initial_attitudes,
+    };
+    // What changes within a recording has no calibration without its change.
+    let range = thermal.as_ref().map(|thermal| thermal.range);
+    let whole = range.map_or(f64::INFINITY, |range| {
+        let span = |range: &ThermalRange| range.highest - range.lowest;
+        span(&range.gyro).max(span(&range.accel))
+    });
+    let stands = span < PART_OF_RANGE * whole;
+    let solved = stands.then(|| from_coarse_start(&plain, &|_| {}));
+    Ok(match solved {
+        Some(Ok(solved)) => alone(
+            super::super::parameters::to_vector(&solved.iterated.held.estimate.triads),
+            solved.priors,
+            solved.iterated.held.estimate.initial_attitudes.clone(),
+            solved.iterated.converged.then(|| Estimate {
+                triads: solved.iterated.held.estimate.triads,
+                covariance: solved.iterated.held.covariance,
+            }),
+        ),
+        _ => {
+            let start = coarse_start(&plain)?;
+            alone(
+                super::super::parameters::to_vector(&start.at.triads),
+                start.attitudes,
+                start.at.initial_attitudes,
+                None,
+            )
+        }
+    })
+}
+
+/// Of a parameter, the part common to all recordings beyond its prior mean, and the coefficient of each function of
+/// temperature: least squares through what each recording alone says.
+pub(super) fn through(
+    model: &Model,
+    alone: &[Alone],
+    (sensor, of_triad, axis): (Sensor, usize, usize),
+) -> DVector<f64> {
+    let index = parameter(sensor, of_triad);
+    let prior = model.prior_sigma[index];
+    let n = 1 + THERMAL_FUNCTIONS;
+    let sigma = |k: usize| match k.checked_sub(1) {
+        None => prior,
+        Some(function) => model.thermal.as_ref().map_or(0.0, |thermal| {
+            thermal.sigma.get(sensor)[(of_triad, function)]
+        }),
+    };
+    let mut normal = DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(i == j)));
+    let mut right = DVector::zeros(n);
+    for alone in alone {
+        let known = alone.estimate.as_ref();
+        let variance = known.map_or(0.0, |estimate| estimate.covariance[(index, index)]);
+        let own = model.own_sigma[index].powi(2);
+        // Without a σ the coarse start is as good as a tenth of what was known before.
+        let variance = match variance > 0.0 {
+            true => variance * BEYOND_NOISE.powi(2) + own,
+            false => (0.1 * prior).powi(2) + own,
+        };
+        let functions = alone.state.as_ref();
+        let row = DVector::from_fn(n, |k, _| {
+            let by = match k.checked_sub(1) {
+                None => 1.0,
+                Some(function) => functions.map_or(0.0, |s| s.get(sensor)[axis][function]),
+            };
+            by * sigma(k)
+        });
+        let off = alone.start[index] - model.prior_mean[index];
+        normal.ger(1.0 / variance, &row, &row, 1.0);
+        right.axpy(off / variance, &row, 1.0);
+    }
+    let mut solution = solved(normal, &right);
+    for k in 0..n {
+        solution[k] *= sigma(k);
+    }
+    solution
+}

@@ -1,0 +1,241 @@
+//! Several recordings of one instrument as one problem: what they have in common is estimated once, what is
+//! each one's own differs by a stated σ, and parameters may follow temperature.
+//!
+//! Each recording is first calibrated alone, on a thread of its own. Through these estimates go the polynomials
+//! from which the Gauss–Newton iterations of all data begin; with all orders that the temperatures support,
+//! then with those that a likelihood ratio calls for.
+
+mod alone;
+mod order;
+mod repeat;
+mod temperatures;
+
+use std::sync::Arc;
+
+use nalgebra::DVector;
+
+use super::error::CalibrationError;
+use super::finding::Finding;
+use super::gauss_newton::Progress;
+use super::iterations::{Iterated, iterate};
+use super::linearisation::{AttitudePrior, Linearisation};
+use super::options::Options;
+use super::outcome::Pass;
+use super::parameters::{ParameterVector, parameter};
+use super::pass::Gate;
+use super::problem::{Problem, Stretch};
+use crate::imu::{
+    HIGHEST_ORDER, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, RATE, Sensor,
+    ThermalCoefficients, ThermalModel, ThermalRange, Triad,
+};
+use crate::run::Run;
+pub use alone::Alone;
+pub use repeat::Repeatability;
+use temperatures::Temperatures;
+
+/// What recordings of one instrument have in common, and what not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Together {
+    /// 1σ by which each parameter differs from one recording to the next, normalised; zero where it is common
+    /// to all.
+    pub day_to_day: ParameterVector,
+    /// How parameters follow temperature; none where they do not.
+    pub temperature: Option<TemperatureOptions>,
+}
+
+impl Default for Together {
+    fn default() -> Self {
+        Self {
+            day_to_day: ParameterVector::zeros(),
+            temperature: Some(TemperatureOptions::default()),
+        }
+    }
+}
+
+/// How parameters follow temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemperatureOptions {
+    /// Highest order of the polynomials that is tried, at most [`HIGHEST_ORDER`].
+    pub highest_order: usize,
+    /// Whether biases may follow the rate of temperature, too.
+    pub rate: bool,
+    /// At which parameters are stated, °C; none: in the middle of the range.
+    pub reference: Option<f64>,
+}
+
+impl Default for TemperatureOptions {
+    fn default() -> Self {
+        Self {
+            highest_order: 3,
+            rate: true,
+            reference: None,
+        }
+    }
+}
+
+/// What a parameter may change by within the range, in σ of what is known of it beforehand: more than an
+/// instrument of its grade, so that the data decide.
+const CHANGE: f64 = 3.0;
+
+impl<'a> Problem<'a> {
+    /// The problem that recordings of one instrument pose together. The first one's instrument and table stand for
+    /// all.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if there is none, or one has no temperature where parameters follow it.
+    pub fn together(
+        runs: &[&'a Run],
+        options: &Options,
+        together: &Together,
+    ) -> Result<Self, CalibrationError> {
+        let (first, others) = runs.split_first().ok_or(CalibrationError::NoDwells)?;
+        let mut problem = Self::new(first, options);
+        for run in others {
+            problem = problem.and(run);
+        }
+        let mut model = problem.model.clone();
+        model.own_sigma = together.day_to_day;
+        if let Some(options) = together.temperature {
+            let temperatures = Temperatures::of(&problem)?;
+            model.thermal = temperatures.model(&problem, options).map(Arc::new);
+        }
+        Ok(problem.with_model(model))
+    }
+
+    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known.
+    pub(super) fn warming(&self) -> Vec<(f64, f64)> {
+        let of_stretch = |stretch: &Stretch| {
+            let imu = &stretch.run.recording.imu;
+            let mean =
+                |all: PerSensor<[f64; 3]>| all.gyro.iter().chain(&all.accel).sum::<f64>() / 6.0;
+            let dwells = stretch.dwells.iter();
+            dwells
+                .map(|dwell| {
+                    let (from, to) = (imu.time(dwell.samples.start), imu.time(dwell.samples.end));
+                    let middle = 0.5 * (from + to);
+                    imu.temperature.as_ref().map_or((f64::NAN, f64::NAN), |t| {
+                        (mean(t.at(middle)), mean(t.rate(middle)))
+                    })
+                })
+                .collect::<Vec<_>>()
+        };
+        self.stretches().iter().flat_map(of_stretch).collect()
+    }
+
+    /// Whether anything in it differs between recordings or temperatures.
+    pub(super) fn varies(&self) -> bool {
+        self.model.thermal.is_some() || self.model.own_sigma.amax() > 0.0
+    }
+}
+
+/// Iterations of all recordings together, and what came of each alone.
+pub(super) struct Joint<'a> {
+    /// With the orders that the data call for.
+    pub problem: Problem<'a>,
+    pub priors: Vec<AttitudePrior>,
+    pub passes: Vec<Pass>,
+    pub iterated: Iterated,
+    pub alone: Vec<Alone>,
+    pub findings: Vec<Finding>,
+}
+
+/// Solves a problem that varies, with stated noise.
+pub(super) fn solve<'a>(
+    problem: &Problem<'a>,
+    progress: Progress,
+) -> Result<Joint<'a>, CalibrationError> {
+    let alone = alone::each(problem)?;
+    let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
+    let at = start(problem, &alone);
+    let mut passes = Vec::new();
+    let gate = Gate::Innovations;
+    let mut iterated = iterate(problem, &priors, at, gate, &mut passes, progress)?;
+    let mut problem = problem.clone();
+    let mut findings = Vec::new();
+    if let Some(thermal) = &iterated.held.thermal {
+        let selected = order::select(thermal, &iterated.held.covariance);
+        findings.extend(selected.finding(problem.model.form));
+        if selected.model != thermal.model {
+            let mut model = problem.model.clone();
+            model.thermal = Some(Arc::new(selected.model));
+            problem = problem.with_model(model);
+            let mut from = iterated.held.estimate.clone();
+            order::move_to(&selected.conditioned, &mut from);
+            iterated = iterate(&problem, &priors, from, gate, &mut passes, progress)?;
+        }
+    }
+    Ok(Joint {
+        problem,
+        priors,
+        passes,
+        iterated,
+        alone,
+        findings,
+    })
+}
+
+/// Where the iterations begin: of each parameter the polynomial through what each recording alone says.
+fn start(problem: &Problem, alone: &[Alone]) -> Linearisation {
+    let model = &problem.model;
+    let initial = alone.iter().flat_map(|a| a.initial_attitudes.clone());
+    let mut at = Linearisation::new(
+        super::parameters::from_vector(model.form, &model.prior_mean),
+        nalgebra::SVector::zeros(),
+        initial.collect(),
+    );
+    let mut common = model.prior_mean;
+    for sensor in Sensor::ALL {
+        for of_triad in 0..PER_TRIAD {
+            let index = parameter(sensor, of_triad);
+            let (sigma, axis) = (model.prior_sigma[index], Triad::axis(model.form, of_triad));
+            let (Some(axis), true) = (axis, sigma > 0.0) else {
+                continue;
+            };
+            let fit = alone::through(model, alone, (sensor, of_triad, axis));
+            common[index] = model.prior_mean[index] + fit[0];
+            let coefficients = at.thermal.get_mut(sensor);
+            for function in 0..fit.len() - 1 {
+                coefficients[(of_triad, function)] = fit[function + 1];
+            }
+        }
+    }
+    at.triads = super::parameters::from_vector(model.form, &common);
+    at
+}
+
+/// 1σ of a triad's coefficients before the recordings, of polynomials up to an order.
+fn prior_sigma(problem: &Problem, sensor: Sensor, order: usize, rate: bool) -> ThermalCoefficients {
+    let model = &problem.model;
+    ThermalCoefficients::from_fn(|of_triad, function| {
+        let on = match function {
+            RATE => rate && Triad::kind(of_triad) == ParameterKind::Bias,
+            _ => function < order.min(HIGHEST_ORDER),
+        };
+        let sigma = model.prior_sigma[parameter(sensor, of_triad)];
+        if on { CHANGE * sigma } else { 0.0 }
+    })
+}
+
+/// The model of polynomials up to an order in these ranges.
+fn model_of(
+    problem: &Problem,
+    range: PerSensor<ThermalRange>,
+    order: PerSensor<usize>,
+    rate: bool,
+) -> ThermalModel {
+    ThermalModel {
+        sigma: PerSensor::from_fn(|sensor| {
+            let changes = range.get(sensor).largest_rate > 0.0;
+            prior_sigma(problem, sensor, *order.get(sensor), rate && changes)
+        }),
+        range,
+    }
+}
+
+/// A solution of normal equations that are positive definite by their prior; zero if not.
+fn solved(normal: nalgebra::DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    let n = right.len();
+    normal
+        .cholesky()
+        .map_or_else(|| DVector::zeros(n), |factor| factor.solve(right))
+}

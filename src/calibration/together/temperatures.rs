@@ -1,0 +1,98 @@
+//! The temperatures of recordings: range, and how many of them are distinct.
+
+use super::super::error::CalibrationError;
+use super::super::problem::Problem;
+use super::{TemperatureOptions, model_of};
+use crate::imu::{HIGHEST_ORDER, PerSensor, Sensor, ThermalModel, ThermalRange};
+
+/// Recordings within this many kelvin are at one temperature: what a soaked instrument changes by itself.
+const ONE_TEMPERATURE: f64 = 1.0;
+
+/// Temperatures that a problem's dwells were at.
+pub(super) struct Temperatures {
+    /// Of each dwell, the mean of a triad's axes, °C, ascending.
+    of_dwells: PerSensor<Vec<f64>>,
+    range: PerSensor<ThermalRange>,
+}
+
+impl Temperatures {
+    pub fn of(problem: &Problem) -> Result<Self, CalibrationError> {
+        for (number, run) in problem.runs().enumerate() {
+            if run.recording.imu.temperature.is_none() {
+                return Err(CalibrationError::NoTemperature {
+                    recording: run.recording.name.clone(),
+                    number: number + 1,
+                });
+            }
+        }
+        let known = |sensor: Sensor| {
+            let runs = problem.runs();
+            runs.filter_map(move |run| Some((run.recording.imu.temperature.as_ref()?, sensor)))
+        };
+        let range = PerSensor::from_fn(|sensor| {
+            let (mut lowest, mut highest, mut largest_rate) =
+                (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
+            for (temperature, sensor) in known(sensor) {
+                let [low, high] = temperature.range(sensor);
+                (lowest, highest) = (lowest.min(low), highest.max(high));
+                largest_rate = largest_rate.max(temperature.largest_rate(sensor));
+            }
+            ThermalRange {
+                lowest,
+                highest,
+                reference: 0.5 * (lowest + highest),
+                largest_rate,
+            }
+        });
+        let of_dwells = PerSensor::from_fn(|sensor| {
+            let mut all: Vec<f64> = Vec::new();
+            for stretch in problem.stretches() {
+                let imu = &stretch.run.recording.imu;
+                let Some(temperature) = &imu.temperature else {
+                    continue;
+                };
+                for dwell in &stretch.dwells {
+                    for edge in [dwell.samples.start, dwell.samples.end] {
+                        let axes = temperature.at(imu.time(edge));
+                        all.push(axes.get(sensor).iter().sum::<f64>() / 3.0);
+                    }
+                }
+            }
+            all.sort_by(f64::total_cmp);
+            all
+        });
+        Ok(Self { of_dwells, range })
+    }
+
+    /// The polynomials that they support; none where the instrument was at one temperature.
+    pub fn model(&self, problem: &Problem, options: TemperatureOptions) -> Option<ThermalModel> {
+        let mut range = self.range;
+        if let Some(reference) = options.reference {
+            range.gyro.reference = reference;
+            range.accel.reference = reference;
+        }
+        let order = PerSensor::from_fn(|sensor| {
+            let most = self.distinct(sensor).saturating_sub(1);
+            most.min(options.highest_order).min(HIGHEST_ORDER)
+        });
+        let any = order.gyro + order.accel > 0;
+        any.then(|| model_of(problem, range, order, options.rate))
+    }
+
+    /// How many temperatures lie apart by as much as a polynomial of the highest order needs to tell them.
+    fn distinct(&self, sensor: Sensor) -> usize {
+        let all = self.of_dwells.get(sensor);
+        let (Some(first), Some(last)) = (all.first(), all.last()) else {
+            return 0;
+        };
+        let apart = ((last - first) / (2 * HIGHEST_ORDER) as f64).max(ONE_TEMPERATURE);
+        let (mut count, mut before) = (0, f64::NEG_INFINITY);
+        for &temperature in all {
+            if temperature - before > apart {
+                count += 1;
+                before = temperature;
+            }
+        }
+        count
+    }
+}

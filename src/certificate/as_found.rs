@@ -1,0 +1,71 @@
+//! How the instrument was found: what its earlier calibration is off now.
+
+use super::results::{Quantity, nominal};
+use crate::calibration::frame::{Canonical, free_parameters};
+use crate::calibration::result::{Calibration, Provenance};
+use crate::calibration::{ComparisonError, Group, parameter_name};
+use crate::imu::{BodyFrame, InstallationForm, ParameterKind};
+
+/// An earlier calibration against this one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AsFound {
+    /// What the earlier one is called.
+    pub earlier: String,
+    /// Body frame that both are brought to.
+    pub body_frame: BodyFrame,
+    /// Every parameter that both have.
+    pub changes: Vec<Change>,
+}
+
+/// What has become of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Its name in the general form.
+    pub name: String,
+    /// What it is.
+    pub quantity: Quantity,
+    /// Earlier value, in SI; scale factors over their nominal value minus one.
+    pub found: f64,
+    /// Value now.
+    pub left: f64,
+    /// 1σ of the difference, as if both came of different data; none where the earlier one claims no σ.
+    pub sigma: Option<f64>,
+}
+
+pub(super) fn as_found(
+    name: &str,
+    earlier: &Calibration,
+    now: &Calibration,
+    provenance: &Provenance,
+) -> Result<AsFound, ComparisonError> {
+    let nominal = nominal(provenance);
+    let frames = [earlier.body_frame, now.body_frame];
+    let body_frame = match frames.contains(&BodyFrame::Accelerometer) {
+        true => BodyFrame::Accelerometer,
+        false => BodyFrame::Table,
+    };
+    let canonical = |name, record| Canonical::new(name, record, &nominal, body_frame);
+    let found = canonical(name, earlier)?;
+    let left = canonical("this calibration", now)?;
+    let covariance = found.covariance.zip(left.covariance).map(|(a, b)| a + b);
+    let (values_found, values_left) = (found.vector(), left.vector());
+    let changes = free_parameters(body_frame).into_iter().map(|i| {
+        let group = Group::of(i);
+        let base = match group.kind() {
+            ParameterKind::Scale => 1.0,
+            _ => 0.0,
+        };
+        Change {
+            name: parameter_name(InstallationForm::General, i).unwrap_or_default(),
+            quantity: Quantity(group),
+            found: values_found[i] - base,
+            left: values_left[i] - base,
+            sigma: covariance.map(|p| p[(i, i)].max(0.0).sqrt()),
+        }
+    });
+    Ok(AsFound {
+        earlier: name.to_owned(),
+        body_frame,
+        changes: changes.collect(),
+    })
+}

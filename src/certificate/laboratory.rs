@@ -1,0 +1,210 @@
+//! What a calibration laboratory states of itself, its customer and the item: nothing of it can be known
+//! from data.
+
+/// Who or where: a laboratory or a customer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Contact {
+    /// Name.
+    pub name: String,
+    /// Street with number.
+    pub street: String,
+    /// Postal code, if there is one.
+    pub post_code: Option<String>,
+    /// City.
+    pub city: String,
+    /// Country code of ISO 3166-1, two capital letters.
+    pub country: String,
+    /// Electronic mail.
+    pub email: Option<String>,
+    /// Telephone.
+    pub phone: Option<String>,
+}
+
+/// A day.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Day {
+    /// Year.
+    pub year: u16,
+    /// Month, from one.
+    pub month: u8,
+    /// Day of the month, from one.
+    pub day: u8,
+}
+
+impl Day {
+    /// From `2026-03-31`; none if that is no day of the calendar.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut parts = text.split('-');
+        let mut next = |digits: usize| {
+            let part = parts.next().filter(|part| part.len() == digits)?;
+            part.bytes().all(|b| b.is_ascii_digit()).then_some(part)
+        };
+        let day = Self {
+            year: next(4)?.parse().ok()?,
+            month: next(2)?.parse().ok()?,
+            day: next(2)?.parse().ok()?,
+        };
+        let leap = day.year % 4 == 0 && (day.year % 100 != 0 || day.year % 400 == 0);
+        let length = match day.month {
+            4 | 6 | 9 | 11 => 30,
+            2 => 28 + u8::from(leap),
+            1..=12 => 31,
+            _ => return None,
+        };
+        let within = (1..=length).contains(&day.day) && parts.next().is_none();
+        within.then_some(day)
+    }
+}
+
+impl std::fmt::Display for Day {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:04}-{:02}-{:02}", self.year, self.month, self.day)
+    }
+}
+
+/// Where a calibration was performed, in the words of the Digital Calibration Certificate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// In the laboratory.
+    Laboratory,
+    /// At the customer's.
+    Customer,
+    /// In a branch of the laboratory.
+    LaboratoryBranch,
+    /// Elsewhere.
+    Other,
+}
+
+impl Place {
+    /// As the Digital Calibration Certificate spells it.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::Laboratory => "laboratory",
+            Self::Customer => "customer",
+            Self::LaboratoryBranch => "laboratoryBranch",
+            Self::Other => "other",
+        }
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Laboratory => "in the laboratory",
+            Self::Customer => "at the customer's",
+            Self::LaboratoryBranch => "in a branch of the laboratory",
+            Self::Other => "elsewhere, see remarks",
+        }
+    }
+}
+
+/// A condition with its expanded uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Condition {
+    /// In the unit of its field.
+    pub value: f64,
+    /// Expanded uncertainty, k = 2.
+    pub uncertainty: f64,
+}
+
+/// A piece of equipment that traceability rests on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Equipment {
+    /// What it is.
+    pub name: String,
+    /// Its serial number.
+    pub serial: String,
+    /// Its own certificate.
+    pub certificate: String,
+}
+
+/// How conformity is decided (ISO/IEC 17025, 7.8.6; ILAC-G8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DecisionRule {
+    /// A limit is kept if the value is within it by the expanded uncertainty: guard band w = U.
+    GuardBand,
+    /// A limit is kept if the value is within it.
+    SimpleAcceptance,
+}
+
+impl DecisionRule {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::GuardBand => {
+                "guard band w = U (ILAC-G8): pass where the value is within its limit by the expanded uncertainty, \
+                 fail where it is beyond it by that; between these pass and fail are conditional"
+            }
+            Self::SimpleAcceptance => {
+                "simple acceptance (ILAC-G8): pass where the value is within its limit, whatever its uncertainty"
+            }
+        }
+    }
+}
+
+/// What a laboratory states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Laboratory {
+    /// The laboratory.
+    pub contact: Contact,
+    /// Who asked for the calibration.
+    pub customer: Contact,
+    /// Unique number of the certificate.
+    pub number: String,
+    /// Day of issue.
+    pub issued: Day,
+    /// Day on which the item was received.
+    pub received: Option<Day>,
+    /// First and last day of the calibration.
+    pub performed: (Day, Day),
+    /// Where it was performed.
+    pub place: Place,
+    /// What was calibrated, such as `inertial measurement unit`.
+    pub item: String,
+    /// Who made it.
+    pub manufacturer: Option<String>,
+    /// Its model.
+    pub model: String,
+    /// Its serial number.
+    pub serial: String,
+    /// In which state it was received.
+    pub state: String,
+    /// The laboratory's own procedure.
+    pub procedure: String,
+    /// Additions to, deviations or exclusions from it.
+    pub deviations: Option<String>,
+    /// Air temperature, °C.
+    pub temperature: Condition,
+    /// Relative humidity, %.
+    pub humidity: Option<Condition>,
+    /// How results are traceable to the SI, in the laboratory's words.
+    pub traceability: String,
+    /// What they are traceable through.
+    pub equipment: Vec<Equipment>,
+    /// Who authorises the certificate, and as what.
+    pub authorised: (String, String),
+    /// How conformity is decided.
+    pub rule: Option<DecisionRule>,
+    /// Anything else.
+    pub remarks: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_day_is_one_of_the_calendar() {
+        assert_eq!(Day::parse("2024-02-29").unwrap().to_string(), "2024-02-29");
+        for none in [
+            "2023-02-29",
+            "2024-13-01",
+            "2024-1-1",
+            "24-01-01",
+            "2024-04-31",
+            "2024-01-01-1",
+            "+024-01-01",
+        ] {
+            assert_eq!(Day::parse(none), None, "{none}");
+        }
+    }
+}

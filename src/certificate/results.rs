@@ -1,0 +1,113 @@
+//! Parameters with their expanded uncertainties.
+
+use crate::calibration::Group;
+use crate::calibration::result::{Calibration, Provenance};
+use crate::calibration::{PARAMETERS, parameter_name, sensor_and_parameter};
+use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor};
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+
+/// Coverage factor for 95.45 % where nothing says another.
+const COVERAGE_FACTOR: f64 = 2.0;
+
+/// A quantity of a certificate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Quantity(pub Group);
+
+impl Quantity {
+    /// Symbol of the unit that it is shown in, and its size in SI.
+    pub fn unit(self) -> (&'static str, f64) {
+        match (self.0.kind(), self.0.sensor()) {
+            (ParameterKind::Scale, _) => ("ppm", PPM),
+            (ParameterKind::Installation, _) => ("″", ARCSEC),
+            (ParameterKind::Bias, Sensor::Gyro) => ("°/h", DEG_PER_H),
+            (ParameterKind::Bias, Sensor::Accel) => ("µg", MICRO_G),
+        }
+    }
+
+    /// Its SI unit as D-SI spells it.
+    pub fn si_unit(self) -> &'static str {
+        match (self.0.kind(), self.0.sensor()) {
+            (ParameterKind::Scale, _) => "\\one",
+            (ParameterKind::Installation, _) => "\\radian",
+            (ParameterKind::Bias, Sensor::Gyro) => "\\radian\\second\\tothe{-1}",
+            (ParameterKind::Bias, Sensor::Accel) => "\\metre\\second\\tothe{-2}",
+        }
+    }
+}
+
+/// A parameter with its expanded uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Its name, such as `gyro.scale.x`.
+    pub name: String,
+    /// What it is.
+    pub quantity: Quantity,
+    /// In SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s².
+    pub value: f64,
+    /// Expanded uncertainty.
+    pub expanded: f64,
+    /// Coverage factor.
+    pub coverage_factor: f64,
+    /// Degrees of freedom; none where infinite.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// The nominal scales that a calibration was made with.
+pub(super) fn nominal(provenance: &Provenance) -> PerSensor<Nominal> {
+    PerSensor::from_fn(|sensor| Nominal((*provenance.nominal.get(sensor)).into()))
+}
+
+/// Every estimated parameter, and their covariance in SI; none if the record has no covariance.
+pub(super) fn results(
+    calibration: &Calibration,
+    provenance: &Provenance,
+) -> Option<(Vec<Measured>, Vec<Vec<f64>>)> {
+    let nominal = nominal(provenance);
+    let form = calibration.installation_form.unwrap_or_default();
+    let index =
+        |name: &String| (0..PARAMETERS).find(|&i| parameter_name(form, i).as_ref() == Some(name));
+    let indices: Vec<usize> = calibration
+        .parameters
+        .iter()
+        .map(index)
+        .collect::<Option<_>>()?;
+    let factor = |i: usize| {
+        let (sensor, of_triad) = sensor_and_parameter(i);
+        nominal.get(sensor).factor(of_triad)
+    };
+    let size = indices.len();
+    let sized = |row: &Vec<f64>| row.len() == size;
+    if size == 0
+        || calibration.covariance.len() != size
+        || !calibration.covariance.iter().all(sized)
+    {
+        return None;
+    }
+    let covariance: Vec<Vec<f64>> = (0..size)
+        .map(|m| {
+            let element =
+                |n: usize| calibration.covariance[m][n] / (factor(indices[m]) * factor(indices[n]));
+            (0..size).map(element).collect()
+        })
+        .collect();
+    let budget = calibration.budget.as_ref();
+    let results = indices.iter().zip(&calibration.parameters).enumerate();
+    let results = results.map(|(n, (&i, name))| {
+        let quantity = Quantity(Group::of(i));
+        let value = *calibration.get(name)? / factor(i);
+        let own = budget.and_then(|budget| budget.coverage_factor.get(n));
+        let coverage_factor = own.copied().unwrap_or(COVERAGE_FACTOR);
+        Some(Measured {
+            name: name.clone(),
+            quantity,
+            value: match quantity.0.kind() {
+                ParameterKind::Scale => value - 1.0,
+                ParameterKind::Installation | ParameterKind::Bias => value,
+            },
+            expanded: coverage_factor * covariance[n][n].max(0.0).sqrt(),
+            coverage_factor,
+            degrees_of_freedom: budget.and_then(|b| *b.degrees_of_freedom.get(n)?),
+        })
+    });
+    Some((results.collect::<Option<_>>()?, covariance))
+}

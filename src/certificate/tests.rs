@@ -1,0 +1,177 @@
+use super::conformity::decide;
+use super::*;
+use crate::calibration::result::InputFile;
+use crate::calibration::{Method, Options, Problem};
+use crate::formats::digest_of_bytes;
+use crate::lot::Limit;
+use crate::report::certificate::files;
+use crate::simulation::Scenario;
+use crate::units::{ARCSEC, PPM};
+
+fn calibration() -> Calibration {
+    let run = Scenario::load("demo").unwrap().simulate(7, 0).unwrap().run;
+    let problem = Problem::new(&run, &Options::default());
+    let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+    let assessment = solution.assess(&problem).unwrap();
+    let mut calibration = solution.calibration(&problem, &assessment);
+    calibration.provenance.as_mut().unwrap().inputs = vec![InputFile {
+        name: "imu.csv".to_owned(),
+        sha256: digest_of_bytes(b"imu"),
+    }];
+    calibration
+}
+
+fn laboratory() -> Laboratory {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
+    Laboratory::read(&path, |_| None).unwrap()
+}
+
+fn specification(within: f64) -> Specification {
+    let limit = |parameter| Limit {
+        parameter,
+        nominal: if parameter < 3 { 1.0 } else { 0.0 },
+        within,
+    };
+    Specification {
+        confidence: 0.95,
+        limits: (0..9).map(limit).collect(),
+    }
+}
+
+fn certificate() -> Certificate {
+    let calibration = calibration();
+    let mut earlier = calibration.clone();
+    earlier.gyro.scale[0] *= 1.0 - 100.0 * PPM;
+    let specification = specification(0.01);
+    let found = Some(("earlier.json", &earlier));
+    Certificate::new(
+        calibration.clone(),
+        digest_of_bytes(b"file"),
+        laboratory(),
+        Some(&specification),
+        found,
+    )
+    .unwrap()
+}
+
+#[test]
+fn the_same_inputs_give_the_same_bytes_and_every_file_names_the_certificate() {
+    let certificate = certificate();
+    let made = || files(&certificate, b"{}".to_vec()).unwrap();
+    let first = made();
+    assert_eq!(first, made());
+    let (name, pdf) = &first[0];
+    assert_eq!(name, "certificate.pdf");
+    assert!(pdf.starts_with(b"%PDF-1.7"));
+    let contains = |bytes: &[u8], text: &str| {
+        bytes
+            .windows(text.len())
+            .any(|part| part == text.as_bytes())
+    };
+    for needed in [
+        "pdfaid:part",
+        "/AFRelationship",
+        "calibration.json",
+        "dcc.xml",
+        "/OutputIntents",
+    ] {
+        assert!(contains(pdf, needed), "{needed}");
+    }
+    let xml = String::from_utf8(first[1].1.clone()).unwrap();
+    assert!(xml.contains("<dcc:uniqueIdentifier>2026-0042</dcc:uniqueIdentifier>"));
+    assert_eq!(xml.matches("<si:covariance>").count(), 24 * 24);
+    assert_eq!(xml.matches("<dcc:conformity>").count(), 9);
+    for open in ["dcc:", "si:"] {
+        let begun = xml.matches(&format!("<{open}")).count();
+        assert_eq!(begun, xml.matches(&format!("</{open}")).count());
+    }
+    assert!(xml.contains(&digest_of_bytes(b"imu")));
+}
+
+#[test]
+fn results_are_those_of_the_calibration_in_si_with_their_own_coverage_factor() {
+    let certificate = certificate();
+    let calibration = &certificate.calibration;
+    assert_eq!(certificate.results.len(), 24);
+    for (n, of) in certificate.results.iter().enumerate() {
+        let sigma = certificate.covariance[n][n].sqrt();
+        assert!((of.expanded / sigma - of.coverage_factor).abs() < 1e-12);
+    }
+    let nominal = certificate.provenance.nominal.gyro[0];
+    let first = &certificate.results[0];
+    assert_eq!(first.name, "gyro.scale.x");
+    assert!((1.0 + first.value - calibration.gyro.scale[0] / nominal).abs() < 1e-15);
+    let sigma = calibration.sigma_of("gyro.scale.x").unwrap() / nominal;
+    assert!((first.expanded / sigma - 2.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_was_found_differs_by_what_has_changed() {
+    let certificate = certificate();
+    let changes = &certificate.as_found.as_ref().unwrap().changes;
+    let by = |n: usize| changes[n].left - changes[n].found;
+    let found = 1.0 + changes[0].found;
+    assert!(
+        (by(0) / found - 100.0 * PPM).abs() < 1e-3 * PPM,
+        "{}",
+        by(0)
+    );
+    assert!((1..changes.len()).all(|n| by(n).abs() < 1e-12));
+}
+
+#[test]
+fn a_guard_band_decides_by_the_uncertainty_and_the_risk_is_that_of_the_other_side() {
+    use DecisionRule::{GuardBand, SimpleAcceptance};
+    let sigma = 1.0;
+    for (off, guarded, simple) in [
+        (0.0, Decision::Pass, Decision::Pass),
+        (7.9, Decision::Pass, Decision::Pass),
+        (9.0, Decision::ConditionalPass, Decision::Pass),
+        (-11.0, Decision::ConditionalFail, Decision::Fail),
+        (12.1, Decision::Fail, Decision::Fail),
+    ] {
+        assert_eq!(decide(off, sigma, 10.0, GuardBand).0, guarded, "{off}");
+        assert_eq!(
+            decide(off, sigma, 10.0, SimpleAcceptance).0,
+            simple,
+            "{off}"
+        );
+    }
+    // Normal distribution beyond 1σ and 2σ: 0.158655, 0.022750.
+    assert!((decide(9.0, sigma, 10.0, GuardBand).1 - 0.158_655).abs() < 1e-6);
+    assert!((decide(8.0, sigma, 10.0, GuardBand).1 - 0.022_750).abs() < 1e-6);
+    assert!((decide(11.0, sigma, 10.0, SimpleAcceptance).1 - 0.158_655).abs() < 1e-6);
+}
+
+#[test]
+fn what_may_not_be_used_or_is_not_complete_gets_no_certificate() {
+    let calibration = calibration();
+    let refused = |calibration: Calibration,
+                   laboratory: Laboratory,
+                   specification: Option<&Specification>| {
+        let digest = String::new();
+        let made = Certificate::new(calibration, digest, laboratory, specification, None);
+        made.unwrap_err().to_string()
+    };
+    let mut astray = calibration.clone();
+    astray.converged = Some(false);
+    assert!(refused(astray, laboratory(), None).contains("did not converge"));
+    let mut old = calibration.clone();
+    old.provenance = None;
+    assert!(refused(old, laboratory(), None).contains("`provenance`"));
+    let mut without = laboratory();
+    without.rule = None;
+    let limits = specification(ARCSEC);
+    assert!(refused(calibration, without, Some(&limits)).contains("decision.rule"));
+}
+
+#[test]
+fn a_character_without_a_glyph_is_named_with_its_text() {
+    let mut certificate = certificate();
+    certificate.laboratory.customer.name = "测绘".to_owned();
+    let message = files(&certificate, Vec::new()).unwrap_err().to_string();
+    assert!(message.contains('测'), "{message}");
+    let greek = "Δοκιμή Łódź Журнал ½ µ ″ ≤ ∞ −";
+    certificate.laboratory.customer.name = greek.to_owned();
+    files(&certificate, Vec::new()).unwrap();
+}

@@ -1,0 +1,105 @@
+//! `turncal certificate`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use turncal::calibration::result::Calibration;
+use turncal::certificate::{Certificate as Content, Laboratory};
+use turncal::formats::digest_of_bytes;
+use turncal::lot::Specification;
+use turncal::report::certificate;
+
+use super::output::{Overwrite, print};
+
+/// Writes a calibration certificate as PDF/A-3, with a Digital Calibration Certificate in it
+///
+/// DIR/certificate.pdf says what ISO/IEC 17025 asks of a certificate: what calibration.json knows, and what
+/// lab.toml states. dcc.xml (PTB's DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json
+/// are embedded in it and written beside it. Required fields that are missing are named. All dates are those of
+/// lab.toml: the same files give the same bytes. It claims no accreditation.
+///
+/// A draft of lab.toml: turncal certificate --draft
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal certificate --draft > lab.toml
+  turncal certificate mine/calibration.json --laboratory lab.toml -o paper
+  turncal certificate mine/calibration.json --laboratory lab.toml \\
+      --specification specification.toml \\
+      --as-found last-year/calibration.json -o paper")]
+pub struct Certificate {
+    /// The calibration
+    #[arg(value_name = "CALIBRATION.json", required_unless_present = "draft")]
+    calibration: Option<PathBuf>,
+    /// What the laboratory states
+    #[arg(long, value_name = "lab.toml", required_unless_present = "draft")]
+    laboratory: Option<PathBuf>,
+    /// Limits that the parameters are held against, by the decision rule of lab.toml
+    #[arg(long, value_name = "specification.toml")]
+    specification: Option<PathBuf>,
+    /// The calibration with which the item was received
+    #[arg(long, value_name = "EARLIER.json")]
+    as_found: Option<PathBuf>,
+    /// Directory to write
+    #[arg(short, long, value_name = "DIR", default_value = "certificate")]
+    output: PathBuf,
+    /// Print a lab.toml to be completed, and nothing else
+    #[arg(long, exclusive = true)]
+    draft: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Certificate {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let (Some(path), Some(laboratory)) = (&self.calibration, &self.laboratory) else {
+            return print(include_bytes!("../../examples/lab.toml"));
+        };
+        let read = |path: &Path| -> anyhow::Result<Vec<u8>> {
+            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+        };
+        let calibration = Calibration::read(path)?;
+        let bytes = read(path)?;
+        let laboratory = Laboratory::read(laboratory, |key| calibration.meta.get(key).cloned())?;
+        let specification = self.specification.as_deref();
+        let specification = specification.map(Specification::read).transpose()?;
+        let earlier = self.as_found.as_deref();
+        let earlier = earlier.map(Calibration::read).transpose()?;
+        let name = self
+            .as_found
+            .as_deref()
+            .map(|path| -> anyhow::Result<String> {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                Ok(format!("{name}, SHA-256 {}", digest_of_bytes(&read(path)?)))
+            });
+        let name = name.transpose()?;
+        let digest = digest_of_bytes(&bytes);
+        let earlier = name.as_deref().zip(earlier.as_ref());
+        let content = Content::new(
+            calibration,
+            digest,
+            laboratory,
+            specification.as_ref(),
+            earlier,
+        )
+        .with_context(|| path.display().to_string())?;
+        let inputs = [
+            &self.calibration,
+            &self.laboratory,
+            &self.specification,
+            &self.as_found,
+        ];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+        let whole = self.overwrite.directory(&self.output, &inputs)?;
+        for (name, bytes) in certificate::files(&content, bytes)? {
+            let target = whole.path().join(&name);
+            std::fs::write(&target, bytes)
+                .with_context(|| format!("cannot write {}", target.display()))?;
+        }
+        whole.commit()?;
+        eprintln!(
+            "certificate: {}",
+            self.output.join("certificate.pdf").display()
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,48 @@
+//! `turncal convert`
+
+use std::path::PathBuf;
+
+use turncal::formats::draft::Draft;
+
+use super::output::Overwrite;
+use super::progress::Activity;
+
+/// Writes the log of another program as a plain run directory
+///
+/// The streams that hold the instrument become CSV files with every column and all digits, beside a draft of
+/// run.toml as `turncal init` makes it. Reads MCAP, ROS 1 bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy
+/// files; calibrate and check read them as they are, too.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal convert flight.ulg -o my-run
+  turncal convert drive.mcap --stream /imu/data -o my-run")]
+pub struct Convert {
+    /// The log; its content says of which format it is
+    log: PathBuf,
+    /// Directory to write
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// The stream that holds the instrument [default: the one with the most samples]
+    #[arg(long, value_name = "NAME")]
+    stream: Option<String>,
+    /// Use what is whole before the first damage
+    #[arg(long)]
+    salvage: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Convert {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let directory = self.overwrite.directory(&self.output, &[&self.log])?;
+        let activity = Activity::new("reading");
+        let draft = Draft::of_stream(&self.log, self.stream.as_deref())?;
+        activity.next("writing");
+        draft.convert(&self.log, &directory.path(), self.salvage)?;
+        directory.commit()?;
+        drop(activity);
+        let run = self.output.join("run.toml");
+        eprintln!("{}: complete the fields marked TODO", run.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+//! Gyros and accelerometers in two files of rows, as phones and `ulog2csv` write them.
+
+use std::path::Path;
+
+use super::FEWEST_ROWS;
+use super::columns::Columns;
+use super::name;
+use super::name::Name;
+use super::streams::{Member, Places, Streams, Written, joined};
+use super::time::Clock;
+use crate::formats::rows::Source;
+use crate::formats::streams::{Column, Found, Stream};
+use crate::formats::{FileError, Place, Sheet};
+use crate::imu::{PerSensor, Sensor};
+
+impl Streams {
+    /// Looks at the files of both triads; the accelerometers' is called so in the draft.
+    pub fn of_two_files(
+        gyro: &Path,
+        accel: &Path,
+        accel_name: &str,
+    ) -> Result<(Self, Sheet), FileError> {
+        let files = PerSensor { gyro, accel };
+        let looked = PerSensor {
+            gyro: look(gyro)?,
+            accel: look(accel)?,
+        };
+        let sources = PerSensor::from_fn(|sensor| Source::of_file(files.get(sensor)));
+        let member = |sensor: Sensor| -> Result<Member, FileError> {
+            let (found, time) = looked.get(sensor);
+            let triad = *Places::of(found).triads.get(sensor);
+            let names = || {
+                found
+                    .stream
+                    .columns
+                    .iter()
+                    .map(|column| column.name.as_str())
+            };
+            let missing = |expected: String| {
+                let columns = crate::formats::error::list(names());
+                let advice = "Rename the columns or the file, or complete the fields by hand.";
+                FileError::new(
+                    files.get(sensor),
+                    Place::File,
+                    format_args!("the columns {columns}"),
+                    expected,
+                    advice,
+                )
+            };
+            Ok(Member {
+                source: sources.get(sensor),
+                found,
+                triad: triad
+                    .ok_or_else(|| missing(format!("three columns of the {}", words(sensor))))?,
+                time: time
+                    .clone()
+                    .ok_or_else(|| missing("a column of time".to_owned()))?,
+            })
+        };
+        let members = PerSensor {
+            gyro: member(Sensor::Gyro)?,
+            accel: member(Sensor::Accel)?,
+        };
+        let sheet = joined(&members)?;
+        let time = PerSensor::from_fn(|sensor| members.get(sensor).time.clone());
+        let streams = Self {
+            gyro: looked.gyro.0.stream.name.clone(),
+            accel: Some(looked.accel.0.stream.name.clone()),
+            time,
+            axes: looked.gyro.0.stream.axes,
+            damage: None,
+            written: Some(Written {
+                accel: Some(accel_name.to_owned()),
+            }),
+            found: vec![looked.gyro.0, looked.accel.0],
+        };
+        Ok((streams, sheet))
+    }
+}
+
+/// A file as a stream of its own, and its column of time with the word for its unit.
+type Looked = (Found, Option<(String, &'static str)>);
+
+fn look(file: &Path) -> Result<Looked, FileError> {
+    let sheet = Sheet::read(file, FEWEST_ROWS)?;
+    let mut columns = Columns::find(&sheet);
+    let clock = Clock::find(&sheet, &mut columns);
+    let time = columns
+        .time
+        .map(|place| (sheet.names[place].clone(), clock.unit));
+    let column = |(name, unit): (&String, &String)| {
+        let unit = Name::of(name).unit.or_else(|| name::unit(unit));
+        Column {
+            name: name.clone(),
+            unit: unit.unwrap_or(""),
+        }
+    };
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    // As PX4's ulog2csv calls its files.
+    let is_of_px4 = ["sensor_gyro_", "sensor_accel_"]
+        .iter()
+        .any(|topic| stem.contains(topic));
+    let stream = Stream {
+        name: stem.into_owned(),
+        columns: sheet.names.iter().zip(&sheet.units).map(column).collect(),
+        remarks: Vec::new(),
+        is_inertial: true,
+        axes: is_of_px4.then_some("frd"),
+    };
+    let samples = sheet.columns.first().map_or(0, Vec::len) as u64;
+    Ok((Found { stream, samples }, time))
+}
+
+fn words(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "gyros",
+        Sensor::Accel => "accelerometers",
+    }
+}

@@ -1,0 +1,83 @@
+//! The noise of an IMU in Gazebo (SDFormat).
+//!
+//! A sample is the true value plus white noise of `stddev`, plus a bias drawn from `bias_mean` ± `bias_stddev` with
+//! either sign, plus a walk pulled back with `dynamic_bias_correlation_time`, whose standard deviation in the long
+//! run is `dynamic_bias_stddev √(τ/2)`.
+//!
+//! Source: gz-sensors, `GaussianNoiseModel.cc`; SDFormat 1.6 and later, `noise.sdf`.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Exported;
+use super::along::{Along, Remainder};
+use super::source::{Document, Source};
+use crate::imu::Sensor;
+
+pub(super) fn write(source: &Source) -> Exported {
+    let along = Along::log(source);
+    let remainder = |sensor| {
+        let triad = along.triads.get(sensor);
+        Remainder::of(sensor, triad, &Matrix3::identity(), &triad.bias)
+    };
+    let left = Sensor::ALL.map(remainder);
+    let notes = [
+        left[0].words(),
+        left[1].words(),
+        "the sign of the bias: Gazebo draws it anew for each axis, so half of them have the other"
+            .to_owned(),
+    ];
+    let notes = notes.into_iter().chain(source.terms_note(|_| false));
+    let mut file = Document::new(source, "", notes);
+    for line in source.term_lines(|_| true) {
+        file.comment(&line);
+    }
+    file.comment("");
+    file.comment(&format!(
+        "Gazebo writes rad/s and m/s^2, here along {};",
+        along.words()
+    ));
+    file.comment(&along.divide());
+    left.iter().for_each(|left| left.lines(&mut file));
+    if source.run.is_none() {
+        file.comment("no noise: export with --run RUN.toml");
+    }
+    file.enclose("<!--", "-->");
+    file.line("<imu>");
+    for (name, sensor) in [
+        ("angular_velocity", Sensor::Gyro),
+        ("linear_acceleration", Sensor::Accel),
+    ] {
+        file.line(&format!("  <{name}>"));
+        let triad = along.triads.get(sensor);
+        let sigma = source
+            .record
+            .sigma
+            .as_ref()
+            .map(|sigma| sigma.get(sensor).bias);
+        let sigma = Vector3::from(sigma.unwrap_or_default());
+        for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+            file.line(&format!("    <{letter}>\n      <noise type=\"gaussian\">"));
+            let mut set =
+                |key: &str, value: f64| file.line(&format!("        <{key}>{value:e}</{key}>"));
+            set("mean", 0.0);
+            let noise = source
+                .run
+                .map(|run| (run, run.instrument.noise.get(sensor)));
+            let stddev =
+                noise.map(|(run, noise)| noise.random_walk / run.recording.imu.period.sqrt());
+            set("stddev", stddev.unwrap_or(0.0));
+            set("bias_mean", triad.bias[axis]);
+            let of_record = along.axis_of_record(axis);
+            set("bias_stddev", sigma[of_record] / triad.nominal[axis].abs());
+            if let Some(bias) = noise.and_then(|(_, noise)| noise.gauss_markov) {
+                let tau = bias.correlation_time;
+                set("dynamic_bias_stddev", bias.sigma * (2.0 / tau).sqrt());
+                set("dynamic_bias_correlation_time", tau);
+            }
+            file.line(&format!("      </noise>\n    </{letter}>"));
+        }
+        file.line(&format!("  </{name}>"));
+    }
+    file.line("</imu>");
+    file.finish()
+}

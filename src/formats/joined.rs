@@ -1,0 +1,399 @@
+//! Two streams, each with its own clock, as rows of one.
+//!
+//! Gyros stand as they are. Accelerometers are integrated over each sample of the gyros: the integral is known at
+//! the edges of their own samples, and between those follows the cubic through four of them. What is passed on
+//! from sample to sample is exact, so errors do not add up; what is left is the error of the integral at an edge,
+//! which the record itself tells (see [`Course::edge_error`]).
+
+use std::path::{Path, PathBuf};
+
+use super::clock::{Clock, Stamp, Stamps, TimeUnit};
+use super::error::{FileError, Place};
+use super::rows::Source;
+use super::uniform::Uniform;
+use crate::imu::{Output, PerSensor};
+
+/// The column of time, in s.
+pub(super) const TIME: &str = "time";
+
+/// One of the streams, as `run.toml` describes it.
+pub(super) struct Part<'a> {
+    pub source: &'a Source<'a>,
+    pub clock: Clock<'a>,
+    pub columns: [&'a str; 3],
+    /// Columns that are passed on as they are.
+    pub further: &'a [&'a str],
+}
+
+/// Both streams at one row of the gyros' clock.
+pub(super) struct Joined {
+    file: PathBuf,
+    header: Vec<String>,
+    units: Vec<String>,
+    remarks: Vec<String>,
+    /// Time, gyros, accelerometers, further columns of the gyros' stream.
+    rows: Vec<Vec<f64>>,
+    error: [f64; 3],
+    /// Rows given out, with this one.
+    at: usize,
+}
+
+/// The columns of both triads by names that tell them apart.
+pub(super) fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
+    let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
+    let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
+    PerSensor {
+        gyro: triads.gyro.map(str::to_owned),
+        accel: triads.accel.map(|name| match clash(name) {
+            true => format!("{name} of accelerometers"),
+            false => name.to_owned(),
+        }),
+    }
+}
+
+impl Joined {
+    /// Reads both streams, whose stamps come so many samples after a sample's begin.
+    pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
+        let gyro = Track::read(&parts.gyro)?;
+        let accel = Track::read(&parts.accel)?;
+        let seconds = match output {
+            Output::Rate => accel.clock.period,
+            Output::Increment | Output::Pulse => 1.0,
+        };
+        let courses = accel.courses(lag);
+        let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
+        let period = gyro.clock.period;
+        let over = match output {
+            Output::Rate => period,
+            Output::Increment | Output::Pulse => 1.0,
+        };
+        // Clocks that are one give values as they stand, to the last bit.
+        let factor = match (seconds / over - 1.0).abs() < 1e-9 {
+            true => 1.0,
+            false => seconds / over,
+        };
+        let ahead = gyro.clock.first - accel.clock.first;
+        let mut course = 0;
+        let mut weights = 0.0;
+        for (k, &number) in gyro.clock.numbers.iter().enumerate() {
+            let time = gyro.clock.first + number as f64 * period;
+            // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
+            let begin = ahead + (number as f64 - lag) * period;
+            let end = begin + period;
+            while courses
+                .get(course)
+                .is_some_and(|course| course.end() < begin)
+            {
+                course += 1;
+            }
+            let course = courses.get(course);
+            // Where one of both lacks samples, the row does.
+            let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
+                continue;
+            };
+            weights += weight;
+            let mut row = vec![time];
+            row.extend(gyro.columns.iter().map(|column| column[k]));
+            row.extend(sums.map(|sum| sum * factor));
+            row.extend(gyro.further.iter().map(|column| column[k]));
+            rows.push(row);
+        }
+        let file = parts.gyro.source.file.clone();
+        if rows.is_empty() {
+            let of = |track: &Track| {
+                let last = track.clock.numbers.last().map_or(0.0, |&last| last as f64);
+                let (first, period) = (track.clock.first, track.clock.period);
+                format!("{first} s to {} s", first + last * period)
+            };
+            return Err(FileError::new(
+                &parts.accel.source.file,
+                Place::File,
+                format_args!("accelerometers from {}", of(&accel)),
+                format_args!("times that overlap the gyros', {}", of(&gyro)),
+                "Bring both streams to one clock, or correct time_unit.",
+            ));
+        }
+        let squares = courses.iter().map(Course::edge_error);
+        let count = courses.len() as f64;
+        let mean = squares.fold([0.0; 3], |mean, of| {
+            [0, 1, 2].map(|k| mean[k] + of[k] / count)
+        });
+        let weight = weights / rows.len() as f64;
+        let names = distinct(&PerSensor::from_fn(|sensor| parts.get(sensor).columns));
+        let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
+        let mut header = vec![TIME.to_owned()];
+        header.extend(names.gyro.iter().chain(&names.accel).map(bare));
+        header.extend(parts.gyro.further.iter().map(|&name| name.to_owned()));
+        let mut units = vec!["s".to_owned()];
+        units.extend(gyro.units.iter().chain(&accel.units).cloned());
+        units.resize(header.len(), String::new());
+        let mut remarks = gyro.remarks;
+        remarks.extend(
+            accel
+                .remarks
+                .into_iter()
+                .filter(|remark| !remarks.contains(remark))
+                .collect::<Vec<_>>(),
+        );
+        remarks.push(format!(
+            "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
+             gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
+            rounded(gyro.clock.period),
+            rounded(accel.clock.period)
+        ));
+        Ok(Self {
+            file,
+            header,
+            units,
+            remarks,
+            rows,
+            error: mean.map(|square| seconds * (weight * square).sqrt()),
+            at: 0,
+        })
+    }
+
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    pub fn units(&self) -> &[String] {
+        &self.units
+    }
+
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// RMS error of the accelerometers' integrals at an edge of a sample, in their columns' unit times s.
+    pub fn integral_error(&self) -> [f64; 3] {
+        self.error
+    }
+
+    pub fn advance(&mut self) -> bool {
+        self.at += 1;
+        self.at <= self.rows.len()
+    }
+
+    pub fn sample(&self) -> u64 {
+        self.at as u64
+    }
+
+    pub fn value(&self, column: usize) -> f64 {
+        let row = self.at.checked_sub(1).and_then(|row| self.rows.get(row));
+        row.and_then(|row| row.get(column))
+            .copied()
+            .unwrap_or(f64::NAN)
+    }
+}
+
+/// Seven digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
+}
+
+/// The samples of a stream on its own uniform clock.
+struct Track {
+    clock: Uniform,
+    columns: [Vec<f64>; 3],
+    further: Vec<Vec<f64>>,
+    units: [String; 3],
+    remarks: Vec<String>,
+}
+
+impl Track {
+    fn read(part: &Part) -> Result<Self, FileError> {
+        let mut rows = part.source.open()?;
+        let mut stamps = part.clock.start(&mut rows)?;
+        let mut places = [0; 3];
+        for (place, name) in places.iter_mut().zip(part.columns) {
+            *place = rows.signed_column(name)?.0;
+        }
+        let further = part.further.iter().map(|name| rows.column(name));
+        let further: Vec<usize> = further.collect::<Result<_, FileError>>()?;
+        let mut others = vec![Vec::new(); further.len()];
+        let units = places.map(|k| rows.units().map_or(String::new(), |units| units[k].clone()));
+        let mut columns = [const { Vec::new() }; 3];
+        let mut before = [f64::NAN; 3];
+        while rows.advance()? && !rows.may_be_cut() {
+            if places.iter().all(|&place| rows.is_blank(place)) {
+                continue;
+            }
+            let mut row = [0.0; 3];
+            for (value, &place) in row.iter_mut().zip(&places) {
+                *value = rows.number(place)?;
+            }
+            match stamps.look(&rows)? {
+                Stamp::Same if row == before => continue,
+                Stamp::Same => return Err(Stamps::same(&rows)),
+                Stamp::Later => before = row,
+            }
+            for (column, value) in columns.iter_mut().zip(row) {
+                column.push(value);
+            }
+            for (column, &place) in others.iter_mut().zip(&further) {
+                column.push(rows.number(place).unwrap_or(f64::NAN));
+            }
+        }
+        if stamps.of_rows.len() < 2 {
+            return Err(rows.error(
+                format_args!("{} samples", stamps.of_rows.len()),
+                "a stream of samples",
+                "Name another stream, or record it again.",
+            ));
+        }
+        let mut remarks = rows.remarks().to_vec();
+        remarks.extend(rows.cut_off("It is left out"));
+        let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period);
+        Ok(Self {
+            clock: clock.map_err(|error| rows.placed(error))?,
+            columns,
+            further: others,
+            units,
+            remarks,
+        })
+    }
+
+    /// Samples that follow one another.
+    fn courses(&self, lag: f64) -> Vec<Course> {
+        let Uniform {
+            period, numbers, ..
+        } = &self.clock;
+        let mut courses: Vec<Course> = Vec::new();
+        for (k, &number) in numbers.iter().enumerate() {
+            let follows = k > 0 && number == numbers[k - 1] + 1;
+            if !follows {
+                courses.push(Course {
+                    begin: (number as f64 - lag) * period,
+                    period: *period,
+                    sums: [const { Vec::new() }; 3],
+                });
+            }
+            if let Some(course) = courses.last_mut() {
+                for (sums, column) in course.sums.iter_mut().zip(&self.columns) {
+                    sums.push(column[k]);
+                }
+            }
+        }
+        courses
+    }
+}
+
+/// The product of the distances from the middle of two edges to the four of the cubic.
+const MIDWAY: f64 = 0.5625;
+
+/// Edges and periods nearer than this, in samples, are the same.
+const SAME: f64 = 1e-6;
+
+/// Samples without a gap, whose integrals are counted in values times samples.
+struct Course {
+    /// From the stream's first stamp, s.
+    begin: f64,
+    period: f64,
+    sums: [Vec<f64>; 3],
+}
+
+impl Course {
+    fn len(&self) -> usize {
+        self.sums[0].len()
+    }
+
+    fn end(&self) -> f64 {
+        self.begin + self.len() as f64 * self.period
+    }
+
+    /// The integrals between two times, and how much of the error midway between edges they have, squared; none if
+    /// the times are not within.
+    fn between(&self, begin: f64, end: f64) -> Option<([f64; 3], f64)> {
+        let place = |time: f64| {
+            let place = (time - self.begin) / self.period;
+            // Times are sums of many periods, which rounding leaves beside their edges.
+            match (place - place.round()).abs() < SAME {
+                true => place.round(),
+                false => place,
+            }
+        };
+        let (from, to) = (place(begin), place(end));
+        let last = self.len() as f64;
+        if from < 0.0 || to > last {
+            return None;
+        }
+        let (first, behind) = (self.edge(from), self.edge(to));
+        let sums = self.sums.each_ref().map(|sums| {
+            let whole: f64 = sums[first..behind].iter().sum();
+            whole + beyond(sums, behind, to - behind as f64)
+                - beyond(sums, first, from - first as f64)
+        });
+        // What a cubic through the edges at −1, 0, 1 and 2 misses is as this product.
+        let u = to - behind as f64;
+        let weight = (1.0 + u) * u * (1.0 - u) * (2.0 - u) / MIDWAY;
+        Some((sums, weight * weight))
+    }
+
+    /// The edge at or before a place.
+    fn edge(&self, place: f64) -> usize {
+        (place as usize).min(self.len())
+    }
+
+    /// Mean square error of the integral midway between two edges.
+    ///
+    /// Every second edge is left out and interpolated from those beside it, and every fourth one from those two
+    /// away. White noise alone, which the filter knows of, makes the square of what is missed grow as the distance
+    /// of edges; a signal that the cubic does not follow as its eighth power. So both are told apart, and the
+    /// signal's part at the distance that there is, is 2⁻⁸ of that at twice as much.
+    fn edge_error(&self) -> [f64; 3] {
+        self.sums.each_ref().map(|sums| {
+            let missed = |apart: usize| {
+                let (mut squares, mut count) = (0.0, 0usize);
+                for k in 3 * apart..sums.len().saturating_sub(3 * apart) {
+                    let sum = |from: usize, to: usize| sums[from..to].iter().sum::<f64>();
+                    // Integrals from the middle edge to those around it.
+                    let (before, behind) = (-sum(k - apart, k), sum(k, k + apart));
+                    let (first, last) = (-sum(k - 3 * apart, k), sum(k, k + 3 * apart));
+                    let off = (9.0 * (before + behind) - (first + last)) / 16.0;
+                    squares += off * off;
+                    count += 1;
+                }
+                squares / count.max(1) as f64
+            };
+            // Edges apart by two and four samples.
+            let (near, far) = (missed(1), missed(2));
+            let signal = ((far - 2.0 * near) / (256.0 - 2.0)).max(0.0);
+            signal / 256.0
+        })
+    }
+}
+
+/// The integral from an edge to a place so much of a sample behind it, by the cubic through four edges about it.
+fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
+    if part == 0.0 {
+        return 0.0;
+    }
+    if sums.len() < 3 {
+        return sums[edge] * part;
+    }
+    // Edges from the first of the four to the others.
+    let first = edge.saturating_sub(1).min(sums.len() - 3);
+    let one = sums[first];
+    let two = one + sums[first + 1];
+    let three = two + sums[first + 2];
+    let cubic = |x: f64| {
+        one * x * (x - 2.0) * (x - 3.0) / 2.0 - two * x * (x - 1.0) * (x - 3.0) / 2.0
+            + three * x * (x - 1.0) * (x - 2.0) / 6.0
+    };
+    let from = (edge - first) as f64;
+    cubic(from + part) - cubic(from)
+}
+
+/// The clock of the rows of both.
+pub(super) fn clock(period: Option<f64>) -> Clock<'static> {
+    Clock {
+        column: Some(TIME),
+        nanoseconds: None,
+        unit: TimeUnit::PerSecond(1.0),
+        period,
+    }
+}

@@ -1,0 +1,247 @@
+//! Bytes of a file, each of which knows where it is.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+/// What a log's bytes come from.
+pub(super) trait Source: Read + Seek {}
+impl<T: Read + Seek> Source for T {}
+
+/// Why a file cannot be read on, and where.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::formats) struct Broken {
+    /// Bytes from the begin of the file.
+    pub offset: u64,
+    pub found: String,
+    pub expected: String,
+}
+
+impl Broken {
+    pub fn new(offset: u64, found: impl ToString, expected: impl ToString) -> Self {
+        Self {
+            offset,
+            found: found.to_string(),
+            expected: expected.to_string(),
+        }
+    }
+}
+
+/// A file read from its begin on.
+pub(super) struct Input {
+    source: Box<dyn Source>,
+    offset: u64,
+    length: u64,
+}
+
+impl Input {
+    pub fn new(mut source: Box<dyn Source>) -> io::Result<Self> {
+        let length = source.seek(SeekFrom::End(0))?;
+        source.seek(SeekFrom::Start(0))?;
+        Ok(Self {
+            source,
+            offset: 0,
+            length,
+        })
+    }
+
+    /// Bytes read or passed over so far.
+    pub fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    /// Bytes not yet read.
+    pub fn left(&self) -> u64 {
+        self.length.saturating_sub(self.offset)
+    }
+
+    /// Reads so many bytes, all of which must be there; `what` they are.
+    pub fn take(&mut self, count: u64, into: &mut Vec<u8>, what: &str) -> Result<(), Broken> {
+        into.clear();
+        if count > self.left() {
+            let found = match self.left() {
+                0 => "the end of the file".to_owned(),
+                left => format!("{left} bytes to the end of the file"),
+            };
+            return Err(Broken::new(
+                self.offset,
+                found,
+                format_args!("{count} bytes of {what}"),
+            ));
+        }
+        let read = (&mut self.source).take(count).read_to_end(into);
+        match read {
+            Ok(read) if read as u64 == count => {
+                self.offset += count;
+                Ok(())
+            }
+            Ok(_) => Err(Broken::new(self.offset, "a file that became shorter", what)),
+            Err(error) => Err(Broken::new(self.offset, error, what)),
+        }
+    }
+
+    /// Goes to another place.
+    pub fn go_to(&mut self, offset: u64) -> Result<(), Broken> {
+        if offset > self.length {
+            let found = format!("a part at byte {offset}");
+            let expected = format!("one within the file of {} bytes", self.length);
+            return Err(Broken::new(self.offset, found, expected));
+        }
+        let sought = self.source.seek(SeekFrom::Start(offset));
+        sought.map_err(|error| Broken::new(offset, error, "a place in the file"))?;
+        self.offset = offset;
+        Ok(())
+    }
+
+    /// Passes over so many bytes.
+    pub fn skip(&mut self, count: u64, what: &str) -> Result<(), Broken> {
+        if count > self.left() {
+            let found = format!("{} bytes to the end of the file", self.left());
+            let expected = format!("{count} bytes of {what}");
+            return Err(Broken::new(self.offset, found, expected));
+        }
+        self.go_to(self.offset + count)
+    }
+}
+
+/// Bytes in memory, read in order.
+#[derive(Clone, Copy)]
+pub(super) struct Slice<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    /// Where the first of them is in the file …
+    base: u64,
+    /// … or all of them, where they were packed.
+    is_packed: bool,
+}
+
+impl<'a> Slice<'a> {
+    pub fn new(bytes: &'a [u8], base: u64) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            base,
+            is_packed: false,
+        }
+    }
+
+    /// Bytes that were packed into something at this place of the file.
+    pub fn packed(bytes: &'a [u8], place: u64) -> Self {
+        Self {
+            is_packed: true,
+            ..Self::new(bytes, place)
+        }
+    }
+
+    /// Some of these bytes, which are at this place.
+    pub fn of(&self, bytes: &'a [u8], place: u64) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            base: place,
+            is_packed: self.is_packed,
+        }
+    }
+
+    /// Where the next byte is in the file.
+    pub fn offset(&self) -> u64 {
+        match self.is_packed {
+            true => self.base,
+            false => self.base + self.at as u64,
+        }
+    }
+
+    /// Bytes read so far.
+    pub fn position(&self) -> usize {
+        self.at
+    }
+
+    pub fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    pub fn take(&mut self, count: usize, what: &str) -> Result<&'a [u8], Broken> {
+        let end = self.at.checked_add(count);
+        let bytes = end.and_then(|end| self.bytes.get(self.at..end));
+        let bytes = bytes.ok_or_else(|| {
+            Broken::new(
+                self.offset(),
+                format_args!("{} bytes to the end of their record", self.left()),
+                format_args!("{count} bytes of {what}"),
+            )
+        })?;
+        self.at += count;
+        Ok(bytes)
+    }
+
+    /// A whole number, little-endian, of at most eight bytes.
+    pub fn whole(&mut self, size: usize, what: &str) -> Result<u64, Broken> {
+        let bytes = self.take(size, what)?;
+        Ok(bytes
+            .iter()
+            .rev()
+            .fold(0, |whole, &byte| whole << 8 | u64::from(byte)))
+    }
+
+    /// The length of what follows.
+    pub fn length(&mut self, size: usize, what: &str) -> Result<usize, Broken> {
+        let length = self.whole(size, what)?;
+        usize::try_from(length).map_err(|_| Broken::new(self.offset(), length, what))
+    }
+
+    /// A text of this length; what is no UTF-8 in it is replaced.
+    pub fn text(&mut self, count: usize, what: &str) -> Result<String, Broken> {
+        let bytes = self.take(count, what)?;
+        let end = bytes.iter().position(|&byte| byte == 0);
+        Ok(String::from_utf8_lossy(&bytes[..end.unwrap_or(count)]).into_owned())
+    }
+}
+
+/// How a number is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+impl Kind {
+    /// Bytes.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// The number in the first bytes; none if there are too few.
+    pub fn number(self, bytes: &[u8], big_endian: bool) -> Option<f64> {
+        let mut all = [0; 8];
+        let size = self.size();
+        let place = all.get_mut(..size)?;
+        place.copy_from_slice(bytes.get(..size)?);
+        if big_endian {
+            place.reverse();
+        }
+        let whole = u64::from_le_bytes(all);
+        Some(match self {
+            Self::I8 => f64::from(whole as u8 as i8),
+            Self::U8 => f64::from(whole as u8),
+            Self::I16 => f64::from(whole as u16 as i16),
+            Self::U16 => f64::from(whole as u16),
+            Self::I32 => f64::from(whole as u32 as i32),
+            Self::U32 => f64::from(whole as u32),
+            Self::I64 => whole as i64 as f64,
+            Self::U64 => whole as f64,
+            Self::F32 => f64::from(f32::from_bits(whole as u32)),
+            Self::F64 => f64::from_bits(whole),
+        })
+    }
+}

@@ -1,0 +1,73 @@
+//! A topic of a log: messages of one type, each with the time at which it was logged.
+
+use super::bytes::Broken;
+use super::ros::{self, Encoding};
+use super::{Column, Stream};
+#[cfg(feature = "mcap")]
+use super::{json, protobuf};
+
+/// The column of the time of logging, in s.
+const LOG_TIME: &str = "log_time";
+
+/// How its messages are read.
+pub(super) enum Reader {
+    Ros(ros::Message),
+    #[cfg(feature = "mcap")]
+    Protobuf(protobuf::Message),
+    /// The first message shows its columns.
+    #[cfg(feature = "mcap")]
+    Json(Vec<Column>),
+    /// Only the time of its messages is known; why.
+    Unknown(String),
+}
+
+impl Reader {
+    /// Of messages of ROS by the text of their definition.
+    pub fn of_ros(name: &str, definition: &str, encoding: Encoding) -> Self {
+        match ros::Message::parse(name, definition, encoding) {
+            Ok(message) => Self::Ros(message),
+            Err(wrong) => Self::Unknown(format!("its definition cannot be read: {wrong}")),
+        }
+    }
+
+    /// The stream of a topic.
+    pub fn stream(&self, topic: &str) -> Stream {
+        let mut columns = vec![Column::new(LOG_TIME, "s")];
+        let mut remarks = Vec::new();
+        match self {
+            Self::Ros(message) => columns.extend_from_slice(&message.columns),
+            #[cfg(feature = "mcap")]
+            Self::Protobuf(message) => columns.extend_from_slice(&message.columns),
+            #[cfg(feature = "mcap")]
+            Self::Json(known) => columns.extend_from_slice(known),
+            Self::Unknown(why) => remarks.push(format!("`{topic}`: {why}")),
+        }
+        Stream {
+            name: topic.to_owned(),
+            columns,
+            remarks,
+            is_inertial: true,
+            axes: None,
+        }
+    }
+
+    /// The values of a message that was logged at this time in ns.
+    pub fn values(
+        &self,
+        time: u64,
+        bytes: &[u8],
+        offset: u64,
+        row: &mut Vec<f64>,
+    ) -> Result<(), Broken> {
+        row.clear();
+        row.push((time / 1_000_000_000) as f64 + 1e-9 * (time % 1_000_000_000) as f64);
+        match self {
+            Self::Ros(message) => message.values(bytes, offset, row),
+            #[cfg(feature = "mcap")]
+            Self::Protobuf(message) => message.values(bytes, offset, row),
+            #[cfg(feature = "mcap")]
+            Self::Json(columns) => json::values(columns, bytes, offset, row),
+            Self::Unknown(_) => Ok(()),
+        }
+    }
+}

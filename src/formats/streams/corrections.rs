@@ -1,0 +1,138 @@
+//! The calibration that an autopilot has already applied to its values, taken out again.
+//!
+//! Both PX4 and ArduPilot make `(raw − offset) ⊙ scale` of accelerometers and `raw − offset` of gyros, and turn the
+//! axes behind that.
+//!
+//! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/sensors/vehicle_imu`; ArduPilot,
+//! `AP_InertialSensor_Backend::_rotate_and_correct_accel` and `_rotate_and_correct_gyro`.
+
+use super::Column;
+use crate::imu::{PerSensor, Sensor};
+
+/// What was applied to a triad.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Applied {
+    /// The parameters, in words.
+    pub name: String,
+    pub offset: [f64; 3],
+    pub scale: [f64; 3],
+    /// Whether axes were turned after it, which mixes them, or more was taken out.
+    pub is_more: bool,
+}
+
+/// Columns of corrected values, of the time in µs that they were summed over, and of the device's number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Corrected {
+    pub values: [usize; 3],
+    pub interval: Option<usize>,
+    pub device: Option<usize>,
+}
+
+impl Corrected {
+    /// Three named columns of rates.
+    pub fn rates(columns: &[Column], names: [&str; 3]) -> Option<Self> {
+        let place = |name: &str| columns.iter().position(|column| column.name == name);
+        match names.map(place) {
+            [Some(x), Some(y), Some(z)] => Some(Self {
+                values: [x, y, z],
+                interval: None,
+                device: None,
+            }),
+            _ => None,
+        }
+    }
+}
+
+/// What was applied while parameters had changed so often, and to which device.
+struct Known {
+    changes: u64,
+    device: Option<f64>,
+    applied: Option<Applied>,
+}
+
+/// What is taken out of the samples of a stream.
+pub(super) struct Undo {
+    /// Who applied it.
+    pub program: &'static str,
+    pub corrected: PerSensor<Option<Corrected>>,
+    said: PerSensor<Option<String>>,
+    /// What was applied, as long as parameters and device stay.
+    found: PerSensor<Option<Known>>,
+}
+
+impl Undo {
+    pub fn new(program: &'static str, corrected: PerSensor<Option<Corrected>>) -> Self {
+        Self {
+            program,
+            corrected,
+            said: PerSensor::default(),
+            found: PerSensor::default(),
+        }
+    }
+
+    /// Makes of a sample what the sensor gave; `changes` counts those of parameters so far.
+    pub fn undo(
+        &mut self,
+        row: &mut [f64],
+        changes: u64,
+        applied: impl Fn(Sensor, Option<f64>) -> Option<Applied>,
+    ) {
+        for sensor in Sensor::ALL {
+            let Some(of) = self.corrected.get(sensor) else {
+                continue;
+            };
+            let device = of.device.map(|place| row[place]);
+            let known = self.found.get_mut(sensor);
+            if !known
+                .as_ref()
+                .is_some_and(|known| known.changes == changes && known.device == device)
+            {
+                *known = Some(Known {
+                    changes,
+                    device,
+                    applied: applied(sensor, device),
+                });
+            }
+            let found = known.as_ref().and_then(|known| known.applied.as_ref());
+            if let Some(applied) = found.filter(|applied| !applied.is_more) {
+                let seconds = of.interval.map_or(1.0, |place| 1e-6 * row[place]);
+                for (axis, &place) in of.values.iter().enumerate() {
+                    row[place] = row[place] / applied.scale[axis] + applied.offset[axis] * seconds;
+                }
+            }
+            let said = self.said.get_mut(sensor);
+            if said.is_none() {
+                *said = Some(words(self.program, sensor, found));
+            }
+        }
+    }
+
+    /// What was undone, a sentence a triad.
+    pub fn remarks(&self) -> Vec<String> {
+        let said = Sensor::ALL
+            .iter()
+            .filter_map(|&sensor| self.said.get(sensor).clone());
+        said.collect()
+    }
+}
+
+fn words(program: &str, sensor: Sensor, found: Option<&Applied>) -> String {
+    let triad = match sensor {
+        Sensor::Gyro => "gyros",
+        Sensor::Accel => "accelerometers",
+    };
+    match found {
+        Some(of) if of.is_more => format!(
+            "{program} corrected its {triad} by {} and did more to them, turned axes or compensated temperature: this \
+             is not undone, so the calibration is that of corrected data.",
+            of.name
+        ),
+        Some(of) => format!(
+            "{program} corrected its {triad} by {}: this is undone.",
+            of.name
+        ),
+        None => format!(
+            "{program} corrects its {triad}; by what the log does not say, so its values are taken as they are."
+        ),
+    }
+}

@@ -1,0 +1,329 @@
+//! ArduPilot's DataFlash logs.
+//!
+//! Messages begin with the bytes A3 95 and their type; those of type 128 (`FMT`) say what the others hold. What
+//! `IMU`, `ACC` and `GYR` hold is corrected by the parameters `INS_…`, which `PARM` messages give.
+//!
+//! Source: ArduPilot, `libraries/AP_Logger/LogStructure.h`.
+
+use std::collections::BTreeMap;
+
+use super::bytes::{Broken, Input, Kind, Slice};
+use super::corrections::{Applied, Corrected, Undo};
+use super::{Column, Log, Stream};
+use crate::imu::{PerSensor, Sensor};
+
+const BEGIN: [u8; 2] = [0xa3, 0x95];
+const FMT: u8 = 0x80;
+/// The column that tells instances apart.
+const INSTANCE: &str = "I";
+
+pub(super) fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
+    let mut formats = BTreeMap::new();
+    formats.insert(
+        FMT,
+        Format::of(0, "FMT", 89, "BBnNZ", "Type,Length,Name,Format,Columns")?,
+    );
+    Ok(Box::new(DataFlash {
+        input,
+        formats,
+        parameters: BTreeMap::new(),
+        changes: 0,
+        streams: Vec::new(),
+        of_streams: BTreeMap::new(),
+        undo: Vec::new(),
+        message: Vec::new(),
+        offset: 0,
+        current: (FMT, 0),
+    }))
+}
+
+struct DataFlash {
+    input: Input,
+    formats: BTreeMap<u8, Format>,
+    parameters: BTreeMap<String, f64>,
+    /// How often one of them was set.
+    changes: u64,
+    streams: Vec<Stream>,
+    /// By type and instance.
+    of_streams: BTreeMap<(u8, u8), usize>,
+    undo: Vec<(Undo, u8)>,
+    message: Vec<u8>,
+    offset: u64,
+    /// Type and stream of the message.
+    current: (u8, usize),
+}
+
+struct Format {
+    name: String,
+    length: u64,
+    columns: Vec<Column>,
+    /// Place, kind and factor of each number.
+    places: Vec<(usize, Kind, f64)>,
+    /// Place of the instance.
+    instance: Option<usize>,
+}
+
+impl Format {
+    fn of(offset: u64, name: &str, length: u64, types: &str, labels: &str) -> Result<Self, Broken> {
+        let mut format = Self {
+            name: name.to_owned(),
+            length,
+            columns: Vec::new(),
+            places: Vec::new(),
+            instance: None,
+        };
+        let mut place = 3;
+        for (letter, label) in types.chars().zip(labels.split(',')) {
+            let (kind, factor) = match letter {
+                'b' => (Kind::I8, 1.0),
+                'B' | 'M' => (Kind::U8, 1.0),
+                'h' => (Kind::I16, 1.0),
+                'H' => (Kind::U16, 1.0),
+                'i' => (Kind::I32, 1.0),
+                'I' => (Kind::U32, 1.0),
+                'q' => (Kind::I64, 1.0),
+                'Q' => (Kind::U64, 1.0),
+                'f' => (Kind::F32, 1.0),
+                'd' => (Kind::F64, 1.0),
+                'c' => (Kind::I16, 0.01),
+                'C' => (Kind::U16, 0.01),
+                'e' => (Kind::I32, 0.01),
+                'E' => (Kind::U32, 0.01),
+                'L' => (Kind::I32, 1e-7),
+                other => {
+                    place += match other {
+                        'n' => 4,
+                        'N' => 16,
+                        'Z' | 'a' => 64,
+                        'g' => 2,
+                        _ => {
+                            return Err(Broken::new(
+                                offset,
+                                format_args!("a field of type `{other}` in {name}"),
+                                "a letter of the format",
+                            ));
+                        }
+                    };
+                    continue;
+                }
+            };
+            if label == INSTANCE && kind == Kind::U8 {
+                format.instance = Some(place);
+            }
+            format.columns.push(Column::new(label, unit(label)));
+            format.places.push((place, kind, factor));
+            place += kind.size();
+        }
+        if place as u64 != length {
+            return Err(Broken::new(
+                offset,
+                format_args!("{name} of {length} bytes"),
+                format_args!("{place}, as its fields `{types}` take"),
+            ));
+        }
+        Ok(format)
+    }
+
+    /// Whether it may be an instrument's.
+    fn is_inertial(&self) -> bool {
+        let stem = self.name.trim_end_matches(|c: char| c.is_ascii_digit());
+        ["IMU", "ACC", "GYR"].contains(&stem)
+    }
+
+    /// What of it is corrected.
+    fn undo(&self) -> Undo {
+        let corrected = PerSensor::from_fn(|sensor| {
+            let names = match sensor {
+                Sensor::Gyro => ["GyrX", "GyrY", "GyrZ"],
+                Sensor::Accel => ["AccX", "AccY", "AccZ"],
+            };
+            Corrected::rates(&self.columns, names).filter(|_| self.is_inertial())
+        });
+        Undo::new("ArduPilot", corrected)
+    }
+}
+
+fn unit(label: &str) -> &'static str {
+    match label {
+        _ if label.ends_with("US") => "us",
+        _ if label.starts_with("Gyr") => "rad/s",
+        _ if label.starts_with("Acc") => "m/s^2",
+        _ => "",
+    }
+}
+
+impl Log for DataFlash {
+    fn streams(&self) -> &[Stream] {
+        &self.streams
+    }
+
+    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+        loop {
+            self.offset = self.input.offset();
+            if self.input.left() == 0 {
+                return Ok(None);
+            }
+            self.input
+                .take(3, &mut self.message, "a message's begin and type")?;
+            let Some(&[first, second, kind]) = self.message.first_chunk() else {
+                return Ok(None);
+            };
+            if [first, second] != BEGIN {
+                return Err(Broken::new(
+                    self.offset,
+                    format_args!("the bytes {first:02x} {second:02x}"),
+                    "a3 95, with which a message begins",
+                ));
+            }
+            let Some(format) = self.formats.get(&kind) else {
+                return Err(Broken::new(
+                    self.offset,
+                    format_args!("a message of type {kind}"),
+                    "a type that an FMT message before it describes",
+                ));
+            };
+            self.input.go_to(self.offset)?;
+            self.input
+                .take(format.length, &mut self.message, "a message")?;
+            if kind == FMT {
+                self.format()?;
+                continue;
+            }
+            if format.name == "PARM" {
+                self.parameter()?;
+                continue;
+            }
+            let stream = self.stream(kind);
+            self.current = (kind, stream);
+            return Ok(Some(stream));
+        }
+    }
+
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
+        row.clear();
+        let (kind, stream) = self.current;
+        let Some(format) = self.formats.get(&kind) else {
+            return Ok(());
+        };
+        for &(place, kind, factor) in &format.places {
+            let bytes = self.message.get(place..).unwrap_or_default();
+            row.push(kind.number(bytes, false).unwrap_or(f64::NAN) * factor);
+        }
+        let (undo, instance) = &mut self.undo[stream];
+        let (parameters, instance) = (&self.parameters, *instance);
+        undo.undo(row, self.changes, |sensor, _| {
+            applied(parameters, sensor, instance)
+        });
+        let remarks = &mut self.streams[stream].remarks;
+        if remarks.is_empty() {
+            *remarks = undo.remarks();
+        }
+        Ok(())
+    }
+
+    fn offset(&self) -> u64 {
+        self.offset
+    }
+}
+
+impl DataFlash {
+    fn format(&mut self) -> Result<(), Broken> {
+        let mut content = Slice::new(&self.message, self.offset);
+        content.take(3, "a message's begin")?;
+        let kind = content.whole(1, "a type")? as u8;
+        let length = content.whole(1, "a length")?;
+        let name = content.text(4, "a name")?;
+        let types = content.text(16, "the types of fields")?;
+        let labels = content.text(64, "the names of fields")?;
+        if kind != FMT {
+            let format = Format::of(self.offset, &name, length, &types, &labels)?;
+            self.formats.insert(kind, format);
+        }
+        Ok(())
+    }
+
+    fn parameter(&mut self) -> Result<(), Broken> {
+        // TimeUS, Name, Value; older logs have no time.
+        let length = self.message.len();
+        let name_at = if length < 3 + 8 + 16 + 4 { 3 } else { 11 };
+        let mut content = Slice::new(&self.message, self.offset);
+        content.take(name_at, "a time")?;
+        let name = content.text(16, "a parameter's name")?;
+        let value = Kind::F32.number(content.take(4, "a parameter's value")?, false);
+        self.parameters.insert(name, value.unwrap_or(f64::NAN));
+        self.changes += 1;
+        Ok(())
+    }
+
+    /// The stream of the message.
+    fn stream(&mut self, kind: u8) -> usize {
+        let format = &self.formats[&kind];
+        let instance = format
+            .instance
+            .and_then(|place| self.message.get(place))
+            .copied();
+        let key = (kind, instance.unwrap_or(0));
+        if let Some(&stream) = self.of_streams.get(&key) {
+            return stream;
+        }
+        let stem = format.name.trim_end_matches(|c: char| c.is_ascii_digit());
+        // Before instances were a column, the second had another name.
+        let number = format.name[stem.len()..]
+            .parse()
+            .unwrap_or(1u8)
+            .saturating_sub(1);
+        let stream = self.streams.len();
+        self.undo.push((format.undo(), instance.unwrap_or(number)));
+        self.streams.push(Stream {
+            name: match instance {
+                Some(instance) => format!("{}[{instance}]", format.name),
+                None => format.name.clone(),
+            },
+            columns: format.columns.clone(),
+            remarks: Vec::new(),
+            is_inertial: format.is_inertial(),
+            axes: Some("frd"),
+        });
+        self.of_streams.insert(key, stream);
+        stream
+    }
+}
+
+/// What ArduPilot's parameters of an instance, from 0, say.
+fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> Option<Applied> {
+    let kind = match sensor {
+        Sensor::Gyro => "GYR",
+        Sensor::Accel => "ACC",
+    };
+    let stem = match (instance, sensor) {
+        (0, Sensor::Gyro) => "INS_GYR".to_owned(),
+        (0, Sensor::Accel) => "INS_ACC".to_owned(),
+        (1 | 2, _) => format!("INS_{kind}{}", instance + 1),
+        (more, _) => format!("INS{}_{kind}", more + 1),
+    };
+    let axes = |what: &str| {
+        let of = |axis: &str| parameters.get(&format!("{stem}{what}_{axis}")).copied();
+        match ["X", "Y", "Z"].map(of) {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            _ => None,
+        }
+    };
+    let offset = axes("OFFS")?;
+    let scale = match sensor {
+        Sensor::Gyro => None,
+        Sensor::Accel => axes("SCAL"),
+    };
+    let is_on = |name: &str| parameters.get(name).is_some_and(|&value| value != 0.0);
+    Some(Applied {
+        name: match sensor {
+            Sensor::Gyro => format!("{stem}OFFS"),
+            Sensor::Accel => format!("{stem}OFFS and {stem}SCAL"),
+        },
+        offset,
+        // Zero stands for a scale that was never calibrated.
+        scale: scale
+            .filter(|scale| scale.iter().all(|&s| s != 0.0))
+            .unwrap_or([1.0; 3]),
+        is_more: is_on("AHRS_ORIENTATION") || is_on(&format!("INS_TCAL{}_ENABLE", instance + 1)),
+    })
+}

@@ -1,0 +1,251 @@
+//! MCAP: messages of ROS 1 and 2, Protocol Buffers and JSON whose schemas are in the file.
+//!
+//! Source: mcap.dev, "MCAP Format Specification": magic bytes, then records of an opcode, a length of eight bytes
+//! and content; chunks hold records, packed.
+
+use std::collections::BTreeMap;
+
+use super::bytes::{Broken, Input, Slice};
+use super::channel::Reader;
+use super::packed::unpack;
+use super::ros::Encoding;
+use super::{Log, Stream, json, protobuf};
+
+const MAGIC: u64 = 8;
+const SCHEMA: u8 = 3;
+const CHANNEL: u8 = 4;
+const MESSAGE: u8 = 5;
+const CHUNK: u8 = 6;
+const DATA_END: u8 = 15;
+
+pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+    input.skip(MAGIC, "the first bytes")?;
+    Ok(Box::new(Mcap {
+        input,
+        schemas: BTreeMap::new(),
+        channels: BTreeMap::new(),
+        streams: Vec::new(),
+        readers: Vec::new(),
+        chunk: Vec::new(),
+        at: 0,
+        record: Vec::new(),
+        offset: 0,
+        current: None,
+        is_ended: false,
+    }))
+}
+
+struct Schema {
+    name: String,
+    encoding: String,
+    data: Vec<u8>,
+}
+
+struct Mcap {
+    input: Input,
+    schemas: BTreeMap<u16, Schema>,
+    /// The stream of each channel.
+    channels: BTreeMap<u16, usize>,
+    streams: Vec<Stream>,
+    readers: Vec<Reader>,
+    /// Records of the chunk that is read, and how far it is.
+    chunk: Vec<u8>,
+    at: usize,
+    record: Vec<u8>,
+    /// Where the record, or the chunk that it is in, is.
+    offset: u64,
+    /// Stream, time and place in the record of the message.
+    current: Option<(usize, u64)>,
+    is_ended: bool,
+}
+
+/// Bytes of a message before its data: channel, number, two times.
+const BEFORE_DATA: usize = 22;
+
+impl Log for Mcap {
+    fn streams(&self) -> &[Stream] {
+        &self.streams
+    }
+
+    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+        while let Some(kind) = self.next_record()? {
+            match kind {
+                SCHEMA => self.schema()?,
+                CHANNEL => self.channel()?,
+                MESSAGE => {
+                    if let Some(stream) = self.message()? {
+                        return Ok(Some(stream));
+                    }
+                }
+                CHUNK => self.open_chunk()?,
+                DATA_END => self.is_ended = true,
+                _ => {}
+            }
+        }
+        Ok(None)
+    }
+
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
+        let Some((stream, time)) = self.current else {
+            return Ok(());
+        };
+        let data = self.record.get(BEFORE_DATA..).unwrap_or_default();
+        self.readers[stream].values(time, data, self.offset, row)
+    }
+
+    fn offset(&self) -> u64 {
+        self.offset
+    }
+}
+
+impl Mcap {
+    /// Takes the next record, from the chunk if one is open; its opcode, or none at the end of the data.
+    fn next_record(&mut self) -> Result<Option<u8>, Broken> {
+        if self.at < self.chunk.len() {
+            let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
+            let kind = chunk.whole(1, "a record's kind")? as u8;
+            let length = chunk.length(8, "a record's length")?;
+            let content = chunk.take(length, "a record of a chunk")?;
+            self.record.clear();
+            self.record.extend_from_slice(content);
+            self.at += chunk.position();
+            if kind == CHUNK {
+                return Err(Broken::new(self.offset, "a chunk in a chunk", "messages"));
+            }
+            return Ok(Some(kind));
+        }
+        if self.is_ended {
+            return Ok(None);
+        }
+        self.offset = self.input.offset();
+        self.input
+            .take(9, &mut self.record, "a record's kind and length")?;
+        let mut head = Slice::new(&self.record, self.offset);
+        let kind = head.whole(1, "a record's kind")? as u8;
+        let length = head.whole(8, "a record's length")?;
+        if matches!(kind, SCHEMA | CHANNEL | MESSAGE | CHUNK) {
+            self.input.take(length, &mut self.record, "a record")?;
+        } else if (1..=DATA_END).contains(&kind) || kind >= 0x80 {
+            self.input.skip(length, "a record")?;
+        } else {
+            return Err(Broken::new(
+                self.offset,
+                format_args!("a record of kind {kind}"),
+                "one of MCAP's kinds",
+            ));
+        }
+        Ok(Some(kind))
+    }
+
+    fn open_chunk(&mut self) -> Result<(), Broken> {
+        let mut record = Slice::new(&self.record, self.offset + 9);
+        record.take(16, "the times of a chunk")?;
+        let size = record.whole(8, "the size of a chunk")?;
+        let sum = record.whole(4, "the checksum of a chunk")? as u32;
+        let length = record.length(4, "a length")?;
+        let method = record.text(length, "how a chunk is packed")?;
+        let length = record.length(8, "a length")?;
+        let packed = record.take(length, "a chunk")?;
+        self.chunk = unpack(&method, packed, size, self.offset)?;
+        self.at = 0;
+        let mut found = flate2::Crc::new();
+        found.update(&self.chunk);
+        // Zero stands for none.
+        if sum != 0 && found.sum() != sum {
+            self.chunk.clear();
+            return Err(Broken::new(
+                self.offset,
+                format_args!("a chunk with the checksum {:08x}", found.sum()),
+                format_args!("{sum:08x}, as it was written"),
+            ));
+        }
+        Ok(())
+    }
+
+    fn schema(&mut self) -> Result<(), Broken> {
+        let mut record = Slice::packed(&self.record, self.offset);
+        let number = record.whole(2, "a schema's number")? as u16;
+        let length = record.length(4, "a length")?;
+        let name = record.text(length, "a schema's name")?;
+        let length = record.length(4, "a length")?;
+        let encoding = record.text(length, "a schema's encoding")?;
+        let length = record.length(4, "a length")?;
+        let data = record.take(length, "a schema")?.to_vec();
+        let schema = Schema {
+            name,
+            encoding,
+            data,
+        };
+        self.schemas.insert(number, schema);
+        Ok(())
+    }
+
+    fn channel(&mut self) -> Result<(), Broken> {
+        let mut record = Slice::packed(&self.record, self.offset);
+        let number = record.whole(2, "a channel's number")? as u16;
+        let schema = record.whole(2, "a schema's number")? as u16;
+        let length = record.length(4, "a length")?;
+        let topic = record.text(length, "a topic")?;
+        let length = record.length(4, "a length")?;
+        let encoding = record.text(length, "an encoding of messages")?;
+        if self.channels.contains_key(&number) {
+            return Ok(());
+        }
+        let reader = match self.schemas.get(&schema) {
+            Some(schema) => reader(&encoding, schema),
+            None if encoding == "json" => Reader::Json(Vec::new()),
+            None => Reader::Unknown(format!(
+                "messages of encoding `{encoding}` without a schema are not read"
+            )),
+        };
+        let stream = self.streams.iter().position(|stream| stream.name == topic);
+        // The same topic again, as when a recorder starts anew.
+        let stream = stream.unwrap_or_else(|| {
+            self.streams.push(reader.stream(&topic));
+            self.readers.push(reader);
+            self.streams.len() - 1
+        });
+        self.channels.insert(number, stream);
+        Ok(())
+    }
+
+    fn message(&mut self) -> Result<Option<usize>, Broken> {
+        let mut record = Slice::packed(&self.record, self.offset);
+        let channel = record.whole(2, "a channel's number")? as u16;
+        record.take(4, "a message's number")?;
+        let time = record.whole(8, "a time")?;
+        record.take(8, "a time")?;
+        let Some(&stream) = self.channels.get(&channel) else {
+            return Err(Broken::new(
+                self.offset,
+                format_args!("a message of channel {channel}"),
+                "a channel that was described before it",
+            ));
+        };
+        if let Reader::Json(columns) = &mut self.readers[stream]
+            && columns.is_empty()
+        {
+            *columns = json::columns(&self.record[BEFORE_DATA..], self.offset)?;
+            let name = self.streams[stream].name.clone();
+            self.streams[stream] = self.readers[stream].stream(&name);
+        }
+        self.current = Some((stream, time));
+        Ok(Some(stream))
+    }
+}
+
+fn reader(encoding: &str, schema: &Schema) -> Reader {
+    let text = || String::from_utf8_lossy(&schema.data);
+    match (encoding, &*schema.encoding) {
+        ("cdr", "ros2msg") => Reader::of_ros(&schema.name, &text(), Encoding::Cdr),
+        ("ros1", "ros1msg") => Reader::of_ros(&schema.name, &text(), Encoding::Ros1),
+        ("json", _) => Reader::Json(Vec::new()),
+        ("protobuf", "protobuf") => match protobuf::Message::parse(&schema.name, &schema.data) {
+            Some(message) => Reader::Protobuf(message),
+            None => Reader::Unknown("its descriptor cannot be read".to_owned()),
+        },
+        (encoding, schema) => Reader::Unknown(format!(
+            "messages of encoding `{encoding}` with a schema of `{schema}` are not read"
+        )),
+    }
+}

@@ -1,0 +1,210 @@
+//! Logs as other programs write them: a file gives streams of samples.
+//!
+//! A format is told by the file's first bytes, never by its name. Each is a feature of the crate.
+
+mod arrays;
+mod bytes;
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod channel;
+mod corrections;
+#[cfg(feature = "dataflash")]
+mod dataflash;
+#[cfg(feature = "mcap")]
+mod json;
+#[cfg(feature = "mat")]
+mod mat;
+#[cfg(feature = "mcap")]
+mod mcap;
+#[cfg(feature = "npy")]
+mod npy;
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod packed;
+#[cfg(feature = "mcap")]
+mod protobuf;
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod ros;
+#[cfg(feature = "rosbag")]
+mod rosbag;
+mod rows;
+#[cfg(feature = "ulog")]
+mod ulog;
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use super::error::{FileError, Place};
+use bytes::{Broken, Input};
+pub(super) use rows::{Found, StreamRows, survey};
+
+/// A column of a stream.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Column {
+    pub name: String,
+    /// As `run.toml` writes it, empty where the file does not say it.
+    pub unit: &'static str,
+}
+
+impl Column {
+    fn new(name: impl Into<String>, unit: &'static str) -> Self {
+        Self {
+            name: name.into(),
+            unit,
+        }
+    }
+}
+
+/// Samples of one kind from one source.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct Stream {
+    /// As `run.toml` names it.
+    pub name: String,
+    /// Empty until its first sample where only that shows them.
+    pub columns: Vec<Column>,
+    /// What was done to its values or must be known of them, a sentence each.
+    pub remarks: Vec<String>,
+    /// Whether it may be an instrument's, as far as the format tells.
+    pub is_inertial: bool,
+    /// The word for its body axes, where the format has a convention.
+    pub axes: Option<&'static str>,
+}
+
+/// A file that gives streams of samples, read from its begin to its end.
+pub(super) trait Log {
+    /// The streams found up to here.
+    fn streams(&self) -> &[Stream];
+
+    /// Goes to the next sample of any stream, and says of which; none at the end of the file.
+    fn advance(&mut self) -> Result<Option<usize>, Broken>;
+
+    /// The values of the sample, one for each column of its stream; NaN where there is no number.
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken>;
+
+    /// Where the sample is in the file, bytes.
+    fn offset(&self) -> u64;
+}
+
+/// A format of logs, with the feature that reads it and what its files begin with.
+struct Format {
+    name: &'static str,
+    feature: &'static str,
+    begins: &'static [&'static [u8]],
+    open: Option<Open>,
+}
+
+type Open = fn(Input) -> Result<Box<dyn Log>, Broken>;
+
+macro_rules! reader {
+    ($feature:literal, $open:path) => {{
+        #[cfg(feature = $feature)]
+        let open: Option<Open> = Some($open);
+        #[cfg(not(feature = $feature))]
+        let open: Option<Open> = None;
+        open
+    }};
+}
+
+fn formats() -> [Format; 7] {
+    [
+        Format {
+            name: "a PX4 ULog file",
+            feature: "ulog",
+            begins: &[b"ULog\x01\x12\x35"],
+            open: reader!("ulog", ulog::open),
+        },
+        Format {
+            name: "an ArduPilot DataFlash log",
+            feature: "dataflash",
+            begins: &[b"\xa3\x95\x80"],
+            open: reader!("dataflash", dataflash::open),
+        },
+        Format {
+            name: "a MAT file",
+            feature: "mat",
+            begins: &[b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"],
+            open: reader!("mat", mat::open),
+        },
+        Format {
+            name: "an MCAP file",
+            feature: "mcap",
+            begins: &[b"\x89MCAP0\r\n"],
+            open: reader!("mcap", mcap::open),
+        },
+        Format {
+            name: "a ROS 1 bag",
+            feature: "rosbag",
+            begins: &[b"#ROSBAG V2.0\n"],
+            open: reader!("rosbag", rosbag::open),
+        },
+        Format {
+            name: "a NumPy array",
+            feature: "npy",
+            begins: &[b"\x93NUMPY"],
+            open: reader!("npy", npy::open_array),
+        },
+        Format {
+            name: "a ZIP archive of NumPy arrays",
+            feature: "npy",
+            begins: &[b"PK\x03\x04"],
+            open: reader!("npy", npy::open_archive),
+        },
+    ]
+}
+
+/// Opens a log by its content; none if it is no such log, but perhaps rows of text.
+pub(super) fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
+    let refused = |error: std::io::Error| {
+        FileError::io(
+            path,
+            "open the file",
+            &error,
+            "Names in run.toml are relative to run.toml; correct the name or add the file.",
+        )
+    };
+    // What is no regular file, or none at all, is refused where text is read.
+    if !std::fs::metadata(path).is_ok_and(|kind| kind.is_file()) {
+        return Ok(None);
+    }
+    let mut file = File::open(path).map_err(refused)?;
+    let mut begin = Vec::new();
+    Read::by_ref(&mut file)
+        .take(128)
+        .read_to_end(&mut begin)
+        .map_err(refused)?;
+    let Some(format) = formats().into_iter().find(|format| format.is_of(&begin)) else {
+        return Ok(None);
+    };
+    let Some(open) = format.open else {
+        return Err(FileError::new(
+            path,
+            Place::File,
+            format_args!("{}, which this build does not read", format.name),
+            format_args!("a build with the feature `{}`", format.feature),
+            "Build turncal with its default features, or convert the file to CSV.",
+        ));
+    };
+    let file = BufReader::with_capacity(1 << 16, file);
+    let input = Input::new(Box::new(file)).map_err(refused)?;
+    open(input)
+        .map(Some)
+        .map_err(|broken| broken.of(path, ADVICE))
+}
+
+const ADVICE: &str = "Record or copy the file again.";
+
+impl Format {
+    fn is_of(&self, begin: &[u8]) -> bool {
+        self.begins.iter().any(|bytes| begin.starts_with(bytes))
+    }
+}
+
+impl Broken {
+    /// As the error of a file.
+    fn of(&self, file: &Path, advice: &str) -> FileError {
+        let place = Place::Byte(self.offset);
+        FileError::new(file, place, &self.found, &self.expected, advice)
+    }
+}
+
+#[cfg(all(test, feature = "logs"))]
+mod tests;

@@ -1,0 +1,205 @@
+//! ROS 1 bags, version 2.0.
+//!
+//! Source: wiki.ros.org/Bags/Format/2.0: a line of the version, then records of a head (fields `name=value`) and
+//! data; chunks hold connections and messages, packed.
+
+use std::collections::BTreeMap;
+
+use super::bytes::{Broken, Input, Slice};
+use super::channel::Reader;
+use super::packed::unpack;
+use super::ros::Encoding;
+use super::{Log, Stream};
+
+const FIRST_LINE: u64 = 13;
+const MESSAGE: u8 = 2;
+const CHUNK: u8 = 5;
+const CONNECTION: u8 = 7;
+
+pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+    input.skip(FIRST_LINE, "the first line")?;
+    Ok(Box::new(Bag {
+        input,
+        connections: BTreeMap::new(),
+        streams: Vec::new(),
+        readers: Vec::new(),
+        chunk: Vec::new(),
+        at: 0,
+        head: Vec::new(),
+        data: Vec::new(),
+        offset: 0,
+        current: None,
+    }))
+}
+
+struct Bag {
+    input: Input,
+    /// The stream of each connection.
+    connections: BTreeMap<u32, usize>,
+    streams: Vec<Stream>,
+    readers: Vec<Reader>,
+    /// Records of the chunk that is read, and how far it is.
+    chunk: Vec<u8>,
+    at: usize,
+    head: Vec<u8>,
+    data: Vec<u8>,
+    /// Where the record, or the chunk that it is in, is.
+    offset: u64,
+    /// Stream and time of the message.
+    current: Option<(usize, u64)>,
+}
+
+impl Log for Bag {
+    fn streams(&self) -> &[Stream] {
+        &self.streams
+    }
+
+    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+        while self.next_record()? {
+            let head = Head::of(&self.head, self.offset)?;
+            let kind = head.field("op").and_then(|op| op.first()).copied();
+            match kind {
+                Some(MESSAGE) => {
+                    let connection = head.whole("conn", 4)? as u32;
+                    let time = head.whole("time", 8)?;
+                    let (seconds, nanoseconds) = (time & 0xffff_ffff, time >> 32);
+                    let Some(&stream) = self.connections.get(&connection) else {
+                        return Err(Broken::new(
+                            self.offset,
+                            format_args!("a message of connection {connection}"),
+                            "a connection that was described before it",
+                        ));
+                    };
+                    self.current = Some((stream, seconds * 1_000_000_000 + nanoseconds));
+                    return Ok(Some(stream));
+                }
+                Some(CHUNK) => {
+                    let size = head.whole("size", 4)?;
+                    let method = head.field("compression").unwrap_or_default();
+                    let method = String::from_utf8_lossy(method);
+                    self.chunk = unpack(&method, &self.data, size, self.offset)?;
+                    self.at = 0;
+                }
+                Some(CONNECTION) => self.connection()?,
+                Some(_) => {}
+                None => {
+                    return Err(Broken::new(
+                        self.offset,
+                        "a record without `op`",
+                        "its kind",
+                    ));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
+        let Some((stream, time)) = self.current else {
+            return Ok(());
+        };
+        self.readers[stream].values(time, &self.data, self.offset, row)
+    }
+
+    fn offset(&self) -> u64 {
+        self.offset
+    }
+}
+
+impl Bag {
+    /// Takes the next record, from the chunk if one is open; false at the end.
+    fn next_record(&mut self) -> Result<bool, Broken> {
+        if self.at < self.chunk.len() {
+            let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
+            for part in [&mut self.head, &mut self.data] {
+                let length = chunk.length(4, "a length")?;
+                part.clear();
+                part.extend_from_slice(chunk.take(length, "a record of a chunk")?);
+            }
+            self.at += chunk.position();
+            if Head::of(&self.head, self.offset)?.field("op") == Some(&[CHUNK]) {
+                return Err(Broken::new(self.offset, "a chunk in a chunk", "messages"));
+            }
+            return Ok(true);
+        }
+        self.offset = self.input.offset();
+        if self.input.left() == 0 {
+            return Ok(false);
+        }
+        for part in [&mut self.head, &mut self.data] {
+            self.input.take(4, part, "a length")?;
+            let length = Slice::new(part, self.offset).whole(4, "a length")?;
+            self.input.take(length, part, "a record")?;
+        }
+        Ok(true)
+    }
+
+    fn connection(&mut self) -> Result<(), Broken> {
+        let head = Head::of(&self.head, self.offset)?;
+        let number = head.whole("conn", 4)? as u32;
+        let text =
+            |bytes: Option<&[u8]>| String::from_utf8_lossy(bytes.unwrap_or_default()).into_owned();
+        let topic = text(head.field("topic"));
+        let described = Head::of(&self.data, self.offset)?;
+        let (kind, definition) = (
+            described.field("type"),
+            described.field("message_definition"),
+        );
+        if self.connections.contains_key(&number) {
+            return Ok(());
+        }
+        let reader = Reader::of_ros(&text(kind), &text(definition), Encoding::Ros1);
+        let stream = self.streams.iter().position(|stream| stream.name == topic);
+        // Several programs may publish on one topic.
+        let stream = stream.unwrap_or_else(|| {
+            self.streams.push(reader.stream(&topic));
+            self.readers.push(reader);
+            self.streams.len() - 1
+        });
+        self.connections.insert(number, stream);
+        Ok(())
+    }
+}
+
+/// Fields by their names.
+struct Head<'a> {
+    fields: Vec<(&'a [u8], &'a [u8])>,
+    offset: u64,
+}
+
+impl<'a> Head<'a> {
+    fn of(bytes: &'a [u8], offset: u64) -> Result<Self, Broken> {
+        let mut slice = Slice::packed(bytes, offset);
+        let mut fields = Vec::new();
+        while slice.left() > 0 {
+            let length = slice.length(4, "the length of a field")?;
+            let field = slice.take(length, "a field")?;
+            let equals = field.iter().position(|&byte| byte == b'=');
+            let Some(equals) = equals else {
+                return Err(Broken::new(offset, "a field without `=`", "`name=value`"));
+            };
+            fields.push((&field[..equals], &field[equals + 1..]));
+        }
+        Ok(Self { fields, offset })
+    }
+
+    fn field(&self, name: &str) -> Option<&'a [u8]> {
+        let found = self
+            .fields
+            .iter()
+            .find(|(known, _)| *known == name.as_bytes());
+        found.map(|&(_, value)| value)
+    }
+
+    fn whole(&self, name: &str, size: usize) -> Result<u64, Broken> {
+        let field = self.field(name).filter(|field| field.len() == size);
+        let field = field.ok_or_else(|| {
+            Broken::new(
+                self.offset,
+                format_args!("no `{name}` of {size} bytes"),
+                "it",
+            )
+        })?;
+        Slice::new(field, self.offset).whole(size, name)
+    }
+}

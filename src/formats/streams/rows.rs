@@ -1,0 +1,266 @@
+//! One stream of a log, row by row.
+
+use std::path::{Path, PathBuf};
+
+use super::bytes::Broken;
+use super::{Log, Stream};
+use crate::formats::error::{FileError, Place, list, suggestion};
+
+/// A log at one sample of one of its streams.
+pub(in crate::formats) struct StreamRows {
+    file: PathBuf,
+    log: Box<dyn Log>,
+    stream: usize,
+    name: String,
+    names: Vec<String>,
+    units: Vec<String>,
+    /// Whether what is whole before a damage is used.
+    salvage: bool,
+    damage: Option<Broken>,
+    row: Vec<f64>,
+    /// Samples of the stream so far, with this one.
+    samples: u64,
+    /// Whether the row is the first and was not given out yet.
+    is_ahead: bool,
+}
+
+/// A stream with what a look over the whole file shows of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::formats) struct Found {
+    pub stream: Stream,
+    pub samples: u64,
+}
+
+/// All streams of a log that have samples, and the error of the place where it is damaged.
+pub(in crate::formats) fn survey(
+    file: &Path,
+    mut log: Box<dyn Log>,
+) -> (Vec<Found>, Option<FileError>) {
+    let mut samples: Vec<u64> = Vec::new();
+    let mut row = Vec::new();
+    let damage = loop {
+        match log.advance() {
+            Ok(None) => break None,
+            Err(broken) => break Some(broken),
+            Ok(Some(stream)) => {
+                if samples.len() <= stream {
+                    samples.resize(stream + 1, 0);
+                }
+                // The first shows what is to be said of the stream.
+                if samples[stream] == 0
+                    && let Err(broken) = log.values(&mut row)
+                {
+                    break Some(broken);
+                }
+                samples[stream] += 1;
+            }
+        }
+    };
+    let streams = log.streams().iter().cloned().zip(samples);
+    let found = streams.map(|(stream, samples)| Found { stream, samples });
+    let with_samples = found.filter(|found| found.samples > 0).collect();
+    (with_samples, damage.map(|broken| broken.of(file, CUT_OFF)))
+}
+
+const CUT_OFF: &str = "Copy or record the file again, or say `salvage = true` and what is whole before this \
+                       place is used.";
+
+impl StreamRows {
+    /// Opens a stream, which must have a sample; without a name the only one.
+    pub fn open(
+        file: &Path,
+        mut log: Box<dyn Log>,
+        name: Option<&str>,
+        salvage: bool,
+    ) -> Result<Self, FileError> {
+        let mut with_samples: Vec<usize> = Vec::new();
+        let mut damage = None;
+        let mut row = Vec::new();
+        let stream = loop {
+            let next = match log.advance() {
+                Err(broken) if salvage => {
+                    damage = Some(broken);
+                    None
+                }
+                next => next.map_err(|broken| broken.of(file, CUT_OFF))?,
+            };
+            let Some(stream) = next else {
+                break None;
+            };
+            if !with_samples.contains(&stream) {
+                with_samples.push(stream);
+            }
+            if name.is_some_and(|name| is_called(&log.streams()[stream].name, name)) {
+                break Some(stream);
+            }
+        };
+        if let (None, None, &[_]) = (stream, name, &with_samples[..]) {
+            // The file was read to its end to know that there is no other.
+            let only = log.streams()[with_samples[0]].name.clone();
+            let again = super::open(file)?.ok_or_else(|| changed(file))?;
+            return Self::open(file, again, Some(&only), salvage);
+        }
+        let Some(stream) = stream else {
+            let names: Vec<&str> = with_samples
+                .iter()
+                .map(|&k| &*log.streams()[k].name)
+                .collect();
+            let (found, expected) = match (names.is_empty(), name) {
+                (true, _) => ("no samples".to_owned(), "streams of samples".to_owned()),
+                (false, Some(name)) => (
+                    format!("the streams {}", list(names.iter().copied())),
+                    format!("a stream `{name}` with samples"),
+                ),
+                (false, None) => (
+                    format!("the streams {}", list(names.iter().copied())),
+                    "one stream, or `stream` in run.toml".to_owned(),
+                ),
+            };
+            let advice = suggestion(
+                name.unwrap_or_default(),
+                names.iter().copied(),
+                "Name one of them; `turncal init FILE` says what each holds.",
+            );
+            return Err(FileError::new(file, Place::File, found, expected, advice));
+        };
+        log.values(&mut row)
+            .map_err(|broken| broken.of(file, CUT_OFF))?;
+        let found = &log.streams()[stream];
+        Ok(Self {
+            file: file.to_owned(),
+            name: found.name.clone(),
+            names: found
+                .columns
+                .iter()
+                .map(|column| column.name.clone())
+                .collect(),
+            units: found
+                .columns
+                .iter()
+                .map(|column| column.unit.to_owned())
+                .collect(),
+            log,
+            stream,
+            salvage,
+            damage,
+            row,
+            samples: 0,
+            is_ahead: true,
+        })
+    }
+
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The names of the columns.
+    pub fn header(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Of the columns, empty where the file does not say it.
+    pub fn units(&self) -> &[String] {
+        &self.units
+    }
+
+    /// What was done to the values.
+    pub fn remarks(&self) -> &[String] {
+        &self.log.streams()[self.stream].remarks
+    }
+
+    /// Goes to the next sample; false at the end, and at a damage where what is before it is to be used.
+    pub fn advance(&mut self) -> Result<bool, FileError> {
+        if self.is_ahead {
+            self.is_ahead = false;
+            self.samples = 1;
+            return Ok(true);
+        }
+        match self.next() {
+            Ok(more) => {
+                self.samples += u64::from(more);
+                Ok(more)
+            }
+            Err(broken) if self.salvage => {
+                self.damage = Some(broken);
+                Ok(false)
+            }
+            Err(broken) => Err(broken.of(&self.file, CUT_OFF)),
+        }
+    }
+
+    fn next(&mut self) -> Result<bool, Broken> {
+        if self.damage.is_some() {
+            return Ok(false);
+        }
+        while let Some(stream) = self.log.advance()? {
+            if stream == self.stream {
+                self.log.values(&mut self.row)?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Where the file is damaged and what was used, in a sentence.
+    pub fn cut_off(&self) -> Option<String> {
+        let Broken {
+            offset,
+            found,
+            expected,
+        } = self.damage.as_ref()?;
+        Some(format!(
+            "{}, byte {offset}: found {found}, expected {expected}; the {} samples of `{}` before it are used.",
+            self.file.display(),
+            self.samples,
+            self.name
+        ))
+    }
+
+    /// The number of the sample, from one.
+    pub fn sample(&self) -> u64 {
+        self.samples
+    }
+
+    /// The value in a column of the sample; NaN is none.
+    pub fn value(&self, column: usize) -> f64 {
+        self.row.get(column).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The place of a column of the sample.
+    pub fn place(&self, column: Option<usize>) -> Place {
+        Place::Sample {
+            number: self.samples,
+            stream: self.name.clone(),
+            byte: self.log.offset(),
+            column: column.and_then(|column| self.names.get(column)).cloned(),
+        }
+    }
+
+    /// The same error where a number that was taken for that of a line is that of a sample.
+    pub fn placed(&self, mut error: FileError) -> FileError {
+        if let Place::Line(number) = error.place {
+            error.place = Place::Sample {
+                number,
+                stream: self.name.clone(),
+                byte: 0,
+                column: None,
+            };
+        }
+        error
+    }
+}
+
+/// Whether this is the stream's name, which may leave out that it is the first instance.
+fn is_called(stream: &str, name: &str) -> bool {
+    stream == name || stream.strip_suffix("[0]") == Some(name)
+}
+
+fn changed(file: &Path) -> FileError {
+    FileError::new(
+        file,
+        Place::File,
+        "another file than a moment ago",
+        "a file that stays as it is",
+        "Wait until it is written, and try again.",
+    )
+}

@@ -1,0 +1,126 @@
+//! What PX4 corrects: `vehicle_imu`, `sensor_combined` and the topics of drivers before version 1.11, which have
+//! `x_raw`; `sensor_accel` and `sensor_gyro` of later versions are as the sensor gave them.
+
+use std::collections::BTreeMap;
+
+use super::super::Column;
+use super::super::bytes::{Broken, Kind, Slice};
+use super::super::corrections::{Applied, Corrected, Undo};
+use crate::imu::{PerSensor, Sensor};
+
+/// Numbers of calibrations of a kind of sensor.
+const CALIBRATIONS: usize = 4;
+
+/// `P` messages, and the devices that PX4 says it has selected.
+#[derive(Default)]
+pub(super) struct Parameters {
+    values: BTreeMap<String, f64>,
+    selected: PerSensor<Option<f64>>,
+    /// How often one of them was set.
+    pub changes: u64,
+}
+
+impl Parameters {
+    pub fn take(&mut self, content: &mut Slice) -> Result<(), Broken> {
+        let length = content.length(1, "the length of a parameter's name")?;
+        let key = content.text(length, "a parameter's name")?;
+        let offset = content.offset();
+        let (kind, name) = match key.split_once(' ') {
+            Some(("float", name)) => (Kind::F32, name),
+            Some(("int32_t", name)) => (Kind::I32, name),
+            _ => {
+                return Err(Broken::new(
+                    offset,
+                    format_args!("the parameter `{key}`"),
+                    "`float NAME` or `int32_t NAME`",
+                ));
+            }
+        };
+        let value = kind.number(content.take(kind.size(), "a parameter")?, false);
+        self.values
+            .insert(name.to_owned(), value.unwrap_or(f64::NAN));
+        self.changes += 1;
+        Ok(())
+    }
+
+    pub fn select(&mut self, sensor: Sensor, device: f64) {
+        *self.selected.get_mut(sensor) = Some(device);
+        self.changes += 1;
+    }
+
+    fn of(&self, name: &str) -> Option<f64> {
+        self.values.get(name).copied()
+    }
+
+    /// What is applied to a device of this number, else to the selected or the only one.
+    pub fn applied(&self, sensor: Sensor, device: Option<f64>) -> Option<Applied> {
+        let device = device.or(*self.selected.get(sensor));
+        let (kind, temperature) = match sensor {
+            Sensor::Gyro => ("GYRO", "TC_G_ENABLE"),
+            Sensor::Accel => ("ACC", "TC_A_ENABLE"),
+        };
+        let named = |number: usize| format!("CAL_{kind}{number}");
+        let mut known = (0..CALIBRATIONS).filter(|&number| {
+            let id = self.of(&format!("{}_ID", named(number)));
+            id.is_some_and(|id| id != 0.0 && device.is_none_or(|device| device == id))
+        });
+        let (number, further) = (known.next()?, known.next());
+        if device.is_none() && further.is_some() {
+            return None;
+        }
+        let name = named(number);
+        let axes = |what: &str, otherwise: f64| {
+            let of = |axis| self.of(&format!("{name}_{axis}{what}"));
+            ["X", "Y", "Z"].map(|axis| of(axis).unwrap_or(otherwise))
+        };
+        let is_on = |name: &str| self.of(name).is_some_and(|value| value > 0.0);
+        Some(Applied {
+            offset: axes("OFF", 0.0),
+            scale: axes("SCALE", 1.0),
+            is_more: is_on(&format!("{name}_ROT")) || is_on("SENS_BOARD_ROT") || is_on(temperature),
+            name: format!("{name}_XOFF … {name}_ZSCALE"),
+        })
+    }
+}
+
+/// What of a topic is corrected.
+pub(super) fn of_topic(topic: &str, columns: &[Column]) -> Undo {
+    let place = |name: &str| columns.iter().position(|column| column.name == name);
+    let corrected = PerSensor::from_fn(|sensor| {
+        let [increments, interval, device, rates, of_driver] = match sensor {
+            Sensor::Gyro => [
+                "delta_angle",
+                "delta_angle_dt",
+                "gyro_device_id",
+                "gyro_rad",
+                "sensor_gyro",
+            ],
+            Sensor::Accel => [
+                "delta_velocity",
+                "delta_velocity_dt",
+                "accel_device_id",
+                "accelerometer_m_s2",
+                "sensor_accel",
+            ],
+        };
+        let triad = |stem: &str| {
+            let names = [0, 1, 2].map(|k| format!("{stem}[{k}]"));
+            Corrected::rates(columns, names.each_ref().map(|name| &**name))
+        };
+        match topic {
+            "vehicle_imu" => Some(Corrected {
+                // Before version 1.12 one interval served both.
+                interval: Some(place(interval).or_else(|| place("dt"))?),
+                device: place(device),
+                ..triad(increments)?
+            }),
+            "sensor_combined" => triad(rates),
+            _ if topic == of_driver && place("x_raw").is_some() => Some(Corrected {
+                device: place("device_id"),
+                ..Corrected::rates(columns, ["x", "y", "z"])?
+            }),
+            _ => None,
+        }
+    });
+    Undo::new("PX4", corrected)
+}

@@ -1,0 +1,150 @@
+//! Where the numbers of a topic are in its messages.
+
+use std::collections::BTreeMap;
+
+use super::super::Column;
+use super::super::bytes::{Broken, Kind};
+
+/// More numbers than a message of 65,535 bytes holds.
+const MOST: usize = 1 << 16;
+/// Topics within topics: those of PX4 go one deep.
+const DEEPEST: usize = 8;
+
+pub(super) struct Layout {
+    pub columns: Vec<Column>,
+    places: Vec<(usize, Kind)>,
+    length: usize,
+}
+
+/// What was found, what was expected.
+type Wrong = (String, &'static str);
+
+impl Layout {
+    pub fn of(topic: &str, formats: &BTreeMap<String, String>) -> Result<Self, Wrong> {
+        let mut layout = Self {
+            columns: Vec::new(),
+            places: Vec::new(),
+            length: 0,
+        };
+        layout.add(topic, "", topic, formats, 0)?;
+        Ok(layout)
+    }
+
+    fn add(
+        &mut self,
+        topic: &str,
+        prefix: &str,
+        format: &str,
+        formats: &BTreeMap<String, String>,
+        depth: usize,
+    ) -> Result<(), Wrong> {
+        let fields = formats
+            .get(format)
+            .filter(|_| depth < DEEPEST)
+            .ok_or_else(|| {
+                (
+                    format!("a field of type `{format}`"),
+                    "a type of a number or a format of this file",
+                )
+            })?;
+        for field in fields.split(';').filter(|field| !field.trim().is_empty()) {
+            let wrong = || (format!("the field `{field}`"), "`type name`");
+            let (kind, name) = field.trim().split_once(' ').ok_or_else(wrong)?;
+            let (kind, count) = match kind.split_once('[') {
+                None => (kind, None),
+                Some((kind, rest)) => {
+                    let count = rest.strip_suffix(']').and_then(|count| count.parse().ok());
+                    let count: usize = count.filter(|&count| count <= MOST).ok_or_else(wrong)?;
+                    (kind, Some(count))
+                }
+            };
+            for index in 0..count.unwrap_or(1) {
+                let name = match count {
+                    Some(_) => format!("{prefix}{name}[{index}]"),
+                    None => format!("{prefix}{name}"),
+                };
+                self.number(topic, name, kind, formats, depth)?;
+                if self.length > MOST {
+                    return Err((
+                        format!("a topic `{topic}` of more than {MOST} bytes"),
+                        "less",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn number(
+        &mut self,
+        topic: &str,
+        name: String,
+        kind: &str,
+        formats: &BTreeMap<String, String>,
+        depth: usize,
+    ) -> Result<(), Wrong> {
+        let kind = match kind {
+            "int8_t" => Kind::I8,
+            "uint8_t" | "bool" => Kind::U8,
+            "int16_t" => Kind::I16,
+            "uint16_t" => Kind::U16,
+            "int32_t" => Kind::I32,
+            "uint32_t" => Kind::U32,
+            "int64_t" => Kind::I64,
+            "uint64_t" => Kind::U64,
+            "float" => Kind::F32,
+            "double" => Kind::F64,
+            "char" => {
+                self.length += 1;
+                return Ok(());
+            }
+            nested => return self.add(topic, &format!("{name}."), nested, formats, depth + 1),
+        };
+        if !name.contains("_padding") {
+            let unit = unit(topic, &name);
+            self.columns.push(Column::new(name, unit));
+            self.places.push((self.length, kind));
+        }
+        self.length += kind.size();
+        Ok(())
+    }
+
+    /// The number in a column of a message.
+    pub fn value(&self, data: &[u8], column: usize) -> Option<f64> {
+        let &(place, kind) = self.places.get(column)?;
+        kind.number(data.get(place..)?, false)
+    }
+
+    /// The numbers of a message whose data begin at this place of the file.
+    pub fn values(&self, data: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
+        row.clear();
+        for &(place, kind) in &self.places {
+            let bytes = data.get(place..).unwrap_or_default();
+            let number = kind.number(bytes, false).ok_or_else(|| {
+                Broken::new(
+                    offset,
+                    format_args!("{} bytes of data", data.len()),
+                    format_args!("the {} that their format has", self.length),
+                )
+            })?;
+            row.push(number);
+        }
+        Ok(())
+    }
+}
+
+/// The unit of a field, by PX4's message definitions.
+fn unit(topic: &str, name: &str) -> &'static str {
+    let of = |start: &str| name.starts_with(start);
+    let is_axis = matches!(name, "x" | "y" | "z");
+    match topic {
+        _ if of("timestamp") || of("delta_angle_dt") || of("delta_velocity_dt") => "us",
+        "sensor_gyro" if is_axis => "rad/s",
+        "sensor_accel" if is_axis => "m/s^2",
+        "vehicle_imu" if of("delta_angle[") => "rad",
+        "vehicle_imu" if of("delta_velocity[") => "m/s",
+        "sensor_combined" if of("gyro_rad[") => "rad/s",
+        "sensor_combined" if of("accelerometer_m_s2[") => "m/s^2",
+        _ => "",
+    }
+}

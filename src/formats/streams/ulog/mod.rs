@@ -1,0 +1,243 @@
+//! PX4's ULog.
+//!
+//! Source: PX4 User Guide, "ULog File Format": a header of 16 bytes, then messages, each with its size in two
+//! bytes, its kind in one and its content.
+
+mod corrections;
+mod layout;
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::bytes::{Broken, Input, Slice};
+use super::corrections::Undo;
+use super::{Column, Log, Stream};
+use crate::imu::{PerSensor, Sensor};
+use corrections::Parameters;
+use layout::Layout;
+
+const HEADER: u64 = 16;
+/// The only incompatible flag that is known: data are appended.
+const APPENDED: u8 = 1;
+
+/// Topics of what an instrument senses, without filters behind it.
+const INERTIAL: [&str; 4] = [
+    "sensor_accel",
+    "sensor_gyro",
+    "vehicle_imu",
+    "sensor_combined",
+];
+
+pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+    input.skip(HEADER, "the header")?;
+    Ok(Box::new(Ulog {
+        input,
+        formats: BTreeMap::new(),
+        parameters: Parameters::default(),
+        streams: Vec::new(),
+        topics: HashMap::new(),
+        appended: Vec::new(),
+        message: Vec::new(),
+        offset: HEADER,
+        current: None,
+    }))
+}
+
+struct Ulog {
+    input: Input,
+    /// Fields of each named format, as they are written.
+    formats: BTreeMap<String, String>,
+    parameters: Parameters,
+    streams: Vec<Stream>,
+    /// By the number that data messages have.
+    topics: HashMap<u16, Topic>,
+    /// Where data were appended behind a message that may be cut.
+    appended: Vec<u64>,
+    message: Vec<u8>,
+    offset: u64,
+    /// The topic of the message.
+    current: Option<u16>,
+}
+
+struct Topic {
+    stream: usize,
+    layout: Layout,
+    undo: Undo,
+    /// Columns of the devices that are selected.
+    selects: PerSensor<Option<usize>>,
+}
+
+impl Log for Ulog {
+    fn streams(&self) -> &[Stream] {
+        &self.streams
+    }
+
+    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+        while let Some(kind) = self.next_message()? {
+            match kind {
+                b'B' => self.flags()?,
+                b'F' => self.format()?,
+                b'P' => {
+                    let mut content = Slice::new(&self.message, self.offset + 3);
+                    self.parameters.take(&mut content)?;
+                }
+                b'A' => self.subscribe()?,
+                b'D' => {
+                    let number = self.content().whole(2, "the number of a topic")? as u16;
+                    if let Some(topic) = self.topics.get(&number) {
+                        let data = self.message.get(2..).unwrap_or_default();
+                        for sensor in Sensor::ALL {
+                            let place = topic.selects.get(sensor);
+                            if let Some(device) =
+                                place.and_then(|place| topic.layout.value(data, place))
+                            {
+                                self.parameters.select(sensor, device);
+                            }
+                        }
+                        self.current = Some(number);
+                        return Ok(Some(topic.stream));
+                    }
+                    return Err(Broken::new(
+                        self.offset,
+                        format_args!("data of topic {number}"),
+                        "a topic that was named before its data",
+                    ));
+                }
+                // What is said of the log, its text messages, marks and lost data.
+                b'I' | b'M' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
+                other => {
+                    return Err(Broken::new(
+                        self.offset,
+                        format_args!("a message of kind {other}"),
+                        "one of ULog's kinds",
+                    ));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
+        let topic = self.current.and_then(|number| self.topics.get_mut(&number));
+        let Some(topic) = topic else {
+            return Ok(());
+        };
+        let data = self.message.get(2..).unwrap_or_default();
+        topic.layout.values(data, self.offset + 5, row)?;
+        let parameters = &self.parameters;
+        topic.undo.undo(row, parameters.changes, |sensor, device| {
+            parameters.applied(sensor, device)
+        });
+        let remarks = &mut self.streams[topic.stream].remarks;
+        if remarks.is_empty() {
+            *remarks = topic.undo.remarks();
+        }
+        Ok(())
+    }
+
+    fn offset(&self) -> u64 {
+        self.offset
+    }
+}
+
+impl Ulog {
+    fn content(&self) -> Slice<'_> {
+        Slice::new(&self.message, self.offset + 3)
+    }
+
+    /// Reads the next message; its kind, or none at the end.
+    fn next_message(&mut self) -> Result<Option<u8>, Broken> {
+        self.offset = self.input.offset();
+        if self.input.left() == 0 {
+            return Ok(None);
+        }
+        self.input
+            .take(3, &mut self.message, "a message's size and kind")?;
+        let mut head = Slice::new(&self.message, self.offset);
+        let size = head.whole(2, "a message's size")?;
+        let kind = head.whole(1, "a message's kind")? as u8;
+        let end = self.offset + 3 + size;
+        // A message that the appended data cut off never ended.
+        let cut = self
+            .appended
+            .iter()
+            .copied()
+            .find(|&at| self.offset < at && end > at);
+        if let Some(at) = cut {
+            self.input.go_to(at)?;
+            return self.next_message();
+        }
+        self.input.take(size, &mut self.message, "a message")?;
+        Ok(Some(kind))
+    }
+
+    fn flags(&mut self) -> Result<(), Broken> {
+        let mut content = self.content();
+        content.take(8, "compatible flags")?;
+        let flags = content.take(8, "incompatible flags")?;
+        let unknown = flags[0] & !APPENDED != 0 || flags[1..].iter().any(|&flag| flag != 0);
+        if unknown {
+            return Err(Broken::new(
+                self.offset,
+                "a flag of a later version of the format",
+                "data that this version can read",
+            ));
+        }
+        let mut offsets = Vec::new();
+        for _ in 0..3 {
+            let offset = content.whole(8, "the place of appended data")?;
+            if offset > self.offset {
+                offsets.push(offset);
+            }
+        }
+        offsets.sort_unstable();
+        self.appended = offsets;
+        Ok(())
+    }
+
+    fn format(&mut self) -> Result<(), Broken> {
+        let mut content = self.content();
+        let length = content.left();
+        let text = content.text(length, "a format")?;
+        let Some((name, fields)) = text.split_once(':') else {
+            return Err(Broken::new(
+                self.offset,
+                format_args!("the format `{text}`"),
+                "`name:type field;…`",
+            ));
+        };
+        self.formats.insert(name.to_owned(), fields.to_owned());
+        Ok(())
+    }
+
+    fn subscribe(&mut self) -> Result<(), Broken> {
+        let mut content = self.content();
+        let instance = content.whole(1, "an instance")?;
+        let number = content.whole(2, "the number of a topic")? as u16;
+        let length = content.left();
+        let name = content.text(length, "the name of a topic")?;
+        let layout = Layout::of(&name, &self.formats)
+            .map_err(|(found, expected)| Broken::new(self.offset, found, expected))?;
+        let undo = corrections::of_topic(&name, &layout.columns);
+        let selects = PerSensor::from_fn(|sensor| {
+            let device = format!("{}_device_id", sensor.name());
+            let is = |column: &Column| name == "sensor_selection" && column.name == device;
+            layout.columns.iter().position(is)
+        });
+        let stream = self.streams.len();
+        self.streams.push(Stream {
+            name: format!("{name}[{instance}]"),
+            columns: layout.columns.clone(),
+            remarks: Vec::new(),
+            is_inertial: INERTIAL.contains(&&*name),
+            axes: Some("frd"),
+        });
+        let topic = Topic {
+            stream,
+            layout,
+            undo,
+            selects,
+        };
+        self.topics.insert(number, topic);
+        Ok(())
+    }
+}

@@ -1,0 +1,219 @@
+//! How a triad changes with its temperature: each parameter is a polynomial in it, biases also follow
+//! its rate.
+//!
+//! `θ(T) = θ + Σ_k c_k B_k`, with `B_k = P_k(τ(T)) − P_k(τ(T_ref))` for the orders k from one on, P Legendre,
+//! τ the temperature scaled to [−1, 1] over the range seen, and a last B that is dT/dt over the largest
+//! seen. So θ is the parameter at the reference temperature while that does not change, and the c are of
+//! the size of what they do within the range.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::{InstallationForm, PARAMETERS, ParameterKind, PerSensor, Sensor, Triad};
+
+/// Highest order of the polynomials.
+pub const HIGHEST_ORDER: usize = 5;
+/// Functions of temperature that parameters are made of: the orders from one on, then its rate.
+pub const THERMAL_FUNCTIONS: usize = HIGHEST_ORDER + 1;
+/// Which of them is the rate.
+pub const RATE: usize = HIGHEST_ORDER;
+
+/// Values of all functions at a time.
+pub type ThermalValues = SVector<f64, THERMAL_FUNCTIONS>;
+/// Coefficients of one triad: a row for each parameter, a column for each function.
+pub type ThermalCoefficients = SMatrix<f64, PARAMETERS, THERMAL_FUNCTIONS>;
+/// Values of all functions at a time, of the axes x, y and z of both triads.
+pub type ThermalState = PerSensor<[ThermalValues; 3]>;
+
+/// The temperatures of a triad within which its polynomials hold.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ThermalRange {
+    /// The lowest, °C.
+    pub lowest: f64,
+    /// The highest, °C.
+    pub highest: f64,
+    /// At which its parameters are stated, °C.
+    pub reference: f64,
+    /// The largest magnitude of its rate, K/s.
+    pub largest_rate: f64,
+}
+
+impl ThermalRange {
+    /// Of a range that is none, half of the span that scales it, K.
+    const LEAST: f64 = 0.5;
+
+    /// The range scaled to [−1, 1].
+    fn scaled(&self, temperature: f64) -> f64 {
+        let middle = 0.5 * (self.lowest + self.highest);
+        let half = (0.5 * (self.highest - self.lowest)).max(Self::LEAST);
+        (temperature - middle) / half
+    }
+
+    /// All functions at a temperature in °C that changes by so many K/s.
+    pub fn values(&self, temperature: f64, rate: f64) -> ThermalValues {
+        let here = legendre(self.scaled(temperature));
+        let there = legendre(self.scaled(self.reference));
+        let mut values = ThermalValues::zeros();
+        for order in 1..=HIGHEST_ORDER {
+            values[order - 1] = here[order] - there[order];
+        }
+        if self.largest_rate > 0.0 {
+            values[RATE] = rate / self.largest_rate;
+        }
+        values
+    }
+
+    /// Whether a temperature lies within it, but for what its sensor is noisy by, K.
+    pub fn contains(&self, temperature: f64, tolerance: f64) -> bool {
+        (self.lowest - tolerance..=self.highest + tolerance).contains(&temperature)
+    }
+}
+
+/// P₀ to the highest order (Bonnet's recursion).
+fn legendre(x: f64) -> [f64; HIGHEST_ORDER + 1] {
+    let mut p = [1.0; HIGHEST_ORDER + 1];
+    p[1] = x;
+    for k in 1..HIGHEST_ORDER {
+        let n = k as f64;
+        p[k + 1] = ((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0);
+    }
+    p
+}
+
+impl Triad {
+    /// The axis whose temperature a parameter follows: that of its output.
+    pub fn axis(form: InstallationForm, parameter: usize) -> Option<usize> {
+        match Self::kind(parameter) {
+            ParameterKind::Scale => Some(parameter),
+            ParameterKind::Installation => {
+                let (row, _) = form.angle_names().get(parameter - 3)?;
+                Some(*row)
+            }
+            ParameterKind::Bias => Some(parameter - (PARAMETERS - 3)),
+        }
+    }
+
+    /// The triad where the functions of temperature have these values on its axes.
+    pub fn warmed(&self, coefficients: &ThermalCoefficients, values: &[ThermalValues; 3]) -> Self {
+        let mut v = self.to_vector();
+        for (parameter, of) in coefficients.row_iter().enumerate() {
+            if let Some(axis) = Self::axis(self.form, parameter) {
+                v[parameter] += of.transpose().dot(&values[axis]);
+            }
+        }
+        Self::from_vector(self.form, &v)
+    }
+}
+
+/// What is estimated of an instrument's temperature dependence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalModel {
+    /// Where the polynomials of each triad hold.
+    pub range: PerSensor<ThermalRange>,
+    /// 1σ of every coefficient before the recordings, around zero; zero where it is off.
+    pub sigma: PerSensor<ThermalCoefficients>,
+}
+
+impl ThermalModel {
+    /// Both triads' functions at temperatures in °C that change by so many K/s.
+    pub fn state(
+        &self,
+        temperatures: &PerSensor<[f64; 3]>,
+        rates: &PerSensor<[f64; 3]>,
+    ) -> ThermalState {
+        PerSensor::from_fn(|sensor| {
+            let (range, t, rate) = (
+                self.range.get(sensor),
+                temperatures.get(sensor),
+                rates.get(sensor),
+            );
+            [0, 1, 2].map(|axis| range.values(t[axis], rate[axis]))
+        })
+    }
+
+    /// Triad, parameter and function of each coefficient that is on.
+    pub fn on(&self) -> impl Iterator<Item = (Sensor, usize, usize)> + '_ {
+        let all = Sensor::ALL.into_iter().flat_map(|sensor| {
+            let functions = (0..THERMAL_FUNCTIONS).map(move |function| (sensor, function));
+            functions.flat_map(|(sensor, function)| {
+                (0..PARAMETERS).map(move |parameter| (sensor, parameter, function))
+            })
+        });
+        all.filter(|&(sensor, parameter, function)| {
+            self.sigma.get(sensor)[(parameter, function)] > 0.0
+        })
+    }
+}
+
+/// The coefficients of powers of `T − reference` in K that a parameter's coefficients amount to, from the first
+/// power on.
+pub fn powers(range: &ThermalRange, coefficients: &ThermalValues) -> [f64; HIGHEST_ORDER] {
+    // Newton's divided differences at as many temperatures as there are coefficients, and the reference.
+    let nodes: [f64; HIGHEST_ORDER + 1] = std::array::from_fn(|k| {
+        let span = range.highest - range.lowest;
+        span.max(1.0) * (k as f64) / HIGHEST_ORDER as f64
+    });
+    let at = |by: f64| {
+        let mut values = range.values(range.reference + by, 0.0);
+        values[RATE] = 0.0;
+        coefficients.dot(&values)
+    };
+    let vandermonde =
+        SMatrix::<f64, { HIGHEST_ORDER + 1 }, { HIGHEST_ORDER + 1 }>::from_fn(|row, column| {
+            (nodes[row] / nodes[HIGHEST_ORDER]).powi(column as i32)
+        });
+    let values = SVector::<f64, { HIGHEST_ORDER + 1 }>::from_fn(|row, _| at(nodes[row]));
+    let scaled = vandermonde.lu().solve(&values).unwrap_or_default();
+    std::array::from_fn(|k| scaled[k + 1] / nodes[HIGHEST_ORDER].powi(k as i32 + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    const RANGE: ThermalRange = ThermalRange {
+        lowest: -20.0,
+        highest: 60.0,
+        reference: 25.0,
+        largest_rate: 0.02,
+    };
+
+    #[test]
+    fn at_the_reference_a_parameter_is_itself_whatever_its_coefficients() {
+        assert_eq!(RANGE.values(25.0, 0.0), ThermalValues::zeros());
+        assert_relative_eq!(RANGE.values(25.0, -0.01)[RATE], -0.5);
+    }
+
+    #[test]
+    fn any_polynomial_of_temperature_has_its_coefficients() {
+        // Of 3 + 2 t − t³ with t in units of the range, by the values that Legendre's polynomials have.
+        let cubic = |temperature: f64| {
+            let t = (temperature - 20.0) / 40.0;
+            3.0 + 2.0 * t - t.powi(3)
+        };
+        // t³ = (2 P₃ + 3 P₁) / 5
+        let mut c = ThermalValues::zeros();
+        c[0] = 2.0 - 0.6;
+        c[2] = -0.4;
+        for temperature in [-20.0, 0.0, 31.0, 60.0] {
+            let change = c.dot(&RANGE.values(temperature, 0.0));
+            assert_relative_eq!(change, cubic(temperature) - cubic(25.0), epsilon = 1e-12);
+        }
+        let powers = powers(&RANGE, &c);
+        let by = 17.0;
+        let sum: f64 = (1..).zip(powers).map(|(k, c)| c * f64::powi(by, k)).sum();
+        assert_relative_eq!(sum, cubic(42.0) - cubic(25.0), epsilon = 1e-10);
+    }
+
+    #[test]
+    fn a_parameter_follows_the_temperature_of_its_own_axis() {
+        let form = InstallationForm::General;
+        let mut coefficients = ThermalCoefficients::zeros();
+        coefficients[(1, 0)] = 1e-3;
+        coefficients[(PARAMETERS - 1, 1)] = 0.5;
+        let values = [-20.0, 60.0, 25.0].map(|t| RANGE.values(t, 0.0));
+        let warmed = Triad::ideal(form).warmed(&coefficients, &values);
+        assert_relative_eq!(warmed.scale.y, 1.0 + 1e-3 * (1.0 - 0.125), epsilon = 1e-15);
+        assert_eq!((warmed.scale.x, warmed.bias.z), (1.0, 0.0));
+    }
+}

@@ -1,0 +1,159 @@
+//! The instrument's temperature while it recorded.
+
+use crate::imu::{PerSensor, Sensor};
+
+/// Time between two knots, s.
+pub const SPACING: f64 = 1.0;
+/// Knots on each side through which value and slope at a knot go: half a minute, below the time constants of
+/// cases, in which the noise of a sensor averages out.
+const OVER: usize = 30;
+
+/// Temperatures against time: one sensor for all axes, or several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Temperature {
+    /// Time of the first knot, s.
+    start: f64,
+    channels: Vec<Channel>,
+    /// The channel of each axis.
+    of: PerSensor<[usize; 3]>,
+}
+
+/// One temperature sensor.
+#[derive(Debug, Clone, PartialEq)]
+struct Channel {
+    /// At the knots, °C.
+    values: Vec<f64>,
+    /// Slopes at the knots, K/s.
+    rates: Vec<f64>,
+}
+
+impl Temperature {
+    /// From means over spans of [`SPACING`] that follow one another, the first about `start`, °C; `of` tells
+    /// which of these sensors each axis has. `None` without values, or where an axis has no sensor.
+    pub fn new(start: f64, channels: Vec<Vec<f64>>, of: PerSensor<[usize; 3]>) -> Option<Self> {
+        let has_values = |values: &Vec<f64>| !values.is_empty();
+        let known = |&channel: &usize| channels.get(channel).is_some_and(has_values);
+        let all = Sensor::ALL.into_iter();
+        all.clone()
+            .all(|sensor| of.get(sensor).iter().all(known))
+            .then(|| Self {
+                start,
+                channels: channels.into_iter().map(Channel::new).collect(),
+                of,
+            })
+    }
+
+    /// One that does not change, °C.
+    pub fn constant(temperature: f64) -> Self {
+        Self {
+            start: 0.0,
+            channels: vec![Channel::new(vec![temperature])],
+            of: PerSensor::default(),
+        }
+    }
+
+    /// Of each axis at a time, °C; before the first knot and after the last it stays.
+    pub fn at(&self, time: f64) -> PerSensor<[f64; 3]> {
+        self.of_axes(time, |channel| &channel.values)
+    }
+
+    /// Rate of each axis at a time, K/s.
+    pub fn rate(&self, time: f64) -> PerSensor<[f64; 3]> {
+        self.of_axes(time, |channel| &channel.rates)
+    }
+
+    /// The lowest and the highest of a triad's axes, °C.
+    pub fn range(&self, sensor: Sensor) -> [f64; 2] {
+        self.extremes(sensor, |channel| &channel.values)
+    }
+
+    /// The largest magnitude of the rate of a triad's axes, K/s.
+    pub fn largest_rate(&self, sensor: Sensor) -> f64 {
+        let [lowest, highest] = self.extremes(sensor, |channel| &channel.rates);
+        highest.max(-lowest)
+    }
+
+    fn of_axes(&self, time: f64, series: impl Fn(&Channel) -> &Vec<f64>) -> PerSensor<[f64; 3]> {
+        let at = (time - self.start) / SPACING;
+        PerSensor::from_fn(|sensor| {
+            self.of
+                .get(sensor)
+                .map(|channel| between(series(&self.channels[channel]), at))
+        })
+    }
+
+    fn extremes(&self, sensor: Sensor, series: impl Fn(&Channel) -> &Vec<f64>) -> [f64; 2] {
+        let channels = self.of.get(sensor).iter();
+        let values = channels.flat_map(|&channel| series(&self.channels[channel]));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| {
+            [low.min(value), high.max(value)]
+        })
+    }
+}
+
+impl Channel {
+    fn new(values: Vec<f64>) -> Self {
+        let (values, rates) = (0..values.len()).map(|k| line(&values, k)).unzip();
+        Self { values, rates }
+    }
+}
+
+/// Value at a knot, and slope per s, of the straight line through the knots about it.
+fn line(values: &[f64], knot: usize) -> (f64, f64) {
+    let over = knot.saturating_sub(OVER)..(knot + OVER + 1).min(values.len());
+    let (count, middle) = (over.len() as f64, 0.5 * (over.start + over.end - 1) as f64);
+    let (mut sum, mut moment, mut squares) = (0.0, 0.0, 0.0);
+    for k in over {
+        let from = k as f64 - middle;
+        sum += values[k];
+        moment += from * values[k];
+        squares += from * from;
+    }
+    let slope = if squares > 0.0 { moment / squares } else { 0.0 };
+    let value = sum / count + slope * (knot as f64 - middle);
+    (value, slope / SPACING)
+}
+
+/// Between two knots on the straight line, beyond the ends as at the ends.
+fn between(values: &[f64], at: f64) -> f64 {
+    let last = values.len() - 1;
+    let at = at.clamp(0.0, last as f64);
+    let knot = (at as usize).min(last.saturating_sub(1));
+    let next = (knot + 1).min(last);
+    let part = at - knot as f64;
+    values[knot] + (values[next] - values[knot]) * part
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_ramp_has_its_value_and_its_rate_everywhere_and_stays_beyond_its_ends() {
+        let ramp = (0..600).map(|k| 20.0 + 0.01 * f64::from(k)).collect();
+        let temperature = Temperature::new(5.0, vec![ramp], PerSensor::default()).unwrap();
+        assert_relative_eq!(temperature.at(105.25).gyro[2], 21.0025, epsilon = 1e-12);
+        assert_relative_eq!(temperature.rate(5.0).accel[0], 0.01, epsilon = 1e-12);
+        assert_relative_eq!(temperature.at(-100.0).gyro[0], 20.0);
+        assert_relative_eq!(temperature.at(1e9).gyro[0], 25.99, epsilon = 1e-12);
+        assert_eq!(temperature.range(Sensor::Gyro)[0], 20.0);
+    }
+
+    #[test]
+    fn each_axis_has_the_sensor_that_it_is_given() {
+        let of = PerSensor {
+            gyro: [0, 1, 0],
+            accel: [1, 1, 1],
+        };
+        let channels = vec![vec![10.0, 12.0], vec![30.0, 30.0]];
+        let temperature = Temperature::new(0.0, channels.clone(), of).unwrap();
+        assert_eq!(temperature.at(0.5).gyro, [11.0, 30.0, 11.0]);
+        assert_eq!(temperature.rate(0.5).accel, [0.0; 3]);
+        let missing = PerSensor {
+            gyro: [0, 1, 2],
+            accel: [0; 3],
+        };
+        assert_eq!(Temperature::new(0.0, channels, missing), None);
+    }
+}

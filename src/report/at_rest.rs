@@ -1,0 +1,197 @@
+//! The report of outputs at rest against temperature.
+
+use serde_json::{Value, json};
+
+use super::document::{Document, Table};
+use super::group::Group;
+use super::number::{plus_minus, three_digits};
+use super::plot::{Axis, Mark, Panel, Plot, Series};
+use crate::calibration::{AtRest, AxisAtRest, Calibration, parameter};
+use crate::imu::{AXES, PARAMETERS as PER_TRIAD, RATE};
+use crate::run::Run;
+
+/// Points of a curve, and seconds that are drawn at most.
+const POINTS: usize = 101;
+const DRAWN: usize = 1500;
+
+/// Everything that is said of it.
+pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Document {
+    let name = &run.recording.name;
+    let mut document = Document::new(format!("{name}: outputs at rest against temperature"));
+    let range = at_rest.range.gyro;
+    document.lead.push(format!(
+        "Run {name} stands in one attitude for {:.0} s while its temperature goes from {:.1} to {:.1} °C. Biases \
+         against temperature are all that it shows; those of the accelerometers hold what their scale factors do \
+         to gravity in this attitude.",
+        run.recording.imu.duration(),
+        range.lowest,
+        range.highest
+    ));
+    document.warnings.items.extend(calibration.warnings.clone());
+    document.both(table(at_rest));
+    document.page(curves(at_rest));
+    document.page(hysteresis(at_rest));
+    document.data = data(at_rest);
+    document
+}
+
+fn group(of: &AxisAtRest) -> Group {
+    Group::of(parameter(of.sensor, PER_TRIAD - 3 + of.axis))
+}
+
+fn name(of: &AxisAtRest) -> String {
+    format!("{} {}", of.sensor.name(), AXES[of.axis])
+}
+
+/// Order of the polynomial, and whether it follows the rate.
+fn order(of: &AxisAtRest) -> String {
+    let order = of.functions.iter().filter(|&&f| f != RATE).count();
+    match of.functions.contains(&RATE) {
+        true => format!("{order} and rate"),
+        false => order.to_string(),
+    }
+}
+
+fn table(at_rest: &AtRest) -> Table {
+    let row = |of: &AxisAtRest| {
+        let (unit, symbol) = (group(of).unit_value(), group(of).unit());
+        let (value, sigma) = of.at_reference;
+        let largest = of
+            .hysteresis
+            .iter()
+            .map(|(_, y)| *y)
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        vec![
+            name(of),
+            symbol.to_owned(),
+            plus_minus(value / unit, sigma / unit),
+            order(of),
+            three_digits(of.about_mean / unit),
+            three_digits(of.residual / unit),
+            three_digits(of.cross_validated / unit),
+            three_digits(of.cubic / unit),
+            largest.map_or("–".to_owned(), |y| three_digits(y / unit)),
+        ]
+    };
+    let sections = at_rest
+        .axes
+        .chunks(3)
+        .map(|of| of.iter().map(row).collect::<Vec<_>>());
+    Table::new(
+        "Outputs against temperature",
+        [
+            "output",
+            "unit",
+            "at the reference ± 1σ",
+            "order",
+            "RMS about\nits mean",
+            "RMS left",
+            "cross-\nvalidated",
+            "of a cubic",
+            "largest\nhysteresis",
+        ],
+    )
+    .sections(sections)
+    .note(format!(
+        "Reference: {:.1} °C. Cross-validated: RMS of every other 100 s by a fit to the others; the order and whether it \
+         follows the rate are those for which it is least. Of a cubic: the same of a cubic in temperature. Hysteresis: \
+         cooling less heating at the same temperature.",
+        at_rest.range.gyro.reference
+    ))
+}
+
+fn curves(at_rest: &AtRest) -> Plot {
+    let panel = |of: &AxisAtRest| {
+        let range = at_rest.range.get(of.sensor);
+        let unit = group(of).unit_value();
+        let step = of.seconds.len().div_ceil(DRAWN).max(1);
+        let marks = |cools: bool| {
+            let seconds = of.seconds.iter().step_by(step);
+            let of_sense = seconds.filter(move |s| (s.rate < 0.0) == cools);
+            of_sense
+                .map(|s| (s.temperature, (s.output - of.at_reference.0) / unit))
+                .collect::<Vec<_>>()
+        };
+        let at = |k: usize| {
+            range.lowest + (range.highest - range.lowest) * k as f64 / (POINTS - 1) as f64
+        };
+        let edge = |factor: f64| {
+            let points = (0..POINTS).map(|k| {
+                let (change, sigma) = of.at(range, at(k));
+                (at(k), (change + factor * sigma) / unit)
+            });
+            points.collect::<Vec<_>>()
+        };
+        let x = Axis::linear("temperature, °C").room(0.02, 0.02);
+        let title = format!("{}, {}", name(of), group(of).unit());
+        Panel::new(title, x, Axis::linear("").room(0.02, 0.02))
+            .with(Series::band(edge(-1.0), edge(1.0)))
+            .with(
+                Series::marks(Mark::Dot, marks(false))
+                    .nth(1)
+                    .width(0.5)
+                    .key("heating"),
+            )
+            .with(
+                Series::marks(Mark::Dot, marks(true))
+                    .nth(2)
+                    .width(0.5)
+                    .key("cooling"),
+            )
+            .with(Series::line(edge(0.0)).nth(0).width(2.0))
+    };
+    Plot::new(
+        "temperature.svg",
+        "Outputs at rest against temperature",
+        (3, 300),
+        at_rest.axes.iter().map(panel),
+    )
+    .caption(
+        "Change from the output at the reference temperature. Line: polynomial at a temperature that does not change; \
+         band: ±1σ of a second about it, by cross-validation. Where heating and cooling lie apart the instrument is not \
+         at the temperature of its sensor, or has hysteresis.",
+    )
+}
+
+fn hysteresis(at_rest: &AtRest) -> Plot {
+    let panel = |of: &AxisAtRest| {
+        let unit = group(of).unit_value();
+        let points = of.hysteresis.iter().map(|&(t, y)| (t, y / unit));
+        let title = format!("{}, {}", name(of), group(of).unit());
+        Panel::new(
+            title,
+            Axis::linear("temperature, °C"),
+            Axis::linear("").room(0.05, 0.05),
+        )
+        .with(Series::zero())
+        .with(Series::line(points))
+    };
+    Plot::new(
+        "hysteresis.svg",
+        "Hysteresis: cooling less heating",
+        (3, 220),
+        at_rest.axes.iter().map(panel),
+    )
+    .caption(
+        "Mean output while it cools less that while it heats, at the same temperature within 2 K.",
+    )
+}
+
+fn data(at_rest: &AtRest) -> Value {
+    let axes = at_rest.axes.iter().map(|of| {
+        let (value, sigma) = of.at_reference;
+        let si = json!({
+            "at_reference": value,
+            "sigma": sigma,
+            "functions": of.functions,
+            "coefficients": of.coefficients.as_slice(),
+            "rms_about_mean": of.about_mean,
+            "rms_residual": of.residual,
+            "rms_cross_validated": of.cross_validated,
+            "rms_cross_validated_cubic": of.cubic,
+            "cooling_less_heating": of.hysteresis,
+        });
+        (format!("{}.{}", of.sensor.name(), AXES[of.axis]), si)
+    });
+    Value::Object(axes.collect())
+}

@@ -1,0 +1,169 @@
+//! Where the uncertainty comes from: tables and stacked bars.
+
+use super::super::document::{NONE, Table, cells};
+use super::super::group::{Group, axis_name};
+use super::super::number::{self, sigma, three_digits, value};
+use super::super::plot::{Axis, Color, Panel, Plot, Series, Shape};
+use super::super::terms::title;
+use crate::calibration::{Budget, BudgetPart, ErrorTermTest, Estimate, ParameterVector};
+use crate::imu::Sensor;
+
+/// So many sources have a colour of their own; the others share one.
+const SHOWN: usize = 5;
+/// A source is named where it adds at least this part of a variance.
+const NAMED: f64 = 1e-3;
+
+/// RMS of a group's standard uncertainties by source, and together.
+pub(super) fn table(budget: &Budget, estimate: &Estimate) -> Table {
+    let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
+    let columns = std::iter::once("source".to_owned()).chain(columns);
+    let row = |name: &str, u: ParameterVector, freedom: &str| {
+        let cells = Group::all().map(|group| {
+            let spread = group.spread(&u, &group.estimated(estimate));
+            number::or_dash(spread.map(|of| of.1), three_digits)
+        });
+        let mut row = vec![name.to_owned()];
+        row.extend(cells);
+        row.push(freedom.to_owned());
+        row
+    };
+    let root = |part: &BudgetPart| part.covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    let parts = shown(budget, estimate);
+    let rows = parts.iter().map(|part| {
+        let freedom = part.degrees_of_freedom;
+        row(part.source.name(), root(part), &finite(freedom))
+    });
+    let combined = budget.covariance().diagonal().map(f64::sqrt);
+    let factors = Group::all().map(|group| {
+        let of = group.estimated(estimate).into_iter();
+        of.map(|i| budget.coverage_factor(i)).reduce(f64::max)
+    });
+    let mut coverage = vec!["coverage factor k, 95.45 %".to_owned()];
+    coverage.extend(factors.map(|k| number::or_dash(k, |k| value(k, 0.1))));
+    coverage.push(String::new());
+    Table::new("Uncertainty budget", columns.chain(["ν".to_owned()]))
+        .section(rows)
+        .section([
+            row("combined standard uncertainty", combined, ""),
+            coverage,
+        ])
+        .note(
+            "Standard uncertainty that each source adds, RMS over the parameters of a group; squares add to the \
+             variances of the estimate (JCGM 100). Sources below a thousandth of every variance are left out \
+             here; calibration.json has them all, parameter by parameter.",
+        )
+        .note(
+            "ν: degrees of freedom with which the size of a source is known, infinite where it is stated. k from \
+             Student's t with the effective degrees of freedom, the largest of the group.",
+        )
+}
+
+fn finite(freedom: f64) -> String {
+    match freedom.is_finite() {
+        true => sigma(freedom),
+        false => "∞".to_owned(),
+    }
+}
+
+/// The sources that add anything worth naming, the largest first.
+fn shown<'a>(budget: &'a Budget, estimate: &Estimate) -> Vec<&'a BudgetPart> {
+    let largest = |part: &BudgetPart| {
+        let shares = estimate.estimated().map(|i| share(part, estimate, i));
+        shares.fold(0.0, f64::max)
+    };
+    let total = |part: &BudgetPart| -> f64 {
+        let shares = estimate.estimated().map(|i| share(part, estimate, i));
+        shares.sum()
+    };
+    let parts = budget.parts.iter();
+    let mut parts: Vec<_> = parts.filter(|part| largest(part) >= NAMED).collect();
+    parts.sort_by(|a, b| total(b).total_cmp(&total(a)));
+    parts
+}
+
+fn share(part: &BudgetPart, estimate: &Estimate, index: usize) -> f64 {
+    part.covariance[(index, index)] / estimate.covariance[(index, index)]
+}
+
+/// Shares of every variance, one bar a parameter.
+pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
+    let parts = shown(budget, estimate);
+    let own = &parts[..parts.len().min(SHOWN)];
+    let form = estimate.form();
+    let panel = |sensor: Sensor| {
+        let groups = Group::all().filter(|group| group.sensor() == sensor);
+        let indices: Vec<usize> = groups.flat_map(|group| group.estimated(estimate)).collect();
+        let name = |&i: &usize| {
+            let letter = Group::of(i).short();
+            let letter = letter.rsplit(' ').next().unwrap_or_default();
+            format!("{letter} {}", axis_name(form, i))
+        };
+        let mut floor = vec![0.0; indices.len()];
+        let mut panel = Panel::new(
+            format!("{}, %", sensor.name()),
+            Axis::places(indices.iter().map(name)).room(0.5, 0.5),
+            Axis::linear("").between(0.0, 100.0),
+        );
+        let mut stack = |heights: &dyn Fn(usize) -> f64, color: Color, key: &str| {
+            let blocks = indices.iter().zip(&mut floor).enumerate();
+            let blocks = blocks.map(|(n, (&i, floor))| {
+                let low = *floor;
+                *floor += 100.0 * heights(i);
+                (n as f64, low, *floor)
+            });
+            let series = Series::new(Shape::Blocks(0.35, blocks.collect())).color(color);
+            series.key(key)
+        };
+        for (n, part) in own.iter().enumerate() {
+            let of = |i: usize| share(part, estimate, i);
+            let color = Color::Nth(n);
+            panel = panel.with(stack(&of, color, part.source.name()));
+        }
+        let others = |i: usize| {
+            let of_own: f64 = own.iter().map(|part| share(part, estimate, i)).sum();
+            (1.0 - of_own).max(0.0)
+        };
+        panel.with(stack(&others, Color::Quiet, "others"))
+    };
+    Plot::new(
+        "budget.svg",
+        "Where the uncertainty comes from",
+        (1, 240),
+        Sensor::ALL.map(panel),
+    )
+    .caption(
+        "Share of each source in the variance of every parameter. What takes most of a bar is what to improve: \
+         noise by more time at rest, the table's position by more positions, the prior by a path that shows the \
+         parameter.",
+    )
+}
+
+/// What is in no sum: error terms that are not estimated.
+pub(super) fn left_off(tests: &[ErrorTermTest], estimate: &Estimate) -> Table {
+    let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
+    let cell = |group: Group, of: &ParameterVector| {
+        let spread = group.spread(of, &group.estimated(estimate));
+        number::or_dash(spread.map(|of| of.1), sigma)
+    };
+    let row = |test: &ErrorTermTest| {
+        let left_off = test.left_off?;
+        let mut row = cells![title(test.term)];
+        row.extend(Group::all().map(|group| {
+            let [usual, shown] = [&left_off.usual, &left_off.shown].map(|of| cell(group, of));
+            match usual == NONE {
+                true => usual,
+                false => format!("{shown} ({usual})"),
+            }
+        }));
+        Some(row)
+    };
+    Table::new(
+        "Error terms that are not estimated: what they may add",
+        std::iter::once("term".to_owned()).chain(columns),
+    )
+    .section(tests.iter().filter_map(row))
+    .note(
+        "In no sum above. RMS change of the parameters of a group if the term is as large as the record allows \
+         (in brackets: as large as its usual σ). Where it matters, estimate the term with --with.",
+    )
+}

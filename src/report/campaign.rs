@@ -1,0 +1,131 @@
+//! The report of a study of campaigns.
+
+use serde_json::{Map, Value, json};
+
+use super::document::{Document, Table};
+use super::group::Group;
+use super::number::{three_digits, value};
+use crate::imu::RATE;
+use crate::study::CampaignAccuracy;
+
+/// Everything that is said of a study.
+pub fn document(accuracy: &CampaignAccuracy) -> Document {
+    let study = &accuracy.study;
+    let mut document = Document::new(format!("Accuracy of campaigns: {}", study.campaign.name));
+    document.lead.push(format!(
+        "{} simulated campaigns of {} recording(s), seed {}; {} gave no calibration. Errors are those of the \
+         parameters at the reference temperature and of the Legendre coefficients that were chosen.",
+        study.runs,
+        study.campaign.recordings.len(),
+        study.seed,
+        accuracy.failures,
+    ));
+    if let Some((anees, interval)) = accuracy.anees() {
+        let good = (interval.0..=interval.1).contains(&anees);
+        document.say(
+            good,
+            format!(
+                "NEES/n of all parameters and coefficients is {anees:.4}; with true σ it lies between {:.4} and \
+                 {:.4} in 99 % of such studies.",
+                interval.0, interval.1
+            ),
+        );
+    }
+    document.both(figures(accuracy));
+    document.both(orders(accuracy));
+    document.data = data(accuracy);
+    document
+}
+
+fn name(function: Option<usize>) -> String {
+    match function {
+        None => "at the reference".to_owned(),
+        Some(RATE) => "by rate".to_owned(),
+        Some(0) => "linear".to_owned(),
+        Some(1) => "square".to_owned(),
+        Some(2) => "cubic".to_owned(),
+        Some(function) => format!("order {}", function + 1),
+    }
+}
+
+fn figures(accuracy: &CampaignAccuracy) -> Table {
+    let row = |group: Group, function: Option<usize>| {
+        let of = accuracy.figures(group, function)?;
+        let unit = group.unit_value();
+        Some(vec![
+            format!("{}, {}", group.short(), name(function)),
+            group.unit().to_owned(),
+            of.campaigns.to_string(),
+            three_digits(of.error / unit),
+            three_digits(of.claimed / unit),
+            three_digits(of.bound / unit),
+            format!(
+                "{} ({} to {})",
+                value(of.ratio.value, 0.01),
+                value(of.ratio.interval.0, 0.01),
+                value(of.ratio.interval.1, 0.01)
+            ),
+        ])
+    };
+    let sections = Group::all().map(|group| {
+        let functions = accuracy.functions().into_iter();
+        functions
+            .filter_map(|function| row(group, function))
+            .collect::<Vec<_>>()
+    });
+    Table::new(
+        "RMS errors against σ and bound",
+        [
+            "",
+            "unit",
+            "campaigns",
+            "RMS error",
+            "RMS σ",
+            "RMS bound",
+            "error/bound (99 %)",
+        ],
+    )
+    .sections(sections)
+    .note("Bound: Cramér–Rao, linearised at the truth with the orders that were chosen.")
+}
+
+fn orders(accuracy: &CampaignAccuracy) -> Table {
+    let rows = Group::all().map(|group| {
+        let (right, all) = accuracy.right_orders(group);
+        vec![group.short(), format!("{right} of {all}")]
+    });
+    Table::new("Orders chosen as they are", ["", "campaigns"]).section(rows)
+}
+
+fn data(accuracy: &CampaignAccuracy) -> Value {
+    let mut groups = Map::new();
+    for group in Group::all() {
+        let mut of_group = Map::new();
+        for function in accuracy.functions() {
+            if let Some(of) = accuracy.figures(group, function) {
+                let unit = group.unit_value();
+                let figures = json!({
+                    "campaigns": of.campaigns,
+                    "rms_error": of.error / unit,
+                    "rms_sigma": of.claimed / unit,
+                    "rms_bound": of.bound / unit,
+                    "ratio": of.ratio.value,
+                    "ratio_interval": [of.ratio.interval.0, of.ratio.interval.1],
+                });
+                of_group.insert(name(function), figures);
+            }
+        }
+        let (right, all) = accuracy.right_orders(group);
+        of_group.insert("order_right".to_owned(), json!([right, all]));
+        groups.insert(group.key(), Value::Object(of_group));
+    }
+    let anees = accuracy.anees();
+    json!({
+        "campaign": accuracy.study.campaign.name,
+        "runs": accuracy.study.runs,
+        "failures": accuracy.failures,
+        "anees": anees.map(|(mean, _)| mean),
+        "anees_interval_99": anees.map(|(_, interval)| [interval.0, interval.1]),
+        "groups": groups,
+    })
+}

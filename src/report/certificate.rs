@@ -1,0 +1,410 @@
+//! A calibration certificate in words: a document, and what stands on every page of it.
+
+use super::document::{Document, Facts, List, Table, cells};
+use super::number::{count, or_dash, sigma, value};
+use super::pdf::{Attached, Frame, PdfError};
+use super::{document::Block, pdf};
+use crate::calibration::Group;
+use crate::certificate::{
+    AsFound, Certificate, Condition, Conformity, Contact, Decision, Measured, Quantity, dcc,
+};
+use crate::imu::{ParameterKind, Sensor};
+
+/// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
+///
+/// # Errors
+/// [`PdfError`] where a text cannot be shown.
+pub fn files(
+    certificate: &Certificate,
+    calibration: Vec<u8>,
+) -> Result<Vec<(String, Vec<u8>)>, PdfError> {
+    let xml = dcc::write(certificate).into_bytes();
+    let attached = vec![
+        Attached {
+            name: "dcc.xml".to_owned(),
+            mime: "application/xml",
+            description: "Digital Calibration Certificate, PTB DCC 3.3.0".to_owned(),
+            alternative: true,
+            bytes: xml.clone(),
+        },
+        Attached {
+            name: "calibration.json".to_owned(),
+            mime: "application/json",
+            description: "Calibration with covariance and uncertainty budget".to_owned(),
+            alternative: false,
+            bytes: calibration.clone(),
+        },
+    ];
+    let pdf = pdf::write(&document(certificate), &frame(certificate), attached)?;
+    Ok(vec![
+        ("certificate.pdf".to_owned(), pdf),
+        ("dcc.xml".to_owned(), xml),
+        ("calibration.json".to_owned(), calibration),
+    ])
+}
+
+fn frame(certificate: &Certificate) -> Frame {
+    let laboratory = &certificate.laboratory;
+    let number = &laboratory.number;
+    let day = laboratory.issued;
+    Frame {
+        left: laboratory.contact.name.clone(),
+        right: format!("Calibration certificate {number}"),
+        foot: format!("Certificate {number}, issued {day}"),
+        end: format!("End of calibration certificate {number}"),
+        author: laboratory.contact.name.clone(),
+        day: (day.year, day.month, day.day),
+    }
+}
+
+/// Everything that it says, in the order of ISO/IEC 17025, 7.8.2 and 7.8.4.
+pub fn document(certificate: &Certificate) -> Document {
+    let laboratory = &certificate.laboratory;
+    let mut document = Document::new("Calibration certificate");
+    let mut general = Facts::new("", [("certificate number", laboratory.number.clone())]);
+    general.push("laboratory", contact(&laboratory.contact));
+    general.push("customer", contact(&laboratory.customer));
+    let manufacturer = laboratory.manufacturer.iter();
+    let made = manufacturer.map(|name| format!(", {name}"));
+    let item = format!(
+        "{}{}, model {}, serial number {}",
+        laboratory.item,
+        made.collect::<String>(),
+        laboratory.model,
+        laboratory.serial
+    );
+    general.push("item", item);
+    general.push("state when received", laboratory.state.clone());
+    if let Some(day) = laboratory.received {
+        general.push("received", day.to_string());
+    }
+    let (first, last) = laboratory.performed;
+    let performed = match first == last {
+        true => first.to_string(),
+        false => format!("{first} to {last}"),
+    };
+    general.push(
+        "calibrated",
+        format!("{performed}, {}", laboratory.place.words()),
+    );
+    general.push("issued", laboratory.issued.to_string());
+    let (name, function) = &laboratory.authorised;
+    general.push("authorised by", format!("{name}, {function}"));
+    document.page(general);
+    if let Some(conformity) = &certificate.conformity {
+        document.page(Block::Text("Conformity".to_owned(), verdict(conformity)));
+    }
+    document.page(method(certificate));
+    document.page(conditions(certificate));
+    document.page(results(certificate));
+    if let Some(conformity) = &certificate.conformity {
+        document.page(limits(conformity));
+    }
+    if let Some(as_found) = &certificate.as_found {
+        document.page(found(as_found));
+    }
+    document.page(traceability(certificate));
+    document.page(remarks(certificate));
+    document
+}
+
+fn contact(contact: &Contact) -> String {
+    let city = match &contact.post_code {
+        Some(code) => format!("{code} {}", contact.city),
+        None => contact.city.clone(),
+    };
+    let mut text = format!(
+        "{}, {}, {city}, {}",
+        contact.name, contact.street, contact.country
+    );
+    for way in [&contact.email, &contact.phone].into_iter().flatten() {
+        text = format!("{text}, {way}");
+    }
+    text
+}
+
+fn method(certificate: &Certificate) -> Facts {
+    let (calibration, provenance) = (&certificate.calibration, &certificate.provenance);
+    let laboratory = &certificate.laboratory;
+    let mut facts = Facts::new("Method", [("procedure", laboratory.procedure.clone())]);
+    let deviations = laboratory.deviations.clone();
+    facts.push(
+        "deviations",
+        deviations.unwrap_or_else(|| "none".to_owned()),
+    );
+    let how = match calibration.aiding {
+        Some(crate::run::Aiding::Table) => {
+            "error-state Kalman filter with Gauss–Newton iterations, observing standstill and the attitude of the \
+             turntable"
+        }
+        Some(crate::run::Aiding::Velocity) => {
+            "error-state Kalman filter with Gauss–Newton iterations, observing standstill"
+        }
+        None => "closed form from static positions",
+    };
+    facts.push("evaluation", format!("{}: {how}", provenance.program));
+    facts.push(
+        "data",
+        format!(
+            "{} s at {} Hz, {} dwells; latitude {}°, height {} m",
+            value(provenance.duration_s, 10.0),
+            value(provenance.rate_hz, 10.0),
+            count(provenance.dwells),
+            value(provenance.latitude_deg, 0.1),
+            value(provenance.height_m, 10.0),
+        ),
+    );
+    facts.push(
+        "model",
+        "N = K C u + D; N output per second, u angular rate or specific force along the body axes, K scale factors, \
+         C installation matrix with entries E beside the diagonal, D bias",
+    );
+    facts.push("body frame", calibration.body_frame.words());
+    if let Some(gravity) = calibration.gravity {
+        let accuracy = match gravity.sigma_m_s2 > 0.0 {
+            true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
+            false => "taken as exact".to_owned(),
+        };
+        let digits = gravity.sigma_m_s2.max(1e-6);
+        facts.push(
+            "gravity",
+            format!("{} m/s², {accuracy}", value(gravity.m_s2, digits)),
+        );
+    }
+    for input in &provenance.inputs {
+        facts.push(
+            "input file",
+            format!("{}, SHA-256 {}", input.name, input.sha256),
+        );
+    }
+    facts.push(
+        "calibration.json",
+        format!("attached, SHA-256 {}", certificate.sha256),
+    );
+    facts
+}
+
+fn conditions(certificate: &Certificate) -> Facts {
+    let laboratory = &certificate.laboratory;
+    let with = |condition: Condition, unit: &str| {
+        let Condition {
+            value: of,
+            uncertainty,
+        } = condition;
+        format!(
+            "({} ± {}) {unit}, k = 2",
+            value(of, uncertainty),
+            sigma(uncertainty)
+        )
+    };
+    let mut facts = Facts::new(
+        "Conditions",
+        [("air temperature", with(laboratory.temperature, "°C"))],
+    );
+    if let Some(humidity) = laboratory.humidity {
+        facts.push("relative humidity", with(humidity, "%"));
+    }
+    facts
+}
+
+fn name(measured: &str) -> String {
+    measured
+        .replace("installation", "E")
+        .replace("scale", "K")
+        .replace("bias", "D")
+}
+
+fn results(certificate: &Certificate) -> Table {
+    let row = |of: &Measured| {
+        let (unit, size) = of.quantity.unit();
+        let expanded = of.expanded / size;
+        cells![
+            name(&of.name),
+            value(of.value / size, expanded),
+            sigma(expanded),
+            unit,
+            value(of.coverage_factor, 0.1),
+            or_dash(of.degrees_of_freedom, sigma).replace('–', "∞"),
+        ]
+    };
+    let groups = Group::all().map(|group| {
+        let of_group = certificate
+            .results
+            .iter()
+            .filter(move |of| of.quantity == Quantity(group));
+        of_group.map(row).collect::<Vec<_>>()
+    });
+    let provenance = &certificate.provenance;
+    let unit = certificate.calibration.unit.as_ref();
+    let nominal = |sensor: Sensor, input: &str| {
+        let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
+        let of = provenance
+            .nominal
+            .get(sensor)
+            .map(|scale| scale.to_string());
+        // What is no rate is told per second.
+        let per = match unit.contains('/') || unit == "g" {
+            true => "",
+            false => " per second",
+        };
+        format!("{} {unit}{per} for 1 {input}", of.join(", "))
+    };
+    Table::new("Results", ["parameter", "value", "U", "unit", "k", "ν"])
+        .sections(groups)
+        .note(format!(
+            "K: scale factors, departure from nominal: gyros {}; accelerometers {}. E: entries of the installation \
+             matrix in row and column. D: biases.",
+            nominal(Sensor::Gyro, "rad/s"),
+            nominal(Sensor::Accel, "m/s²"),
+        ))
+        .note(
+            "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
+             of 95.45 % (JCGM 100); ν: effective degrees of freedom. Results are correlated: their covariance matrix \
+             is in both attached files, their uncertainty budget in calibration.json.",
+        )
+}
+
+fn verdict(conformity: &Conformity) -> String {
+    let limits = conformity.limits.len();
+    let kept = conformity
+        .limits
+        .iter()
+        .filter(|of| of.decision == Decision::Pass)
+        .count();
+    let first = match conformity.overall() {
+        Some(Decision::Pass) => format!("Every one of {limits} limits is kept."),
+        Some(worst) => format!(
+            "{kept} of {limits} limits are kept; overall: {}.",
+            worst.words()
+        ),
+        None => "No limit concerns a parameter that was calibrated.".to_owned(),
+    };
+    let risk = conformity
+        .limits
+        .iter()
+        .map(|of| of.risk)
+        .fold(0.0, f64::max);
+    let mut text = format!(
+        "{first} Decision rule: {}. Largest probability that a decision below is wrong: {}.",
+        conformity.rule.words(),
+        probability(risk)
+    );
+    if !conformity.not_decided.is_empty() {
+        text += &format!(
+            " Not calibrated, so not decided: {}.",
+            conformity.not_decided.join(", ")
+        );
+    }
+    text
+}
+
+/// A probability, as small as matters.
+fn probability(of: f64) -> String {
+    match of < 1e-6 {
+        true => "below 0.0001 %".to_owned(),
+        false => format!("{} %", sigma(100.0 * of)),
+    }
+}
+
+fn limits(conformity: &Conformity) -> Table {
+    let rows = conformity.limits.iter().map(|of| {
+        let quantity = Quantity(Group::of(of.limit.parameter));
+        let (unit, size) = quantity.unit();
+        let base = match quantity.0.kind() {
+            ParameterKind::Scale => 1.0,
+            ParameterKind::Installation | ParameterKind::Bias => 0.0,
+        };
+        let expanded = 2.0 * of.sigma / size;
+        cells![
+            name(&of.name),
+            value((of.off + of.limit.nominal - base) / size, expanded),
+            sigma(expanded),
+            format!(
+                "{} ± {}",
+                value((of.limit.nominal - base) / size, of.limit.within / size),
+                sigma(of.limit.within / size)
+            ),
+            unit,
+            of.decision.words(),
+            probability(of.risk),
+        ]
+    });
+    let columns = [
+        "parameter",
+        "value",
+        "U (k = 2)",
+        "limits",
+        "unit",
+        "decision",
+        "wrong with",
+    ];
+    Table::new("Conformity with the specification", columns)
+        .section(rows)
+        .note(
+            "In the general installation form. Wrong with: probability that the parameter is outside a limit that it \
+             passes (false acceptance) or inside one that it fails, given this calibration (JCGM 106, 9.3).",
+        )
+}
+
+fn found(as_found: &AsFound) -> Table {
+    let rows = as_found.changes.iter().map(|change| {
+        let (unit, size) = change.quantity.unit();
+        let expanded = change.sigma.map(|sigma| 2.0 * sigma / size);
+        let digits = expanded.unwrap_or(0.01);
+        let by = (change.left - change.found) / size;
+        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / u);
+        cells![
+            name(&change.name),
+            value(change.found / size, digits),
+            value(change.left / size, digits),
+            value(by, digits),
+            or_dash(expanded, sigma),
+            unit,
+            or_dash(in_u, |x| value(x, 0.1)),
+        ]
+    });
+    let columns = [
+        "parameter",
+        "as found",
+        "as left",
+        "change",
+        "U (k = 2)",
+        "unit",
+        "change/U",
+    ];
+    Table::new("As found and as left", columns).section(rows).note(format!(
+        "As found: the parameters of {}, with which the item was received; as left: those of this calibration. A \
+         change beyond its U shows that the item has drifted since. Body frame of both: {}.",
+        as_found.earlier,
+        as_found.body_frame.words()
+    ))
+}
+
+fn traceability(certificate: &Certificate) -> Facts {
+    let laboratory = &certificate.laboratory;
+    let mut facts = Facts::new(
+        "Metrological traceability",
+        [("statement", laboratory.traceability.clone())],
+    );
+    for equipment in &laboratory.equipment {
+        facts.push(
+            &equipment.name,
+            format!(
+                "serial number {}, certificate {}",
+                equipment.serial, equipment.certificate
+            ),
+        );
+    }
+    facts
+}
+
+fn remarks(certificate: &Certificate) -> List {
+    let mut items = vec![
+        "The results relate only to the item named above, in the state and under the conditions stated.".to_owned(),
+        "This certificate may not be reproduced except in full without approval of the laboratory.".to_owned(),
+    ];
+    items.extend(certificate.laboratory.remarks.clone());
+    let warnings = certificate.calibration.warnings.iter();
+    items.extend(warnings.map(|warning| format!("From the evaluation: {warning}")));
+    List::new("Remarks", items)
+}

@@ -1,0 +1,404 @@
+//! Where the parts of a document stand on pages.
+
+use super::super::document::{Block, Document, Facts, List, Medium, Table};
+use super::font::Fonts;
+use super::{Frame, PdfError};
+
+/// A4, pt.
+pub(super) const WIDTH: f32 = 595.28;
+pub(super) const HEIGHT: f32 = 841.89;
+const MARGIN: f32 = 54.0;
+const TOP: f32 = 74.0;
+const BOTTOM: f32 = HEIGHT - 62.0;
+const TITLE: f32 = 19.0;
+const HEADING: f32 = 10.5;
+const BODY: f32 = 9.0;
+const SMALL: f32 = 7.5;
+const NOTE: u8 = 85;
+const INK: u8 = 20;
+/// Line to line over the size of letters.
+const LEADING: f32 = 1.38;
+/// Width of the names of facts.
+const NAMES: f32 = 128.0;
+/// Between columns of a table.
+const GAP: f32 = 14.0;
+
+/// What is drawn on a page.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Drawn {
+    Text {
+        at: (f32, f32),
+        text: String,
+        size: f32,
+        bold: bool,
+        grey: u8,
+    },
+    Rule {
+        from: (f32, f32),
+        to: f32,
+        width: f32,
+    },
+}
+
+/// How letters are.
+#[derive(Clone, Copy)]
+struct Style {
+    size: f32,
+    bold: bool,
+    grey: u8,
+}
+
+const PLAIN: Style = Style {
+    size: BODY,
+    bold: false,
+    grey: INK,
+};
+const STRONG: Style = Style {
+    bold: true,
+    ..PLAIN
+};
+const REMARK: Style = Style {
+    size: 8.0,
+    grey: NOTE,
+    ..PLAIN
+};
+
+/// Pages in the making.
+pub(super) struct Layout<'a> {
+    fonts: &'a Fonts,
+    frame: &'a Frame,
+    pages: Vec<Vec<Drawn>>,
+    /// Where the next line begins.
+    y: f32,
+}
+
+impl<'a> Layout<'a> {
+    pub fn new(fonts: &'a Fonts, frame: &'a Frame) -> Self {
+        Self {
+            fonts,
+            frame,
+            pages: vec![Vec::new()],
+            y: TOP,
+        }
+    }
+
+    /// All of a document's pages.
+    pub fn pages(mut self, document: &Document) -> Result<Vec<Vec<Drawn>>, PdfError> {
+        self.title(&document.title)?;
+        for text in &document.lead {
+            self.paragraph(text, PLAIN)?;
+        }
+        for (medium, block) in &document.blocks {
+            if *medium != Medium::Terminal {
+                self.block(block)?;
+            }
+        }
+        if !document.warnings.items.is_empty() {
+            self.list(&document.warnings)?;
+        }
+        self.y += 10.0;
+        self.need(2.0 * BODY);
+        let end = self.frame.end.clone();
+        let at = 0.5 * (WIDTH - self.width(&end, REMARK));
+        self.text(at, &end, REMARK)?;
+        self.frames()?;
+        Ok(self.pages)
+    }
+
+    fn title(&mut self, title: &str) -> Result<(), PdfError> {
+        let style = Style {
+            size: TITLE,
+            bold: true,
+            grey: INK,
+        };
+        self.y += TITLE;
+        self.text(MARGIN, title, style)?;
+        self.y += 0.6 * TITLE;
+        Ok(())
+    }
+
+    fn block(&mut self, block: &Block) -> Result<(), PdfError> {
+        match block {
+            Block::Facts(of) => self.facts(of),
+            Block::Table(of) => self.table(of),
+            Block::List(of) => self.list(of),
+            Block::Text(heading, text) | Block::Code(heading, text) => {
+                self.heading(heading, 3.0 * BODY)?;
+                self.paragraph(text, PLAIN)
+            }
+            Block::Plot(_) | Block::Fold(_) => Ok(()),
+        }
+    }
+
+    /// A heading, with room for so much of what follows.
+    fn heading(&mut self, heading: &str, follows: f32) -> Result<(), PdfError> {
+        if heading.is_empty() {
+            return Ok(());
+        }
+        self.y += 9.0;
+        self.need(HEADING * LEADING + follows);
+        let style = Style {
+            size: HEADING,
+            ..STRONG
+        };
+        self.y += HEADING;
+        self.text(MARGIN, heading, style)?;
+        self.y += 4.0;
+        Ok(())
+    }
+
+    fn facts(&mut self, facts: &Facts) -> Result<(), PdfError> {
+        self.heading(&facts.heading, 2.0 * BODY * LEADING)?;
+        for (name, value) in &facts.rows {
+            let room = WIDTH - 2.0 * MARGIN - NAMES;
+            let lines = self.broken(value, PLAIN, room);
+            self.need(BODY * LEADING);
+            for (n, line) in lines.iter().enumerate() {
+                self.need(BODY * LEADING);
+                self.y += BODY;
+                if n == 0 {
+                    let name_style = Style {
+                        grey: NOTE,
+                        ..PLAIN
+                    };
+                    self.text(MARGIN, name, name_style)?;
+                }
+                self.text(MARGIN + NAMES, line, PLAIN)?;
+                self.y += BODY * (LEADING - 1.0);
+            }
+        }
+        Ok(())
+    }
+
+    fn list(&mut self, list: &List) -> Result<(), PdfError> {
+        self.heading(&list.heading, 2.0 * BODY * LEADING)?;
+        for item in &list.items {
+            self.paragraph(&format!("• {item}"), PLAIN)?;
+        }
+        Ok(())
+    }
+
+    fn paragraph(&mut self, text: &str, style: Style) -> Result<(), PdfError> {
+        for line in self.broken(text, style, WIDTH - 2.0 * MARGIN) {
+            self.need(style.size * LEADING);
+            self.y += style.size;
+            self.text(MARGIN, &line, style)?;
+            self.y += style.size * (LEADING - 1.0);
+        }
+        self.y += 2.0;
+        Ok(())
+    }
+
+    fn table(&mut self, table: &Table) -> Result<(), PdfError> {
+        let rows = || table.sections.iter().flatten();
+        let size = |text: &str, style: Style| self.width(text, style);
+        let widths: Vec<f32> = (0..table.columns.len())
+            .map(|k| {
+                let cells = rows().filter_map(|row| row.get(k));
+                let widest = cells.map(|cell| size(cell, PLAIN)).fold(0.0, f32::max);
+                widest.max(size(&table.columns[k], STRONG))
+            })
+            .collect();
+        let all = widths.iter().sum::<f32>() + GAP * (widths.len().max(1) - 1) as f32;
+        let room = WIDTH - 2.0 * MARGIN;
+        // A table that is too wide is set in smaller letters.
+        let shrink = (room / all).min(1.0);
+        let style = |bold: bool| Style {
+            size: BODY * shrink,
+            ..(if bold { STRONG } else { PLAIN })
+        };
+        let leading = BODY * shrink * LEADING;
+        let rights: Vec<f32> = widths
+            .iter()
+            .scan(MARGIN - GAP * shrink, |x, width| {
+                *x += (width + GAP) * shrink;
+                Some(*x)
+            })
+            .collect();
+        let right = rights.last().copied().unwrap_or(MARGIN);
+        let rules = 2.0 * table.sections.len() as f32;
+        let whole = leading * (rows().count() + 1) as f32 + rules;
+        let first = leading * (table.sections.first().map_or(1, Vec::len).min(4) as f32 + 1.5);
+        // A table that fits on a page stands on one.
+        let together = whole + HEADING * LEADING < BOTTOM - TOP;
+        self.heading(&table.heading, if together { whole } else { first })?;
+        let mut header = true;
+        for section in &table.sections {
+            for row in section {
+                if self.y + leading > BOTTOM {
+                    self.next_page();
+                    header = true;
+                }
+                if std::mem::take(&mut header) {
+                    self.row(&table.columns, &widths, &rights, shrink, style(true))?;
+                    self.rule(right, 0.7);
+                }
+                self.row(row, &widths, &rights, shrink, style(false))?;
+            }
+            self.rule(right, 0.3);
+        }
+        self.y += 2.0;
+        for note in &table.notes {
+            self.paragraph(note, REMARK)?;
+        }
+        Ok(())
+    }
+
+    /// Cells of a row: the first to the left, the others to the right.
+    fn row(
+        &mut self,
+        cells: &[String],
+        widths: &[f32],
+        rights: &[f32],
+        shrink: f32,
+        style: Style,
+    ) -> Result<(), PdfError> {
+        self.y += style.size;
+        for (k, (cell, right)) in cells.iter().zip(rights).enumerate() {
+            let x = match k {
+                0 => right - widths[0] * shrink,
+                _ => right - self.width(cell, style),
+            };
+            self.text(x, cell, style)?;
+        }
+        self.y += style.size * (LEADING - 1.0);
+        Ok(())
+    }
+
+    fn rule(&mut self, to: f32, width: f32) {
+        let y = self.y - 0.5;
+        self.draw(Drawn::Rule {
+            from: (MARGIN, y),
+            to,
+            width,
+        });
+        self.y += 1.5;
+    }
+
+    /// What stands on every page, once their number is known.
+    fn frames(&mut self) -> Result<(), PdfError> {
+        let total = self.pages.len();
+        let style = Style {
+            size: SMALL,
+            bold: false,
+            grey: NOTE,
+        };
+        let Frame {
+            left, right, foot, ..
+        } = self.frame;
+        for page in 0..total {
+            let number = format!("Page {} of {total}", page + 1);
+            let end = |text: &str| WIDTH - MARGIN - self.width(text, style);
+            let texts = [
+                (MARGIN, 44.0, left.clone()),
+                (end(right), 44.0, right.clone()),
+                (MARGIN, HEIGHT - 36.0, foot.clone()),
+                (end(&number), HEIGHT - 36.0, number),
+            ];
+            for (x, y, text) in texts {
+                self.check(&text, style)?;
+                self.pages[page].push(Drawn::Text {
+                    at: (x, y),
+                    text,
+                    size: style.size,
+                    bold: style.bold,
+                    grey: style.grey,
+                });
+            }
+            for y in [50.0, HEIGHT - 46.0] {
+                self.pages[page].push(Drawn::Rule {
+                    from: (MARGIN, y),
+                    to: WIDTH - MARGIN,
+                    width: 0.5,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&self, text: &str, style: Style) -> Result<(), PdfError> {
+        match self.fonts.get(style.bold).lacks(text).next() {
+            Some(character) => Err(PdfError::NoGlyph {
+                character,
+                text: text.to_owned(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn text(&mut self, x: f32, text: &str, style: Style) -> Result<(), PdfError> {
+        self.check(text, style)?;
+        if !text.is_empty() {
+            let at = (x, self.y);
+            self.draw(Drawn::Text {
+                at,
+                text: text.to_owned(),
+                size: style.size,
+                bold: style.bold,
+                grey: style.grey,
+            });
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, drawn: Drawn) {
+        if let Some(page) = self.pages.last_mut() {
+            page.push(drawn);
+        }
+    }
+
+    /// Begins another page where there is less room than this.
+    fn need(&mut self, room: f32) {
+        if self.y + room > BOTTOM {
+            self.next_page();
+        }
+    }
+
+    fn next_page(&mut self) {
+        self.pages.push(Vec::new());
+        self.y = TOP;
+    }
+
+    fn width(&self, text: &str, style: Style) -> f32 {
+        self.fonts.get(style.bold).width(text, style.size)
+    }
+
+    /// A text in lines that are no wider than this; a word that is, is broken anywhere.
+    fn broken(&self, text: &str, style: Style, room: f32) -> Vec<String> {
+        let mut lines = vec![String::new()];
+        for word in text.split(' ') {
+            let mut word = word.to_owned();
+            loop {
+                let Some(line) = lines.last_mut() else { break };
+                let joined = match line.is_empty() {
+                    true => word.clone(),
+                    false => format!("{line} {word}"),
+                };
+                if self.width(&joined, style) <= room {
+                    *line = joined;
+                    break;
+                }
+                if !line.is_empty() {
+                    lines.push(String::new());
+                    continue;
+                }
+                let mut cut = word.len();
+                while self.width(&word[..cut], style) > room {
+                    let before = word[..cut].char_indices().next_back();
+                    match before {
+                        Some((at, _)) if at > 0 => cut = at,
+                        _ => break,
+                    }
+                }
+                let rest = word.split_off(cut);
+                line.push_str(&word);
+                if rest.is_empty() {
+                    break;
+                }
+                lines.push(String::new());
+                word = rest;
+            }
+        }
+        lines
+    }
+}

@@ -1,0 +1,177 @@
+//! A document as a PDF/A-3 file: facts, tables and texts on A4 pages, with files attached.
+
+mod font;
+mod layout;
+
+use krilla::Document as Pdf;
+use krilla::SerializeSettings;
+use krilla::color::rgb;
+use krilla::configure::{Archival, ConfigurationBuilder};
+use krilla::embed::{AssociationKind, EmbeddedFile, MimeType};
+use krilla::geom::{PathBuilder, Point};
+use krilla::metadata::{DateTime, Metadata};
+use krilla::page::PageSettings;
+use krilla::paint::{Fill, Stroke};
+
+use super::document::Document;
+use font::Fonts;
+use layout::{Drawn, HEIGHT, Layout, WIDTH};
+
+/// A document that could not be made a PDF.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PdfError {
+    /// A character has no glyph.
+    #[error(
+        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic: the fonts of the \
+         certificate have no other. Write it in those."
+    )]
+    NoGlyph {
+        /// The character.
+        character: char,
+        /// Where it stands.
+        text: String,
+    },
+    /// The file would not be what the standard asks for.
+    #[error("the certificate cannot be written as PDF/A-3: {reason}")]
+    Standard {
+        /// What is in the way.
+        reason: String,
+    },
+}
+
+/// A file in a PDF.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Attached {
+    /// Its name.
+    pub name: String,
+    /// Its MIME type.
+    pub mime: &'static str,
+    /// What it is.
+    pub description: String,
+    /// Whether it says what the pages say, so that programs may read it instead.
+    pub alternative: bool,
+    /// What is in it.
+    pub bytes: Vec<u8>,
+}
+
+/// What stands on every page, and what the file says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// Upper left.
+    pub left: String,
+    /// Upper right.
+    pub right: String,
+    /// At the foot, before the page's number.
+    pub foot: String,
+    /// Below the last line.
+    pub end: String,
+    /// Author in the metadata.
+    pub author: String,
+    /// Year, month and day of the metadata.
+    pub day: (u16, u8, u8),
+}
+
+/// The bytes of a PDF/A-3 file; the same for the same document.
+///
+/// # Errors
+/// [`PdfError`] where a text cannot be shown.
+pub fn write(
+    document: &Document,
+    frame: &Frame,
+    files: Vec<Attached>,
+) -> Result<Vec<u8>, PdfError> {
+    let standard = |reason: &str| PdfError::Standard {
+        reason: reason.to_owned(),
+    };
+    let fonts = Fonts::new().ok_or_else(|| standard("its fonts cannot be read"))?;
+    let pages = Layout::new(&fonts, frame).pages(document)?;
+    let configuration = ConfigurationBuilder::new()
+        .with_archival_validator(Archival::A3_U)
+        .finish()
+        .map_err(|error| standard(&format!("{error:?}")))?;
+    let mut pdf = Pdf::new_with(SerializeSettings {
+        configuration,
+        ..SerializeSettings::default()
+    });
+    let (year, month, day) = frame.day;
+    let day = DateTime::new(year)
+        .month(month)
+        .day(day)
+        .hour(0)
+        .minute(0)
+        .second(0);
+    let day = day.utc_offset_hour(0).utc_offset_minute(0);
+    for page in &pages {
+        let size = PageSettings::from_wh(WIDTH, HEIGHT).ok_or_else(|| standard("no page"))?;
+        let mut on = pdf.start_page_with(size);
+        let mut surface = on.surface();
+        for drawn in page {
+            match drawn {
+                Drawn::Text {
+                    at: (x, y),
+                    text,
+                    size,
+                    bold,
+                    grey,
+                } => {
+                    let typeface = fonts.get(*bold);
+                    let color = rgb::Color::new(*grey, *grey, *grey);
+                    surface.set_stroke(None);
+                    surface.set_fill(Some(Fill {
+                        paint: color.into(),
+                        ..Fill::default()
+                    }));
+                    let (at, glyphs) = (Point::from_xy(*x, *y), typeface.glyphs(text));
+                    surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, *size, false);
+                }
+                Drawn::Rule {
+                    from: (x, y),
+                    to,
+                    width,
+                } => {
+                    let mut path = PathBuilder::new();
+                    path.move_to(*x, *y);
+                    path.line_to(*to, *y);
+                    surface.set_fill(None);
+                    surface.set_stroke(Some(Stroke {
+                        paint: rgb::Color::new(90, 90, 90).into(),
+                        width: *width,
+                        ..Stroke::default()
+                    }));
+                    if let Some(path) = path.finish() {
+                        surface.draw_path(&path);
+                    }
+                }
+            }
+        }
+        surface.finish();
+        on.finish();
+    }
+    for file in files {
+        let embedded = EmbeddedFile {
+            path: file.name.clone(),
+            mime_type: MimeType::new(file.mime),
+            description: Some(file.description),
+            association_kind: match file.alternative {
+                true => AssociationKind::Alternative,
+                false => AssociationKind::Data,
+            },
+            data: file.bytes.into(),
+            modification_date: Some(day),
+            compress: Some(true),
+            location: None,
+        };
+        pdf.embed_file(embedded)
+            .ok_or_else(|| standard(&format!("two attached files are named {}", file.name)))?;
+    }
+    pdf.set_metadata(
+        Metadata::new()
+            .title(document.title.clone())
+            .language("en".to_owned())
+            .creator(concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned())
+            .authors(vec![frame.author.clone()])
+            .creation_date(day),
+    );
+    pdf.finish()
+        .map_err(|error| standard(&format!("{error:?}")))
+}

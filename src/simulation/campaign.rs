@@ -1,0 +1,196 @@
+//! A simulated campaign: one instrument recorded several times.
+
+use nalgebra::SVector;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::scenario::ChamberFile;
+use super::{Chamber, Draws, Scenario, Simulated};
+use crate::calibration::result::{Calibration, FORMAT_WITH_TEMPERATURE};
+use crate::calibration::{
+    Group, ParameterVector, TemperatureOptions, ThermalRecord, Together, truth_record,
+};
+use crate::imu::{ParameterKind, PerSensor, Sensor, ThermalRange, Triad};
+use crate::models::{self, ModelError, NonNegative, Place, Room};
+use crate::turntable::TableError;
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+
+/// Recordings of one instrument, to be simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SimulatedCampaign {
+    /// A short name for titles and file names.
+    pub name: String,
+    /// What all recordings have in common.
+    pub scenario: Scenario,
+    /// Name of each, and the chamber that it has for itself.
+    pub recordings: Vec<(String, Option<Chamber>)>,
+    /// 1σ by which each parameter differs from one recording to the next, normalised.
+    pub day_to_day: ParameterVector,
+}
+
+/// Streams of random numbers of one campaign: more than it may have recordings.
+const STREAMS: u64 = 1 << 10;
+
+impl SimulatedCampaign {
+    /// Whether a campaign is meant: a file that lists recordings, else an embedded one.
+    pub fn is_named(name_or_path: &str) -> bool {
+        match models::text(Room::Campaign, name_or_path, &Place::CommandLine) {
+            Ok(text) if text.place == Place::Embedded => true,
+            Ok(text) => text.text.lines().any(|line| line.trim() == "[[recording]]"),
+            Err(_) => false,
+        }
+    }
+
+    /// Finds and reads one, by embedded name or path, and what it names.
+    ///
+    /// # Errors
+    /// If one of them does not exist or is malformed.
+    pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
+        let text = models::text(Room::Campaign, name_or_path, &Place::CommandLine)?;
+        let file: CampaignFile = text.parse()?;
+        let name = match &text.place {
+            // What an embedded one names is embedded, and by its path a scenario beside a file is meant.
+            Place::File(path) => path.with_file_name(&file.scenario).display().to_string(),
+            _ => file.scenario.clone(),
+        };
+        let beside = std::path::Path::new(&name).is_file();
+        let mut scenario = Scenario::load(if beside { &name } else { &file.scenario })?;
+        scenario.seed = file.seed.unwrap_or(scenario.seed);
+        if file.recording.is_empty() || file.recording.len() as u64 > STREAMS {
+            return Err(text.inconsistent(format!("expected 1 to {STREAMS} [[recording]]")));
+        }
+        let recordings = file.recording.into_iter().map(|recording| {
+            let chamber = recording.chamber.map(ChamberFile::in_si).transpose();
+            let chamber = chamber.map_err(|message| text.inconsistent(message))?;
+            let inherited = |mut own: Chamber| {
+                if let Some(common) = &scenario.chamber {
+                    own.sensor_noise = own.sensor_noise.max(common.sensor_noise);
+                }
+                own
+            };
+            Ok((recording.name, chamber.map(inherited)))
+        });
+        Ok(Self {
+            name: text.name(),
+            recordings: recordings.collect::<Result<_, ModelError>>()?,
+            day_to_day: file.day_to_day.in_si(),
+            scenario,
+        })
+    }
+
+    /// Simulates all recordings of one instrument. The same seed and stream give the same bits; a Monte Carlo keeps
+    /// the seed and counts the stream.
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn simulate(&self, seed: u64, stream: u64) -> Result<Vec<Simulated>, TableError> {
+        let all = (0..).zip(&self.recordings);
+        all.map(|(number, (name, chamber))| {
+            let mut scenario = self.scenario.clone();
+            scenario.name.clone_from(name);
+            scenario.chamber = chamber.clone().or(scenario.chamber);
+            let of = stream.wrapping_mul(STREAMS) + number;
+            let mut rng = Draws::thermal(seed, of ^ (1 << 63));
+            let own = SVector::from_fn(|i, _| {
+                let unit: f64 = StandardNormal.sample(&mut rng);
+                unit * self.day_to_day[i]
+            });
+            scenario.simulate_recording(seed, stream, of, &own)
+        })
+        .collect()
+    }
+
+    /// The truth that simulated recordings have in common, in the file's quantity: it changes with temperature
+    /// within what they saw.
+    pub fn truth(simulated: &[Simulated]) -> Option<Calibration> {
+        let first = simulated.first()?;
+        let run = &first.run;
+        let Some(thermal) = &first.thermal else {
+            return Some(truth_record(&first.common, run));
+        };
+        let range = PerSensor::from_fn(|sensor| {
+            let all = simulated.iter();
+            let known = all.filter_map(|one| one.run.recording.imu.temperature.as_ref());
+            let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut largest_rate = 0.0f64;
+            for temperature in known {
+                let [low, high] = temperature.range(sensor);
+                (lowest, highest) = (lowest.min(low), highest.max(high));
+                largest_rate = largest_rate.max(temperature.largest_rate(sensor));
+            }
+            ThermalRange {
+                lowest,
+                highest,
+                reference: 0.5 * (lowest + highest),
+                largest_rate,
+            }
+        });
+        let at = thermal.at(&first.common, range.gyro.reference, 0.0);
+        let coefficients = thermal.coefficients(&range);
+        Some(Calibration {
+            format: FORMAT_WITH_TEMPERATURE.to_owned(),
+            temperature: Some(ThermalRecord::of_truth(&range, &coefficients, run)),
+            ..truth_record(&at, run)
+        })
+    }
+
+    /// What its recordings have in common, as an engineer would say of it.
+    pub fn together(&self) -> Together {
+        let chambers = self.recordings.iter().map(|(_, own)| own);
+        let warms = self.scenario.chamber.is_some() || chambers.flatten().next().is_some();
+        Together {
+            day_to_day: self.day_to_day,
+            temperature: warms.then(TemperatureOptions::default),
+        }
+    }
+}
+
+/// A triad changed by what is a recording's own.
+pub(super) fn changed(triads: PerSensor<Triad>, own: &ParameterVector) -> PerSensor<Triad> {
+    let all = crate::calibration::to_vector(&triads) + own;
+    crate::calibration::from_vector(triads.gyro.form, &all)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CampaignFile {
+    scenario: String,
+    seed: Option<u64>,
+    #[serde(default)]
+    day_to_day: DayToDayFile,
+    recording: Vec<RecordingFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecordingFile {
+    name: String,
+    chamber: Option<ChamberFile>,
+}
+
+#[derive(Deserialize, Default, Clone, Copy)]
+#[serde(deny_unknown_fields, default)]
+struct DayToDayFile {
+    gyro_scale_ppm: NonNegative,
+    gyro_installation_arcsec: NonNegative,
+    gyro_bias_deg_per_h: NonNegative,
+    accel_scale_ppm: NonNegative,
+    accel_installation_arcsec: NonNegative,
+    accel_bias_ug: NonNegative,
+}
+
+impl DayToDayFile {
+    fn in_si(self) -> ParameterVector {
+        let of = |group: Group| match (group.sensor(), group.kind()) {
+            (Sensor::Gyro, ParameterKind::Scale) => self.gyro_scale_ppm.0 * PPM,
+            (Sensor::Gyro, ParameterKind::Installation) => self.gyro_installation_arcsec.0 * ARCSEC,
+            (Sensor::Gyro, ParameterKind::Bias) => self.gyro_bias_deg_per_h.0 * DEG_PER_H,
+            (Sensor::Accel, ParameterKind::Scale) => self.accel_scale_ppm.0 * PPM,
+            (Sensor::Accel, ParameterKind::Installation) => {
+                self.accel_installation_arcsec.0 * ARCSEC
+            }
+            (Sensor::Accel, ParameterKind::Bias) => self.accel_bias_ug.0 * MICRO_G,
+        };
+        ParameterVector::from_fn(|i, _| of(Group::of(i)))
+    }
+}

@@ -1,0 +1,333 @@
+//! How accurate the calibration of a campaign is, and whether its σ are true, over many simulated campaigns:
+//! parameters at the reference temperature, their coefficients, and the orders that are chosen.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::accuracy::StudyError;
+use super::ratio::Ratio;
+use crate::calibration::{
+    CalibrationError, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate,
+    mean_square_interval, thermal_bound, to_vector,
+};
+use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients, Triad};
+use crate::run::Run;
+use crate::simulation::{Simulated, SimulatedCampaign, ThermalTruth};
+
+/// What is studied.
+#[derive(Debug, Clone)]
+pub struct CampaignStudy {
+    /// What is simulated.
+    pub campaign: SimulatedCampaign,
+    /// The filter's installation form; σ are those of the general form where it is another.
+    pub form: InstallationForm,
+    /// Which noise the filter uses.
+    pub noise: NoisePolicy,
+    /// Number of campaigns.
+    pub runs: u64,
+    /// Seed; each campaign has its own streams of it.
+    pub seed: u64,
+    /// Whether biases may follow the rate of temperature.
+    pub rate: bool,
+}
+
+/// The result.
+#[derive(Debug, Clone)]
+pub struct CampaignAccuracy {
+    /// What was studied.
+    pub study: CampaignStudy,
+    /// Every campaign that gave a calibration, in order.
+    pub trials: Vec<CampaignTrial>,
+    /// How many gave none.
+    pub failures: usize,
+}
+
+/// One campaign.
+#[derive(Debug, Clone)]
+pub struct CampaignTrial {
+    /// Squared error by the covariance, correlations included, of all parameters and coefficients, and their number.
+    pub nees: (f64, usize),
+    /// What each error is of: a parameter at the reference, or a coefficient of it.
+    pub errors: Vec<ErrorOf>,
+    /// Order that was chosen and true order of each group, and whether its rate was, and is there.
+    pub orders: [OrderChosen; 6],
+}
+
+/// An error of one campaign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorOf {
+    /// The parameter's group.
+    pub group: Group,
+    /// Index among the functions of temperature; none: the parameter at the reference.
+    pub function: Option<usize>,
+    /// Squared error, σ² claimed and bound, normalised.
+    pub squares: [f64; 3],
+}
+
+/// Order of a group, chosen and true.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OrderChosen {
+    /// Chosen order, and whether the rate is on.
+    pub chosen: (usize, bool),
+    /// True ones.
+    pub truth: (usize, bool),
+}
+
+impl CampaignStudy {
+    /// Makes all campaigns, on all cores; `done` is told of each.
+    ///
+    /// # Errors
+    /// [`StudyError`] if they cannot be simulated, or not even the bound can be had.
+    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<CampaignAccuracy, StudyError> {
+        let streams: Vec<u64> = (0..self.runs).collect();
+        let all = streams.into_par_iter().with_max_len(1).map(|stream| {
+            let trial = self.trial(stream);
+            done();
+            trial
+        });
+        let all: Vec<Option<CampaignTrial>> = all.collect::<Result<_, StudyError>>()?;
+        Ok(CampaignAccuracy {
+            study: self.clone(),
+            failures: all.iter().filter(|trial| trial.is_none()).count(),
+            trials: all.into_iter().flatten().collect(),
+        })
+    }
+
+    fn trial(&self, stream: u64) -> Result<Option<CampaignTrial>, StudyError> {
+        let simulated = self.campaign.simulate(self.seed, stream)?;
+        let runs: Vec<&Run> = simulated.iter().map(|one| &one.run).collect();
+        let options = Options::default().noise(self.noise).installation(self.form);
+        let mut together = self.campaign.together();
+        if let Some(temperature) = &mut together.temperature {
+            temperature.rate = self.rate;
+        }
+        let at_bound = |source: CalibrationError| StudyError::Bound {
+            run: stream,
+            source,
+        };
+        let problem = Problem::together(&runs, &options, &together).map_err(at_bound)?;
+        let Ok(outcome) = estimate(&problem, &|_| {}) else {
+            return Ok(None);
+        };
+        if !outcome.converged {
+            return Ok(None);
+        }
+        let bound = self
+            .bound(&problem, &outcome, &simulated)
+            .map_err(at_bound)?;
+        Ok(compare(&outcome, &simulated, &bound))
+    }
+
+    /// Covariance of parameters and of the coefficients that the outcome has, at the truth.
+    fn bound(
+        &self,
+        problem: &Problem,
+        outcome: &Outcome,
+        simulated: &[Simulated],
+    ) -> Result<DVector<f64>, CalibrationError> {
+        let mut model = problem.model.clone();
+        model.thermal = outcome.model.thermal.clone();
+        let problem = problem.with_model(model);
+        let truth = truth(outcome, simulated);
+        let coefficients = truth_coefficients(outcome, simulated);
+        thermal_bound(&problem, &truth, &coefficients)
+    }
+}
+
+/// The true triads at the reference temperature of an outcome, as the mean of all recordings has them.
+fn truth(outcome: &Outcome, simulated: &[Simulated]) -> PerSensor<Triad> {
+    let form = outcome.estimate.form();
+    let base = simulated
+        .first()
+        .map(|one| (one.common, one.thermal.as_ref()));
+    let (common, thermal) = base.unwrap_or((outcome.estimate.triads, None));
+    let at = match (thermal, &outcome.thermal) {
+        (Some(truth), Some(of)) => {
+            let reference = |sensor| of.model.range.get(sensor).reference;
+            PerSensor::from_fn(|sensor| *truth.at(&common, reference(sensor), 0.0).get(sensor))
+        }
+        (Some(truth), None) => {
+            let mean = mean_temperature(simulated);
+            truth.at(&common, mean, 0.0)
+        }
+        _ => common,
+    };
+    PerSensor::from_fn(|sensor| at.get(sensor).in_form(form))
+}
+
+fn mean_temperature(simulated: &[Simulated]) -> f64 {
+    let all = simulated.iter().filter_map(|one| {
+        let imu = &one.run.recording.imu;
+        let middle = 0.5 * (imu.start() + imu.end());
+        Some(imu.temperature.as_ref()?.at(middle).gyro[0])
+    });
+    let all: Vec<f64> = all.collect();
+    all.iter().sum::<f64>() / all.len().max(1) as f64
+}
+
+fn truth_coefficients(
+    outcome: &Outcome,
+    simulated: &[Simulated],
+) -> PerSensor<ThermalCoefficients> {
+    let truth: Option<&ThermalTruth> = simulated.first().and_then(|one| one.thermal.as_ref());
+    let all = truth.zip(outcome.thermal.as_ref());
+    all.map(|(truth, of)| truth.coefficients(&of.model.range))
+        .unwrap_or_default()
+}
+
+fn compare(
+    outcome: &Outcome,
+    simulated: &[Simulated],
+    bound: &DVector<f64>,
+) -> Option<CampaignTrial> {
+    let form = outcome.estimate.form();
+    let estimated: Vec<usize> = outcome.estimate.estimated().collect();
+    let empty = DMatrix::zeros(PARAMETERS, 0);
+    let thermal = outcome.thermal.as_ref();
+    let coefficients = thermal
+        .map(|t| t.coefficients.as_slice())
+        .unwrap_or_default();
+    let cross = thermal.map_or(&empty, |t| &t.cross);
+    let (m, n) = (estimated.len(), coefficients.len());
+    let off = to_vector(&truth(outcome, simulated)) - outcome.estimate.vector();
+    let true_coefficients = truth_coefficients(outcome, simulated);
+    let error = DVector::from_fn(m + n, |k, _| match k.checked_sub(m) {
+        None => off[estimated[k]],
+        Some(k) => {
+            let c = coefficients[k];
+            let value = thermal.map_or(0.0, |t| t.values[k]);
+            true_coefficients.get(c.sensor)[(c.parameter, c.function)] - value
+        }
+    });
+    let covariance = DMatrix::from_fn(m + n, m + n, |i, j| {
+        match (i.checked_sub(m), j.checked_sub(m)) {
+            (None, None) => outcome.estimate.covariance[(estimated[i], estimated[j])],
+            (None, Some(k)) => cross[(estimated[i], k)],
+            (Some(k), None) => cross[(estimated[j], k)],
+            (Some(k), Some(l)) => thermal.map_or(0.0, |t| t.covariance[(k, l)]),
+        }
+    });
+    let sigma = covariance.diagonal().map(f64::sqrt);
+    let correlation = DMatrix::from_fn(m + n, m + n, |i, j| {
+        covariance[(i, j)] / (sigma[i] * sigma[j])
+    });
+    let whitened = error.component_div(&sigma);
+    let nees = whitened.dot(&correlation.cholesky()?.solve(&whitened));
+    let errors = (0..m + n).map(|k| {
+        let (index, function) = match k.checked_sub(m) {
+            None => (estimated[k], None),
+            Some(k) => (coefficients[k].index(), Some(coefficients[k].function)),
+        };
+        let bound = match k.checked_sub(m) {
+            None => bound.get(index),
+            Some(k) => bound.get(PARAMETERS + k),
+        };
+        ErrorOf {
+            group: Group::of(index),
+            function,
+            squares: [
+                error[k].powi(2),
+                covariance[(k, k)],
+                bound.copied().unwrap_or(f64::NAN),
+            ],
+        }
+    });
+    let groups: Vec<Group> = Group::all().collect();
+    let orders = std::array::from_fn(|g| {
+        let first = groups[g].parameters(form).first().copied().unwrap_or(0);
+        OrderChosen {
+            chosen: thermal.map_or((0, false), |t| t.order(first)),
+            truth: simulated
+                .first()
+                .and_then(|one| one.thermal.as_ref())
+                .map_or((0, false), |t| true_order(t, groups[g])),
+        }
+    });
+    Some(CampaignTrial {
+        nees: (nees, m + n),
+        errors: errors.collect(),
+        orders,
+    })
+}
+
+/// Order of a group's true polynomials, and whether its biases follow the rate.
+fn true_order(truth: &ThermalTruth, group: Group) -> (usize, bool) {
+    let by = truth.by.get(group.sensor());
+    let first = match group.kind() {
+        ParameterKind::Scale => 0,
+        ParameterKind::Installation => 3,
+        ParameterKind::Bias => Triad::ideal(InstallationForm::General).to_vector().len() - 3,
+    };
+    let there = |k: usize| by[k][first] != 0.0;
+    let order = if there(1) { 2 } else { usize::from(there(0)) };
+    (order, there(2))
+}
+
+impl CampaignAccuracy {
+    /// NEES/n over all campaigns with its 99 % interval; none without campaigns.
+    pub fn anees(&self) -> Option<(f64, (f64, f64))> {
+        let (sum, count) = self.trials.iter().fold((0.0, 0), |(sum, count), trial| {
+            (sum + trial.nees.0, count + trial.nees.1)
+        });
+        (count > 0).then(|| (sum / count as f64, mean_square_interval(count, 0.01)))
+    }
+
+    /// RMS error, RMS σ claimed, RMS bound and the ratio of error to bound, of the parameters of a group at the
+    /// reference or of their coefficients of one function.
+    pub fn figures(&self, group: Group, function: Option<usize>) -> Option<CampaignFigures> {
+        let of = |trial: &CampaignTrial| {
+            let of_group = |e: &&ErrorOf| e.group == group && e.function == function;
+            let errors: Vec<&ErrorOf> = trial.errors.iter().filter(of_group).collect();
+            let mean =
+                |k: usize| errors.iter().map(|e| e.squares[k]).sum::<f64>() / errors.len() as f64;
+            (!errors.is_empty()).then(|| [mean(0), mean(1), mean(2)])
+        };
+        let all: Vec<[f64; 3]> = self.trials.iter().filter_map(of).collect();
+        let column = |k: usize| all.iter().map(|s| s[k]).collect::<Vec<f64>>();
+        let rms = |k: usize| (column(k).iter().sum::<f64>() / all.len() as f64).sqrt();
+        let ratio = Ratio::of(&column(0), &column(2))?;
+        Some(CampaignFigures {
+            campaigns: all.len(),
+            error: rms(0),
+            claimed: rms(1),
+            bound: rms(2),
+            ratio,
+        })
+    }
+
+    /// In how many campaigns the order of a group was chosen as it is, and of how many.
+    pub fn right_orders(&self, group: Group) -> (usize, usize) {
+        let place = Group::all().position(|g| g == group).unwrap_or(0);
+        let right = |trial: &&CampaignTrial| {
+            let OrderChosen { chosen, truth } = trial.orders[place];
+            chosen == truth
+        };
+        (self.trials.iter().filter(right).count(), self.trials.len())
+    }
+}
+
+/// Figures of one kind of error over all campaigns, normalised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CampaignFigures {
+    /// Campaigns that have it.
+    pub campaigns: usize,
+    /// RMS error.
+    pub error: f64,
+    /// RMS of the σ that is claimed.
+    pub claimed: f64,
+    /// RMS of the Cramér–Rao bound.
+    pub bound: f64,
+    /// Error over bound.
+    pub ratio: Ratio,
+}
+
+impl CampaignAccuracy {
+    /// The functions of temperature that any campaign has, after none for parameters at the reference.
+    pub fn functions(&self) -> Vec<Option<usize>> {
+        let all = self.trials.iter().flat_map(|trial| &trial.errors);
+        let mut functions: Vec<Option<usize>> = all.map(|error| error.function).collect();
+        functions.sort();
+        functions.dedup();
+        functions
+    }
+}

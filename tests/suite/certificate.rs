@@ -1,0 +1,82 @@
+//! `turncal certificate`: files as other programs read them.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::shared::{shared, skipped};
+
+/// Embedded files come out as they went in; the metadata names PDF/A-3; and where TURNCAL_DCC_SCHEMA names the
+/// schema of the Digital Calibration Certificate 3.3.0, with those that it imports beside it, the XML is valid.
+const SCRIPT: &str = "
+import os, sys
+import pikepdf
+from lxml import etree
+directory = sys.argv[1]
+pdf = pikepdf.open(os.path.join(directory, 'certificate.pdf'))
+assert len(pdf.pages) in (2, 3, 4), len(pdf.pages)
+metadata = pdf.open_metadata()
+assert (metadata['pdfaid:part'], metadata['pdfaid:conformance']) == ('3', 'U'), metadata.pdfa_status
+assert sorted(pdf.attachments) == ['calibration.json', 'dcc.xml'], list(pdf.attachments)
+for name, attached in pdf.attachments.items():
+    inside = attached.get_file().read_bytes()
+    assert inside == open(os.path.join(directory, name), 'rb').read(), name
+    assert str(attached.obj['/AFRelationship']) in ('/Data', '/Alternative')
+assert len(pdf.Root.AF) == 2 and str(pdf.Root.OutputIntents[0].S) == '/GTS_PDFA1'
+tree = etree.parse(os.path.join(directory, 'dcc.xml'))
+assert tree.getroot().get('schemaVersion') == '3.3.0'
+schema = os.environ.get('TURNCAL_DCC_SCHEMA')
+if schema:
+    etree.XMLSchema(etree.parse(schema)).assertValid(tree)
+else:
+    print('no TURNCAL_DCC_SCHEMA')
+";
+
+#[test]
+fn a_certificate_is_a_pdf_a_3_with_its_files_in_it_and_valid_xml() {
+    let Some(shared) = shared("three-axis-counts") else {
+        return;
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let [result, paper] = ["result", "paper"].map(|name| directory.path().join(name));
+    let turncal = |arguments: &[&Path]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_turncal"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{done:?}");
+    };
+    let output = Path::new("-o");
+    turncal(&[
+        Path::new("calibrate"),
+        &shared.join("run.toml"),
+        output,
+        &result,
+    ]);
+    let lab = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
+    turncal(&[
+        Path::new("certificate"),
+        &result.join("calibration.json"),
+        Path::new("--laboratory"),
+        &lab,
+        output,
+        &paper,
+    ]);
+    let python = std::env::var("TURNCAL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let Ok(ran) = Command::new(python)
+        .args(["-c", SCRIPT])
+        .arg(&paper)
+        .output()
+    else {
+        skipped("no Python");
+        return;
+    };
+    let error = String::from_utf8_lossy(&ran.stderr);
+    if error.contains("ModuleNotFoundError") {
+        skipped("Python without pikepdf or lxml");
+        return;
+    }
+    assert!(ran.status.success(), "{error}");
+    if String::from_utf8_lossy(&ran.stdout).contains("no TURNCAL_DCC_SCHEMA") {
+        skipped("XML against its schema: no TURNCAL_DCC_SCHEMA");
+    }
+}

@@ -1,0 +1,424 @@
+//! Calibrations as other programs hold them, evaluated by the equations of those programs.
+
+use std::fs;
+use std::process::Command;
+
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use turncal::calibration::result::{Calibration, TermRecord, TestVector};
+use turncal::formats::export::{Exported, Format, write};
+
+use crate::door::made::made_run;
+use crate::export::{comment, divisors, halves, numbers, output, record, yaml};
+use crate::shared::skipped;
+
+fn exported(format: Format) -> Exported {
+    write(&record(), format, None).unwrap()
+}
+
+/// Right, front, up as front, right, down, and back.
+fn turned(v: Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(v.y, v.x, -v.z)
+}
+
+/// What the file says is left of a triad: parts of the input, and a constant.
+fn left(text: &str, name: &str) -> (Matrix3<f64>, Vector3<f64>) {
+    let row = |axis| -> [f64; 4] {
+        let mark = format!("left, {name} {axis}:");
+        let line = text.lines().find(|line| line.contains(&mark)).unwrap();
+        let lists = line.split('[').skip(1).filter_map(|l| l.split(']').next());
+        lists
+            .flat_map(numbers)
+            .collect::<Vec<_>>()
+            .try_into()
+            .unwrap()
+    };
+    let rows = ["x", "y", "z"].map(row);
+    let errors = Matrix3::from_fn(|i, j| rows[i][j]);
+    (errors, Vector3::from(rows.map(|row| row[3])))
+}
+
+/// What the program makes of each test vector is off by what the file says, to 1e-9 of it and of the input.
+fn off_by_what_is_left(
+    text: &str,
+    axes: impl Fn(Vector3<f64>) -> Vector3<f64>,
+    evaluate: impl Fn([Vector3<f64>; 2]) -> [Vector3<f64>; 2],
+) {
+    for TestVector { raw, calibrated } in &record().test_vectors {
+        let measured = halves(raw).map(&axes);
+        let found = evaluate(measured);
+        for ((found, u), name) in found
+            .into_iter()
+            .zip(halves(calibrated))
+            .zip(["gyro", "accel"])
+        {
+            let u = axes(u);
+            let (errors, constant) = left(text, name);
+            let expected = u + errors * u + constant;
+            assert!(
+                (found - expected).norm() <= 1e-9 * (1.0 + u.norm()),
+                "{name}: {found} {expected}"
+            );
+        }
+    }
+}
+
+fn autopilot(
+    format: Format,
+    [gyro, accel]: [&str; 2],
+    words: [&str; 2],
+    separator: char,
+    name_at: usize,
+) {
+    let Exported { text, notes, .. } = exported(format);
+    let value = |name: String| -> f64 {
+        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+        let line = lines
+            .find(|line| line.split(separator).nth(name_at) == Some(&name))
+            .unwrap();
+        let value: f32 = line
+            .split(separator)
+            .nth(name_at + 1)
+            .unwrap()
+            .parse()
+            .unwrap();
+        f64::from(value)
+    };
+    let triple = |pattern: &str, what: &str| {
+        let named = |axis| pattern.replace('#', axis).replace('@', what);
+        Vector3::from(["X", "Y", "Z"].map(|axis| value(named(axis))))
+    };
+    let offset = [triple(gyro, words[0]), triple(accel, words[0])];
+    let scale = triple(accel, words[1]);
+    // The divisors are magnitudes in the file's order.
+    let divisors = divisors(&text);
+    off_by_what_is_left(&text, turned, |n| {
+        let n = [0, 1].map(|k| n[k].component_div(&divisors[k]));
+        [n[0] - offset[0], (n[1] - offset[1]).component_mul(&scale)]
+    });
+    // Biases and scales of accelerometers as well as 32 bits hold them.
+    let (errors, constant) = left(&text, "accel");
+    assert!(errors.diagonal().amax() < 1e-7 && constant.amax() < 1e-6);
+    assert!(
+        notes
+            .iter()
+            .any(|note| note.contains("ppm of scale") && note.contains("deg/s at 100 deg/s"))
+    );
+}
+
+#[test]
+fn px4_gives_the_test_vectors_but_for_what_its_file_states() {
+    autopilot(
+        Format::Px4,
+        ["CAL_GYRO0_#@", "CAL_ACC0_#@"],
+        ["OFF", "SCALE"],
+        '\t',
+        2,
+    );
+}
+
+#[test]
+fn ardupilot_gives_the_test_vectors_but_for_what_its_file_states() {
+    autopilot(
+        Format::ArduPilot,
+        ["INS_GYR@_#", "INS_ACC@_#"],
+        ["OFFS", "SCAL"],
+        ',',
+        0,
+    );
+}
+
+/// OpenVINS' correction, by the triangle that its model reads.
+fn open_vins(text: &str, is_lower: bool, n: [Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
+    assert!(text.starts_with("%YAML:1.0\n"));
+    let file = yaml(text.strip_prefix("%YAML:1.0").unwrap());
+    let matrix = |key: &str| Matrix3::from_row_slice(&file[&format!("imu0.{key}")]);
+    let triangle = |key: &str| {
+        let mut inverse = matrix(key).try_inverse().unwrap();
+        match is_lower {
+            true => inverse.fill_upper_triangle(0.0, 1),
+            false => inverse.fill_lower_triangle(0.0, 1),
+        }
+        inverse
+    };
+    let bias = |name: &str| Vector3::from_vec(comment(text, &format!("bias of {name}")));
+    let force = matrix("R_IMUtoACC").transpose() * triangle("Ta") * (n[1] - bias("accelerometers"));
+    let rate = n[0] - matrix("Tg") * force - bias("gyroscopes");
+    [
+        matrix("R_IMUtoGYRO").transpose() * triangle("Tw") * rate,
+        force,
+    ]
+}
+
+#[test]
+fn open_vins_gives_the_test_vectors_in_both_models_and_takes_g_sensitivity_out() {
+    let mut record = record();
+    for (name, value) in [("xy", 3e-7), ("zz", -2e-7)] {
+        let term = TermRecord {
+            value,
+            sigma: Some(1e-9),
+        };
+        record
+            .terms
+            .insert(format!("gyro.g_sensitivity.{name}"), term);
+    }
+    for (format, is_lower) in [
+        (Format::OpenVinsKalibr, true),
+        (Format::OpenVinsRpng, false),
+    ] {
+        let text = write(&record, format, None).unwrap().text;
+        let divisors = divisors(&text);
+        for vector in &record.test_vectors {
+            let [rate, force] = halves(&vector.calibrated);
+            let sensed = rate + Vector3::new(3e-7 * force.y, 0.0, -2e-7 * force.z);
+            let raw = [output(&record.gyro, sensed), output(&record.accel, force)];
+            let found = open_vins(
+                &text,
+                is_lower,
+                [0, 1].map(|k| raw[k].component_div(&divisors[k])),
+            );
+            for (found, expected) in found.iter().zip([rate, force]) {
+                assert!(
+                    (found - expected).norm() <= 1e-12 * (1.0 + expected.norm()),
+                    "{found} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn ikalibr_measures_the_raw_output_of_the_test_vectors_along_its_own_axes() {
+    let text = exported(Format::IKalibr).text;
+    let file = yaml(&text);
+    let value = |key: String| file[&format!("Intrinsics.{key}")][0];
+    let bias = |triad: &str| Vector3::from_fn(|k, _| value(format!("{triad}.BIAS.r{k}c0")));
+    let map = |triad: &str| {
+        let [a, b, c, d, e, f] =
+            [0, 1, 2, 3, 4, 5].map(|k| value(format!("{triad}.MAP_COEFF.r{k}c0")));
+        Matrix3::new(a, d, e, 0.0, b, f, 0.0, 0.0, c)
+    };
+    let q = ["qw", "qx", "qy", "qz"].map(|name| value(format!("SO3_AtoG.{name}")));
+    let turn = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]));
+    let own: Vec<f64> = ["x", "y", "z"]
+        .iter()
+        .flat_map(|axis| comment(&text, &format!("its {axis} axis")))
+        .collect();
+    let own = Matrix3::from_row_slice(&own);
+    let divisors = divisors(&text);
+    for vector in &record().test_vectors {
+        let [rate, force] = halves(&vector.calibrated);
+        let measured = [
+            map("GYRO") * (turn * (own * rate)) + bias("GYRO"),
+            map("ACCE") * (own * force) + bias("ACCE"),
+        ];
+        for (k, raw) in halves(&vector.raw).iter().enumerate() {
+            let raw = raw.component_div(&divisors[k]);
+            assert!((measured[k] - raw).norm() <= 1e-12 * (1.0 + raw.norm()));
+        }
+    }
+}
+
+#[test]
+fn imu_calib_gives_the_specific_force_of_the_test_vectors() {
+    let text = exported(Format::ImuCalib).text;
+    let file = yaml(&text);
+    let matrix = Matrix3::from_row_slice(&file["SM"]);
+    let bias = Vector3::from_column_slice(&file["bias"]);
+    let divisors = divisors(&text);
+    for vector in &record().test_vectors {
+        let [_, raw] = halves(&vector.raw);
+        let found = matrix * raw.component_div(&divisors[1]) - bias;
+        let [_, force] = halves(&vector.calibrated);
+        assert!((found - force).norm() <= 1e-12 * (1.0 + force.norm()));
+    }
+    // The gyros' mean at rest is their bias here.
+    let (errors, constant) = left(&text, "gyro");
+    let gyro = record().gyro;
+    for vector in &record().test_vectors {
+        let [raw, _] = halves(&vector.raw);
+        let n = (raw - Vector3::from(gyro.bias)).component_div(&divisors[0]);
+        let [u, _] = halves(&vector.calibrated);
+        assert!((n - (u + errors * u + constant)).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn gazebo_makes_the_raw_output_but_for_what_its_file_states() {
+    let record = record();
+    let text = write(&record, Format::Gazebo, None).unwrap().text;
+    assert!(
+        text.starts_with("<!--\n") && text.contains("\n-->\n<imu>\n") && text.ends_with("</imu>\n")
+    );
+    let (remarks, body) = text.split_once("-->").unwrap();
+    assert!(!remarks[4..].contains("--"));
+    let all = |key: &str| -> Vec<f64> {
+        let mark = format!("<{key}>");
+        let parts = body.split(&mark).skip(1);
+        parts
+            .map(|part| part.split('<').next().unwrap().parse().unwrap())
+            .collect()
+    };
+    let (bias, sigma) = (all("bias_mean"), all("bias_stddev"));
+    let (bias, sigma): ([f64; 6], [f64; 6]) = (bias.try_into().unwrap(), sigma.try_into().unwrap());
+    let line = text
+        .lines()
+        .find(|line| line.contains("divide the raw"))
+        .unwrap();
+    let lists = line.split('[').skip(1).filter_map(|l| l.split(']').next());
+    let divisors: [f64; 6] = lists
+        .flat_map(numbers)
+        .collect::<Vec<_>>()
+        .try_into()
+        .unwrap();
+    let divisors = halves(&divisors);
+    for vector in &record.test_vectors {
+        for (k, (raw, u)) in halves(&vector.raw)
+            .into_iter()
+            .zip(halves(&vector.calibrated))
+            .enumerate()
+        {
+            let (errors, constant) = left(&text, ["gyro", "accel"][k]);
+            let made = u + halves(&bias)[k];
+            let sensed = raw.component_div(&divisors[k]);
+            assert!((sensed - (made + errors * u + constant)).norm() < 1e-12 * (1.0 + u.norm()));
+        }
+    }
+    let of_record = Vector3::from(record.sigma.as_ref().unwrap().gyro.bias);
+    assert!((halves(&sigma)[0] - of_record.component_div(&divisors[0])).norm() < 1e-15);
+}
+
+#[test]
+fn noise_goes_out_as_a_variance_a_sample_and_as_gazebos_deviations() {
+    let run = made_run("made");
+    let record = Calibration {
+        unit: Some(run.instrument.unit.clone()),
+        gyro: turncal::calibration::result::TriadRecord {
+            scale: [1.0; 3],
+            installation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            bias: [0.0; 3],
+        },
+        accel: turncal::calibration::result::TriadRecord {
+            scale: [1.0; 3],
+            installation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            bias: [0.0; 3],
+        },
+        ..record()
+    };
+    let text = write(&record, Format::RosCovariance, Some(&run))
+        .unwrap()
+        .text;
+    let file = yaml(&text);
+    let (gyro, accel) = (run.instrument.noise.gyro, run.instrument.noise.accel);
+    for (key, density) in [
+        ("angular_velocity_covariance", gyro.random_walk),
+        ("linear_acceleration_covariance", accel.random_walk),
+    ] {
+        // A density of 1 unit/√Hz sampled at 128 Hz has a standard deviation of √128.
+        let variance = (density * 128f64.sqrt()).powi(2);
+        let expected: Vec<f64> = (0..9)
+            .map(|k| if k % 4 == 0 { variance } else { 0.0 })
+            .collect();
+        let off = file[key].iter().zip(&expected).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-12 * variance, "{key}");
+    }
+    let text = write(&record, Format::Gazebo, Some(&run)).unwrap().text;
+    let first = |key: &str| -> f64 {
+        let (_, rest) = text.split_once(&format!("<{key}>")).unwrap();
+        rest.split('<').next().unwrap().parse().unwrap()
+    };
+    assert!((first("stddev") / (gyro.random_walk * 128f64.sqrt()) - 1.0).abs() < 1e-12);
+    // Gazebo's recursion b' = e^(−dt/τ) b + w, w of σ² τ/2 (1 − e^(−2dt/τ)), settles at σ √(τ/2).
+    let (sigma, tau) = (
+        first("dynamic_bias_stddev"),
+        first("dynamic_bias_correlation_time"),
+    );
+    let decay = (-1.0 / (128.0 * tau)).exp();
+    let step = sigma * sigma * tau / 2.0 * (1.0 - decay * decay);
+    let settled = (step / (1.0 - decay * decay)).sqrt();
+    let bias = gyro.gauss_markov.unwrap();
+    assert!(
+        (settled / bias.sigma - 1.0).abs() < 1e-9
+            && (tau / bias.correlation_time - 1.0).abs() < 1e-12
+    );
+}
+
+#[test]
+fn betaflight_takes_whole_counts_off_and_leaves_what_its_file_states() {
+    let Exported { text, .. } = exported(Format::Betaflight);
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("set acc_calibration = "))
+        .unwrap();
+    let counts: Vec<i64> = line["set acc_calibration = ".len()..]
+        .split(',')
+        .map(|c| c.parse().unwrap())
+        .collect();
+    assert_eq!(counts[3], 1);
+    let per_g = 2048.0 / 9.80665;
+    let divisors = divisors(&text);
+    off_by_what_is_left(
+        &text,
+        |v| v,
+        |n| {
+            let n = [0, 1].map(|k| n[k].component_div(&divisors[k]));
+            let counted =
+                n[1] * per_g - Vector3::new(counts[0], counts[1], counts[2]).map(|c| c as f64);
+            [n[0], counted / per_g]
+        },
+    );
+    // Half a count, but for the matrix, which is near one.
+    assert!(left(&text, "accel").1.amax() <= 0.51 / per_g);
+}
+
+#[test]
+fn a_matlab_structure_gives_the_test_vectors_in_scipy() {
+    let Exported { binary, .. } = exported(Format::Mat);
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("calibration.mat");
+    fs::write(&path, binary.unwrap()).unwrap();
+    let raw: Vec<[f64; 6]> = record()
+        .test_vectors
+        .iter()
+        .map(|vector| vector.raw)
+        .collect();
+    let script = format!(
+        "from scipy.io import loadmat
+c = loadmat({path:?}, simplify_cells=True)['turncal']
+assert c['equation'].startswith('N = '), c['equation']
+assert c['gyro']['sigma']['bias'].shape == (3,)
+for n in {raw:?}:
+    for t, k in (('gyro', 0), ('accel', 3)):
+        print(*(c[t]['correction'] @ (n[k:k + 3] - c[t]['bias'])))
+        a = (c[t]['scale'][:, None] * c[t]['installation'])
+        assert abs(a @ c[t]['correction'] - [[1, 0, 0], [0, 1, 0], [0, 0, 1]]).max() < 1e-12
+"
+    );
+    let python = std::env::var("TURNCAL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let Ok(ran) = Command::new(python).args(["-c", &script]).output() else {
+        skipped("no Python");
+        return;
+    };
+    let error = String::from_utf8_lossy(&ran.stderr);
+    if error.contains("ModuleNotFoundError") {
+        skipped("Python without SciPy");
+        return;
+    }
+    assert!(ran.status.success(), "{error}");
+    let said = String::from_utf8(ran.stdout).unwrap();
+    let found: Vec<f64> = said
+        .split_whitespace()
+        .map(|word| word.parse().unwrap())
+        .collect();
+    let expected: Vec<f64> = record()
+        .test_vectors
+        .iter()
+        .flat_map(|vector| vector.calibrated)
+        .collect();
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!(
+            (found - expected).abs() < 1e-12 * (1.0 + expected.abs()),
+            "{found} {expected}"
+        );
+    }
+    assert_eq!(found.len(), expected.len());
+}
