@@ -162,7 +162,7 @@ struct Content {
 }
 
 enum Samples {
-    Held(Held, Uniform),
+    Held(Box<(Held, Uniform)>),
     Long(Box<Whole>),
 }
 
@@ -194,7 +194,10 @@ impl ImuLog<'_> {
                 let missing = whole.missing;
                 (self.packed(&layout, *whole), missing)
             }
-            Samples::Held(held, clock) => self.whole(layout, &stamps, held, clock),
+            Samples::Held(held) => {
+                let (held, clock) = *held;
+                self.whole(layout, &stamps, held, clock)
+            }
         };
         notes.extend(stamps.lost_count(missing));
         // As bounded as the error of whole pulses, and as independent of how long it is summed over.
@@ -503,7 +506,7 @@ impl ImuLog<'_> {
                 .and_then(|()| long.finish(duplicates))
                 .map(|whole| Samples::Long(Box::new(whole))),
             None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
-                .map(|clock| Samples::Held(held, clock)),
+                .map(|clock| Samples::Held(Box::new((held, clock)))),
         };
         Ok(Content {
             samples: samples.map_err(|error| csv.placed(error))?,

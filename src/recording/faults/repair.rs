@@ -219,8 +219,8 @@ struct Holes {
 /// Columns with holes, those with the same ones together: rows that are missing lack all of them.
 fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) -> Vec<Holes> {
     let mut all: Vec<Holes> = Vec::new();
-    for k in 0..body_axes.len() {
-        let concerned = |fault: &&Fault| fault.concerns(sensor(k), body_axes[k]);
+    for (k, &axis) in body_axes.iter().enumerate() {
+        let concerned = |fault: &&Fault| fault.concerns(sensor(k), axis);
         if !faults.iter().any(|fault| concerned(&fault)) {
             continue;
         }
