@@ -97,21 +97,23 @@ impl AtRest {
         let mut axes = Vec::new();
         for sensor in Sensor::ALL {
             let samples = imu.of(sensor);
+            let seconds = (0..imu.len()).step_by(length).map(|begin| {
+                let end = (begin + length).min(imu.len());
+                let middle = 0.5 * (imu.time(begin) + imu.time(end));
+                let mean = samples.sum(begin..end) / ((end - begin) as f64 * imu.period);
+                let (t, rate) = (temperature.at(middle), temperature.rate(middle));
+                [0, 1, 2].map(|axis| Second {
+                    temperature: t.get(sensor)[axis],
+                    rate: rate.get(sensor)[axis],
+                    output: mean[axis],
+                    residual: 0.0,
+                })
+            });
+            let seconds: Vec<[Second; 3]> = seconds.collect();
             for axis in 0..3 {
-                let mut seconds: Vec<Second> = Vec::new();
-                for begin in (0..imu.len()).step_by(length) {
-                    let end = (begin + length).min(imu.len());
-                    let middle = 0.5 * (imu.time(begin) + imu.time(end));
-                    let sum: f64 = (begin..end).map(|k| samples[k][axis]).sum();
-                    seconds.push(Second {
-                        temperature: temperature.at(middle).get(sensor)[axis],
-                        rate: temperature.rate(middle).get(sensor)[axis],
-                        output: sum / ((end - begin) as f64 * imu.period),
-                        residual: 0.0,
-                    });
-                }
+                let of_axis = seconds.iter().map(|second| second[axis]).collect();
                 let of = range.get(sensor);
-                axes.push(AxisAtRest::new(sensor, axis, of, seconds, highest_order)?);
+                axes.push(AxisAtRest::new(sensor, axis, of, of_axis, highest_order)?);
             }
         }
         Some(Self { range, axes })

@@ -5,7 +5,7 @@ use super::error::CalibrationError;
 use super::iterations::{Iterated, iterate, summary};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::outcome::Pass;
-use super::pass::{Gate, Mode, PassResult, pass};
+use super::pass::{Epoch, Gate, Mode, pass};
 use super::problem::Problem;
 use crate::run::Aiding;
 
@@ -16,7 +16,8 @@ pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 pub(super) struct Attempt {
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
-    pub feedback: Option<PassResult>,
+    /// Of the pass with feedback, where there was one.
+    pub feedback_history: Vec<Epoch>,
     pub iterated: Iterated,
 }
 
@@ -61,7 +62,11 @@ fn attempt(
             progress,
         )
     };
-    let live = feedback.as_ref().map(|pass| pass.estimate.clone());
+    // Nothing else of it is needed.
+    let (live, feedback_history) = match feedback {
+        Some(pass) => (Some(pass.estimate), pass.history),
+        None => (None, Vec::new()),
+    };
     let iterated = match live.map(&mut from) {
         Some(Ok(iterated)) if iterated.converged => iterated,
         // What figures that are wrong by orders of magnitude feed back may lead astray, too.
@@ -74,7 +79,7 @@ fn attempt(
     Ok(Attempt {
         priors,
         passes,
-        feedback,
+        feedback_history,
         iterated,
     })
 }

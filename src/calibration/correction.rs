@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::frame::triad_record;
 use crate::calibration::result::Calibration;
 use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
-use crate::recording::TEMPERATURE_SPACING;
+use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
 /// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
@@ -192,7 +192,9 @@ impl Correction {
         let plain = self.terms().next().is_none();
         // A calibration that changes with temperature is made anew each second.
         let mut now: Option<(u64, Self, bool)> = None;
+        let mut near = Near::new(&run.recording.imu);
         (0..run.recording.imu.len()).map(move |k| {
+            near.reach(&(k.saturating_sub(1)..k + 2));
             let time = run.recording.imu.time(k);
             let second = ((time - run.recording.imu.start()) / TEMPERATURE_SPACING) as u64;
             if self.changing.is_some() && now.as_ref().is_none_or(|(of, ..)| *of != second) {
@@ -203,11 +205,11 @@ impl Correction {
                 Some((_, here, in_range)) => (here, *in_range),
                 None => (self, true),
             };
-            let of_triads = PerSensor::from_fn(|sensor| here.of_triad(sensor, run, k));
+            let of_triads = PerSensor::from_fn(|sensor| here.of_triad(sensor, run, &near, k));
             let u = if plain {
                 of_triads
             } else {
-                here.without_terms(&of_triads, here.angular_acceleration(run, k))
+                here.without_terms(&of_triads, here.angular_acceleration(run, &near, k))
             };
             Calibrated {
                 in_range,
@@ -242,23 +244,20 @@ impl Correction {
     }
 
     /// `(K C)⁻¹ (N − D)` of sample `k`.
-    fn of_triad(&self, sensor: Sensor, run: &Run, k: usize) -> Vector3<f64> {
-        let increment = match sensor {
-            Sensor::Gyro => run.recording.imu.gyro[k],
-            Sensor::Accel => run.recording.imu.accel[k],
-        };
+    fn of_triad(&self, sensor: Sensor, run: &Run, near: &Near, k: usize) -> Vector3<f64> {
+        let increment = near.at(k).get(sensor).to_owned();
         let output = increment.component_mul(&run.instrument.nominal.get(sensor).0)
             / run.recording.imu.period;
         self.matrix.get(sensor) * (output - self.bias.get(sensor))
     }
 
-    fn angular_acceleration(&self, run: &Run, k: usize) -> Vector3<f64> {
+    fn angular_acceleration(&self, run: &Run, near: &Near, k: usize) -> Vector3<f64> {
         let first = k.saturating_sub(1);
         let last = (k + 1).min(run.recording.imu.len() - 1);
         if !run.recording.imu.continuous || first == last {
             return Vector3::zeros();
         }
-        let rate = |k| self.of_triad(Sensor::Gyro, run, k);
+        let rate = |k| self.of_triad(Sensor::Gyro, run, near, k);
         (rate(last) - rate(first)) / ((last - first) as f64 * run.recording.imu.period)
     }
 

@@ -53,7 +53,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let Attempt {
         priors,
         mut passes,
-        feedback,
+        feedback_history,
         mut iterated,
     } = attempt;
     let stated = &problem;
@@ -135,7 +135,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         log_determinant: held.log_determinant,
         consistency: consistency(&held.innovations),
         history: held.history,
-        feedback_history: feedback.map(|pass| pass.history).unwrap_or_default(),
+        feedback_history,
         innovations: held.innovations,
         aiding: model.aiding,
         velocity_sigma: problem
@@ -183,7 +183,7 @@ impl<'a> Solved<'a> {
             attempt: Attempt {
                 priors: joint.priors,
                 passes: joint.passes,
-                feedback: None,
+                feedback_history: Vec::new(),
                 iterated: joint.iterated,
             },
             problem: joint.problem,
@@ -277,6 +277,7 @@ mod tests {
     use super::super::Options;
     use super::super::linearisation::Linearisation;
     use super::super::parameters::{from_vector, to_vector};
+    use super::super::pass::{Mode, pass};
     use super::*;
     use crate::attitude::exp;
     use crate::imu::TermVector;

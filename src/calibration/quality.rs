@@ -228,7 +228,7 @@ fn measures(
             let triads = at.instrument(&problem.model, (run, 0), &segment.samples);
             let triad = &triads.gyro;
             let correction = triad.correction().ok_or_else(|| singular(&triads))?;
-            let sum: Vector3<f64> = run.recording.imu.gyro[segment.samples.clone()].iter().sum();
+            let sum: Vector3<f64> = run.recording.imu.gyro.sum(segment.samples.clone());
             let duration = segment.samples.len() as f64 * run.recording.imu.period;
             turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
         }

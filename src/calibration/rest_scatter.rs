@@ -1,6 +1,5 @@
 //! How much the rows scatter at rest, beside what the stated noise makes of them.
 
-use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::finding::Finding;
@@ -42,10 +41,9 @@ fn of_triad<'a>(
     let (mut squares, mut count) = (0.0, 0usize);
     for dwell in dwells {
         // Pairs that have no step in common, so that each is new.
-        for pair in imu.of(sensor)[dwell.samples.clone()].chunks_exact(2 * length) {
-            let (before, after) = pair.split_at(length);
-            let sum = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>();
-            squares += (sum(after) - sum(before)).norm_squared();
+        let mut sums = imu.of(sensor).sums(dwell.samples.clone(), length);
+        while let (Some(before), Some(after)) = (sums.next(), sums.next()) {
+            squares += (after - before).norm_squared();
             count += 3;
         }
     }

@@ -27,30 +27,48 @@ pub(super) struct AtRest {
     pub first: bool,
     /// Its samples, summed.
     pub sums: Sums,
-    /// Mean of the table's readings during the whole dwell, `C_b_n`; none without a table.
+    /// Mean of the table's readings during the step, and how many they were.
+    pub reading: Option<(Matrix3<f64>, usize)>,
+    /// What its dwell is as a whole.
+    pub dwell: Arc<WholeDwell>,
+}
+
+/// What is known of a dwell as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct WholeDwell {
+    /// Mean of the table's readings, `C_b_n`; none without a table.
     pub attitude: Option<Matrix3<f64>>,
     /// How the table's attitude turns with errors of its axes, where their angles are known.
     pub axes: Option<Arc<AxisResponse>>,
-    /// Mean output of the accelerometers during the whole dwell.
+    /// Mean output of the accelerometers.
     pub accel: Vector3<f64>,
-    /// Mean of the table's readings during the step, and how many they were.
-    pub reading: Option<(Matrix3<f64>, usize)>,
 }
 
 /// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
 const STEP: f64 = 0.1;
+/// The same of a packed record once a dwell has lasted as long, in such steps: by then what is observed is
+/// limited by random walk, not by its own noise.
+const STEPS_OF_PACKED: usize = 10;
 
 /// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
-/// dwells `longer` times as long as usual.
+/// dwells so many taken together.
 pub(super) fn steps(
     run: &Run,
     table: Option<&TableLog>,
     dwells: &[Dwell],
-    longer: usize,
+    together: usize,
 ) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
-    let mut steps = Vec::new();
+    let longest = match imu.is_packed() {
+        true => STEPS_OF_PACKED * length,
+        false => length,
+    };
+    let lengths = (length, longest);
+    let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), lengths, together);
+    // There may be so many that room to grow would be too much.
+    let count = dwells.iter().map(|dwell| 1 + of_dwell(dwell).count());
+    let mut steps = Vec::with_capacity(count.sum());
     let mut at = dwells.first().map_or(0, |dwell| dwell.samples.start);
     for (number, dwell) in dwells.iter().enumerate() {
         let samples = at..dwell.samples.start;
@@ -66,12 +84,15 @@ pub(super) fn steps(
         if let Some(unread) = unread.as_mut().filter(|_| number == 0) {
             unread.start += 1;
         }
-        let accel = dwell.mean(Sensor::Accel, run).output;
         let axes = table.zip(position);
         let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
-        let axes = axes.map(|angles| Arc::new(axis_response(angles)));
+        let whole = Arc::new(WholeDwell {
+            attitude: position.map(|p| p.attitude),
+            axes: axes.map(|angles| Arc::new(axis_response(angles))),
+            accel: dwell.mean(Sensor::Accel, run).output,
+        });
         let mut first = true;
-        for samples in cut(dwell.samples.clone(), longer * length) {
+        for samples in of_dwell(dwell) {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
             let reading = table.zip(unread.as_mut()).and_then(|(table, unread)| {
                 let readings = take_until(unread, table, until);
@@ -82,10 +103,8 @@ pub(super) fn steps(
                 at_rest: Some(AtRest {
                     first,
                     sums: Sums::new(imu, samples.clone()),
-                    attitude: position.map(|p| p.attitude),
-                    accel,
-                    axes: axes.clone(),
                     reading,
+                    dwell: whole.clone(),
                 }),
                 samples,
             });
@@ -104,8 +123,8 @@ impl AtRest {
     /// record never leaves the linear range; nor does a tilt that it makes change what a wrong heading
     /// does.
     pub fn tied(&self, computed: &State, accel: &Triad) -> State {
-        State::at_rest(self.attitude.unwrap_or_else(|| {
-            let up = accel.correction().unwrap_or_default() * (self.accel - accel.bias);
+        State::at_rest(self.dwell.attitude.unwrap_or_else(|| {
+            let up = accel.correction().unwrap_or_default() * (self.dwell.accel - accel.bias);
             exp(tilt(&(computed.attitude * up))) * computed.attitude
         }))
     }
@@ -127,6 +146,25 @@ pub(super) fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Ra
     let end = range.end;
     let begins = range.step_by(length.max(1));
     begins.map(move |begin| begin..(begin + length).min(end))
+}
+
+/// Cuts a range into parts of the first length, then into ever longer ones, each as long as all before it, up
+/// to the second; so many of them are taken together.
+fn growing(
+    range: Range<usize>,
+    (length, longest): (usize, usize),
+    together: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let begin = range.start;
+    let mut at = begin;
+    std::iter::from_fn(move || {
+        let from = at;
+        for _ in 0..together.max(1) {
+            let length = (at - begin).clamp(length.max(1), longest.max(1));
+            at = (at + length).min(range.end);
+        }
+        (at > from).then_some(from..at)
+    })
 }
 
 /// Takes the readings up to a time off the front of those not yet used.

@@ -15,10 +15,13 @@ use super::quality::Quality;
 use super::result::{Calibration, Method, Provenance};
 use crate::imu::PerSensor;
 use crate::room;
+use crate::run::Run;
 use crate::units::DEGREE;
 
 /// Bytes of the passes, their history and innovations for each sample: 200 to 235, as measured.
 const BYTES_A_SAMPLE: usize = 256;
+/// The same of a packed record.
+const BYTES_A_PACKED_SAMPLE: usize = 8;
 /// Bytes of what does not grow with the record: threads, error terms that are tried, the report.
 const BYTES_BESIDE: usize = 16 << 20;
 
@@ -49,7 +52,15 @@ impl Problem<'_> {
     /// [`CalibrationError`] where the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
         let samples: usize = self.runs().map(|run| run.recording.imu.len()).sum();
-        let bytes = samples.saturating_mul(BYTES_A_SAMPLE);
+        let bytes_of = |run: &Run| {
+            let imu = &run.recording.imu;
+            let each = match imu.is_packed() {
+                true => BYTES_A_PACKED_SAMPLE,
+                false => BYTES_A_SAMPLE,
+            };
+            imu.len().saturating_mul(each)
+        };
+        let bytes = self.runs().map(bytes_of).fold(0, usize::saturating_add);
         if !room::is_there(bytes.saturating_add(BYTES_BESIDE)) {
             return Err(CalibrationError::NoMemory {
                 samples,

@@ -34,10 +34,7 @@ fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
     let stretch = step_length(imu.period);
     let (mut covariance, mut variance, mut pairs) = (0.0, 0.0, 0usize);
     for dwell in dwells {
-        let sums: Vec<_> = samples[dwell.samples.clone()]
-            .chunks_exact(stretch)
-            .map(|chunk| chunk.iter().sum::<Vector3<f64>>())
-            .collect();
+        let sums: Vec<_> = samples.sums(dwell.samples.clone(), stretch).collect();
         if sums.len() < 3 {
             continue;
         }
@@ -111,7 +108,7 @@ mod tests {
             })
         };
         for k in 0..run.recording.imu.accel.len() {
-            run.recording.imu.accel[k] += velocity(k + 1) - velocity(k);
+            run.recording.imu.accel.to_mut()[k] += velocity(k + 1) - velocity(k);
         }
         let found = stillness(&run, &run.dwells(run.aiding())).accel;
         assert!((found / sigma - 1.0).abs() < 0.1, "{found}");

@@ -77,6 +77,7 @@ impl<'a> Clock<'a> {
             unwrapped: 0.0,
             wraps_at: None,
             of_rows: Vec::new(),
+            let_go: 0,
         })
     }
 }
@@ -101,8 +102,10 @@ pub(super) struct Stamps {
     unwrapped: f64,
     /// The size of a counter that wrapped.
     wraps_at: Option<f64>,
-    /// Time in s and line of each row taken.
+    /// Time in s and line of each row taken and not let go …
     pub of_rows: Vec<(f64, u64)>,
+    /// … and how many were before them.
+    let_go: usize,
 }
 
 impl Stamps {
@@ -110,7 +113,7 @@ impl Stamps {
     /// taken.
     pub fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
         let Some(column) = self.column else {
-            let time = self.of_rows.len() as f64 * self.period;
+            let time = (self.let_go + self.of_rows.len()) as f64 * self.period;
             self.of_rows.push((time, csv.line()));
             return Ok(Stamp::Later);
         };
@@ -165,11 +168,17 @@ impl Stamps {
         Ok(Stamp::Later)
     }
 
+    /// Lets go of the first rows' stamps.
+    pub fn let_go(&mut self, rows: usize) {
+        self.of_rows.drain(..rows);
+        self.let_go += rows;
+    }
+
     /// What a counter that wraps leaves open where so many samples lack their rows, in a sentence.
     pub fn lost_count(&self, missing: usize) -> Option<String> {
         let size = self.wraps_at.filter(|_| missing > 0)?;
         Some(format!(
-            "LogRows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing at \
+            "Rows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing at \
              each place, or several times as many, and all after it be as much too early. Give a time that does \
              not wrap, or split the record there.",
             nanoseconds(size * self.period)

@@ -23,6 +23,8 @@ const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
 const BYTES_A_VALUE: usize = 32;
 /// The same where no column is taken, for all are only looked at.
 const BYTES_LOOKED_AT: usize = 16;
+/// The same where rows are packed as they come.
+const BYTES_PACKED: usize = 4;
 /// So many rows always find room.
 const FEW_ROWS: usize = 1 << 12;
 
@@ -39,6 +41,7 @@ pub(super) struct CsvFile {
     decimal_comma: bool,
     row: Row,
     rows: usize,
+    packed: bool,
     line: u64,
     cut: Option<Cut>,
 }
@@ -119,6 +122,7 @@ impl CsvFile {
             names: Names::new(&heading.names),
             units: heading.units,
             rows: 0,
+            packed: false,
             line: heading.line,
             cut: None,
         })
@@ -207,6 +211,7 @@ impl CsvFile {
         }
         let a_row = match self.names.taken().len() {
             0 => self.header().len() * BYTES_LOOKED_AT,
+            taken if self.packed => taken * BYTES_PACKED,
             taken => taken * BYTES_A_VALUE,
         };
         if room::is_there((2 * self.rows).saturating_mul(a_row)) {
@@ -217,6 +222,11 @@ impl CsvFile {
             "a record that fits into memory",
             "Give it more memory, or split the record.",
         ))
+    }
+
+    /// Takes less memory for granted: rows are packed as they come.
+    pub fn pack(&mut self) {
+        self.packed = true;
     }
 
     /// Line of the row.

@@ -1,5 +1,7 @@
 //! The instrument's samples.
 
+mod long;
+
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
@@ -12,8 +14,11 @@ use super::temperature::{TemperatureColumns, Temperatures};
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
-use crate::recording::stretches_between;
-use crate::recording::{ColumnFacts, FileColumn, ImuSamples, LogFacts, NamedColumns};
+use crate::recording::{
+    Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
+    stretches_between,
+};
+use long::{LongLog, Sizes, Whole};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
@@ -64,72 +69,226 @@ pub(super) struct ImuLog<'a> {
     pub full_scale: PerSensor<Option<f64>>,
 }
 
-/// What the file holds.
-struct Content {
-    stamps: Stamps,
-    triads: PerSensor<[FileColumn; 3]>,
+/// Where the values of a sample stand in a row.
+#[derive(Clone)]
+struct Layout {
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
+    names: [FileColumn; 6],
+    places: [usize; 6],
+    /// Right, front or up, whichever each lies along.
+    body_axes: [usize; 6],
+}
+
+fn sensor(column: usize) -> Sensor {
+    Sensor::ALL[column / 3]
+}
+
+impl Layout {
+    /// Rad and m/s by the nominal scale for one of each column's unit in a row.
+    fn units(&self, log: &ImuLog, period: f64) -> [f64; 6] {
+        let unit = |k: usize| log.seconds(period) / log.nominal.get(sensor(k)).0[self.body_axes[k]];
+        std::array::from_fn(unit)
+    }
+
+    fn full_scale(&self, log: &ImuLog) -> [Option<f64>; 6] {
+        std::array::from_fn(|k| *log.full_scale.get(sensor(k)))
+    }
+
+    /// The columns of a triad that lie along right, front and up.
+    fn columns(&self, sensor: Sensor) -> [usize; 3] {
+        let first = 3 * sensor as usize;
+        let along = |axis: usize| (first..first + 3).find(|&k| self.body_axes[k] == axis);
+        [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
+    }
+
+    /// Rad and m/s along right, front and up for one of the unit of the column that lies along it.
+    fn body_units(&self, log: &ImuLog, sensor: Sensor, period: f64) -> [f64; 3] {
+        let units = self.units(log, period);
+        self.columns(sensor).map(|k| {
+            let sign = if self.names[k].reversed { -1.0 } else { 1.0 };
+            let along = log.axes.vector(Vector3::ith(k % 3, sign));
+            units[k] * along[self.body_axes[k]]
+        })
+    }
+
+    fn triads(&self) -> PerSensor<[FileColumn; 3]> {
+        let name = |k: usize| self.names[k].clone();
+        PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| name(3 * sensor as usize + axis)))
+    }
+}
+
+/// Rows that are held, without duplicates.
+#[derive(Default)]
+struct Held {
     columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     duplicates: Vec<(usize, u64)>,
-    temperature: Option<Temperatures>,
+}
+
+impl Held {
+    fn len(&self) -> usize {
+        self.columns[0].len()
+    }
+
+    /// Lets go of the first rows.
+    fn let_go(&mut self, rows: usize) {
+        for column in &mut self.columns {
+            column.drain(..rows);
+            column.shrink_to(2 * column.len());
+        }
+        self.duplicates.retain(|&(row, _)| row > rows);
+        self.duplicates.iter_mut().for_each(|(row, _)| *row -= rows);
+    }
+}
+
+/// What was read besides samples.
+struct Read<'a> {
+    layout: &'a Layout,
     clock: Uniform,
+    facts: [ColumnFacts; 6],
+    rows: usize,
+    faults: Vec<Fault>,
+    bridges: Vec<Bridge>,
+}
+
+/// What the file holds.
+struct Content {
+    layout: Layout,
+    stamps: Stamps,
+    samples: Samples,
+    temperature: Option<Temperatures>,
     /// Of the integrals of the accelerometers' columns, in their unit times s.
     integral_error: [f64; 3],
 }
 
+enum Samples {
+    Held(Box<(Held, Uniform)>),
+    Long(Box<Whole>),
+}
+
 impl ImuLog<'_> {
+    /// What a row's value is to be taken for to be an integral over its sample.
+    fn seconds(&self, period: f64) -> f64 {
+        match self.output {
+            Output::Pulse | Output::Increment => 1.0,
+            Output::Rate => period,
+        }
+    }
+
     /// Reads the samples, finds what is wrong with them, and bridges it; what the file leaves open goes to
     /// `notes`.
     pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
+        self.read_by(Sizes::default(), notes)
+    }
+
+    fn read_by(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let Content {
+            layout,
             stamps,
-            triads,
-            columns,
-            duplicates,
+            samples,
             temperature,
-            clock,
             integral_error,
-        } = self.content(notes)?;
-        let mut temperature = temperature.map(|t| t.read(&self.source.file.display().to_string()));
-        notes.extend(temperature.iter_mut().flat_map(|t| t.notes.drain(..)));
+        } = self.content(sizes, notes)?;
+        let (mut imu, missing) = match samples {
+            Samples::Long(whole) => {
+                let missing = whole.missing;
+                (self.packed(&layout, *whole), missing)
+            }
+            Samples::Held(held) => {
+                let (held, clock) = *held;
+                self.whole(layout, &stamps, held, clock)
+            }
+        };
+        notes.extend(stamps.lost_count(missing));
+        // As bounded as the error of whole pulses, and as independent of how long it is summed over.
+        let error = self
+            .axes
+            .each(Vector3::from(integral_error))
+            .component_div(&self.nominal.accel.0);
+        imu.pulse.accel = imu
+            .pulse
+            .accel
+            .hypot(12f64.sqrt() * error.norm() / 3f64.sqrt());
+        if let Some(temperature) = temperature {
+            let read = temperature.read(&self.source.file.display().to_string());
+            notes.extend(read.notes);
+            imu.temperature = read.temperature;
+            if let Some(log) = &mut imu.log {
+                log.temperature = read.facts;
+            }
+        }
+        Ok(imu)
+    }
+
+    /// The samples of a log that was packed as it was read.
+    fn packed(&self, layout: &Layout, whole: Whole) -> ImuSamples {
+        let Whole {
+            clock,
+            facts,
+            packed,
+            samples,
+            faults,
+            bridges,
+            rows,
+            missing: _,
+        } = whole;
+        let read = Read {
+            layout,
+            clock,
+            facts,
+            rows,
+            faults,
+            bridges,
+        };
+        // Samples are then whole steps, as pulses are.
+        let pulse = PerSensor::from_fn(|sensor| packed.get(sensor).step());
+        let series = PerSensor {
+            gyro: Series::packed(packed.gyro),
+            accel: Series::packed(packed.accel),
+        };
+        self.samples(read, samples, series, pulse)
+    }
+
+    /// The samples of a log whose rows are all held.
+    fn whole(
+        &self,
+        layout: Layout,
+        stamps: &Stamps,
+        held: Held,
+        mut clock: Uniform,
+    ) -> (ImuSamples, usize) {
         let samples = clock.numbers.last().map_or(0, |last| last + 1);
-        notes.extend(stamps.lost_count(samples - clock.numbers.len()));
-        let stamps = stamps.of_rows;
+        let missing = samples - clock.numbers.len();
+        let lines = stamps.of_rows.iter().map(|&(_, line)| line);
         let period = clock.period;
-        let seconds = match self.output {
-            Output::Pulse | Output::Increment => 1.0,
-            Output::Rate => period,
-        };
-        let body_axes = std::array::from_fn(|column| self.axes.body_axis(column % 3));
-        let sensor = |column: usize| Sensor::ALL[column / 3];
-        let named = |k: usize| &triads.get(sensor(k))[k % 3];
-        let unit = |k| seconds / self.nominal.get(sensor(k)).0[body_axes[k]];
-        let units = std::array::from_fn(unit);
-        let facts = std::array::from_fn(|k| ColumnFacts::of(&named(k).name, &columns[k], units[k]));
+        let units = layout.units(self, period);
+        let facts = std::array::from_fn(|k| {
+            ColumnFacts::of(&layout.names[k].name, &held.columns[k], units[k])
+        });
+        let count = held.len() + held.duplicates.len();
         let rows = Rows {
-            columns,
+            columns: held.columns,
             facts: &facts,
-            full_scale: std::array::from_fn(|k| *self.full_scale.get(sensor(k))),
+            full_scale: layout.full_scale(self),
             pulses: self.output == Output::Pulse,
-            body_axes,
+            body_axes: layout.body_axes,
             units,
-            lines: stamps.iter().map(|&(_, line)| line).collect(),
-            numbers: clock.numbers,
+            lines: lines.collect(),
+            numbers: std::mem::take(&mut clock.numbers),
             period,
-            duplicates,
+            duplicates: held.duplicates,
         };
-        let count = stamps.len() + rows.duplicates.len();
         let Repaired {
             columns,
             faults,
             bridges,
         } = rows.repair();
 
-        let samples = PerSensor::from_fn(|sensor| {
+        let seconds = self.seconds(period);
+        let series = PerSensor::from_fn(|sensor| {
             let nominal = self.nominal.get(sensor).0;
             let [x, y, z] = std::array::from_fn(|axis| &columns[3 * sensor as usize + axis]);
-            let signs = triads.get(sensor).each_ref();
+            let signs = [0, 1, 2].map(|axis| &layout.names[3 * sensor as usize + axis]);
             let signs = Vector3::from(signs.map(|column| if column.reversed { -1.0 } else { 1.0 }));
             let rows = x.iter().zip(y).zip(z);
             let sample = |((&x, &y), &z)| {
@@ -138,52 +297,73 @@ impl ImuLog<'_> {
                     .vector(Vector3::new(x, y, z).component_mul(&signs));
                 (row * seconds).component_div(&nominal)
             };
-            rows.map(sample).collect::<Vec<_>>()
+            rows.map(sample).collect::<Series>()
         });
-        let mut pulse = PerSensor::from_fn(|sensor| match self.output {
+        let pulse = PerSensor::from_fn(|sensor| match self.output {
             Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
             Output::Increment | Output::Rate => 0.0,
         });
-        // As bounded as the error of whole pulses, and as independent of how long it is summed over.
-        let error = self
-            .axes
-            .each(Vector3::from(integral_error))
-            .component_div(&self.nominal.accel.0);
-        pulse.accel = pulse.accel.hypot(12f64.sqrt() * error.norm() / 3f64.sqrt());
+        let read = Read {
+            layout: &layout,
+            clock,
+            facts,
+            rows: count,
+            faults,
+            bridges,
+        };
+        (self.samples(read, samples, series, pulse), missing)
+    }
+
+    fn samples(
+        &self,
+        read: Read,
+        samples: usize,
+        series: PerSensor<Series>,
+        pulse: PerSensor<f64>,
+    ) -> ImuSamples {
+        let Read {
+            layout,
+            clock,
+            facts,
+            rows,
+            faults,
+            bridges,
+        } = read;
+        let period = clock.period;
         let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
         for (k, facts) in facts.into_iter().enumerate() {
-            of_axes.get_mut(sensor(k))[body_axes[k]] = facts;
+            of_axes.get_mut(sensor(k))[layout.body_axes[k]] = facts;
         }
-        Ok(ImuSamples {
+        ImuSamples {
             stretches: stretches_between(
-                samples.gyro.len(),
+                samples,
                 clock.first - self.stamp.lag() * period,
                 period,
                 &faults,
             ),
             period,
             continuous: self.continuous,
-            gyro: samples.gyro,
-            accel: samples.accel,
+            gyro: series.gyro,
+            accel: series.accel,
             pulse,
             faults,
             bridges,
-            temperature: temperature.as_mut().and_then(|t| t.temperature.take()),
+            temperature: None,
             log: Some(LogFacts {
-                rows: count,
+                rows,
                 jitter_rms: clock.jitter_rms,
                 jitter_max: clock.jitter_max,
                 off_stated_period: clock.off_given,
                 columns: of_axes,
                 named: NamedColumns {
                     time: self.clock_of_rows().column.map(str::to_owned),
-                    triads,
+                    triads: layout.triads(),
                     temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
                     axes: self.axes.order(),
                 },
-                temperature: temperature.as_ref().and_then(|t| t.facts),
+                temperature: None,
             }),
-        })
+        }
     }
 
     /// The rows of both triads.
@@ -218,25 +398,35 @@ impl ImuLog<'_> {
         }
     }
 
-    fn content(&self, notes: &mut Vec<String>) -> Result<Content, FileError> {
-        let mut csv = self.open()?;
+    fn layout(&self, csv: &mut LogRows) -> Result<Layout, FileError> {
         let names = match self.accel_from {
             Some(_) => joined::distinct(&self.triads),
             None => PerSensor::from_fn(|sensor| self.triads.get(sensor).map(str::to_owned)),
         };
-        let mut stamps = self.clock_of_rows().start(&mut csv)?;
-        let mut triad = |[x, y, z]: &[String; 3]| -> Result<_, FileError> {
-            Ok([
-                csv.signed_column(x)?,
-                csv.signed_column(y)?,
-                csv.signed_column(z)?,
-            ])
+        let names = names.gyro.iter().chain(&names.accel);
+        let found = names.map(|name| csv.signed_column(name));
+        let found = found.collect::<Result<Vec<_>, _>>()?;
+        let (places, names): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        let mut names = names.into_iter();
+        let mut name = |_| {
+            names.next().unwrap_or(FileColumn {
+                name: String::new(),
+                reversed: false,
+            })
         };
-        let found = PerSensor {
-            gyro: triad(&names.gyro)?,
-            accel: triad(&names.accel)?,
-        };
-        let places: [usize; 6] = std::array::from_fn(|k| found.get(Sensor::ALL[k / 3])[k % 3].0);
+        Ok(Layout {
+            names: std::array::from_fn(&mut name),
+            places: std::array::from_fn(|k| places[k]),
+            body_axes: std::array::from_fn(|k| self.axes.body_axis(k % 3)),
+        })
+    }
+
+    fn content(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<Content, FileError> {
+        let mut csv = self.open()?;
+        let clock = self.clock_of_rows();
+        let mut stamps = clock.start(&mut csv)?;
+        let layout = self.layout(&mut csv)?;
+        let places = layout.places;
         let temperature = self
             .temperature
             .as_ref()
@@ -247,9 +437,9 @@ impl ImuLog<'_> {
             Some((name, number)) => Some((csv.column(name)?, number)),
             None => None,
         };
-        let mut blank = 0;
-        let mut columns = [const { Vec::new() }; 6];
-        let mut duplicates = Vec::new();
+        let (mut blank, mut duplicates) = (0, 0);
+        let mut held = Held::default();
+        let mut long: Option<LongLog> = None;
         let mut before = [f64::NAN; 6];
         while csv.advance()? && !csv.may_be_cut() {
             if let Some((place, number)) = instance
@@ -258,9 +448,7 @@ impl ImuLog<'_> {
                 continue;
             }
             // Rows that another sensor wrote; without a time they would be missing.
-            if self.clock_of_rows().column.is_some()
-                && places.iter().all(|&place| csv.is_blank(place))
-            {
+            if clock.column.is_some() && places.iter().all(|&place| csv.is_blank(place)) {
                 blank += 1;
                 continue;
             }
@@ -270,18 +458,31 @@ impl ImuLog<'_> {
             }
             match stamps.look(&csv)? {
                 Stamp::Same if row == before => {
-                    duplicates.push((stamps.of_rows.len(), csv.line()));
+                    held.duplicates.push((held.len(), csv.line()));
+                    duplicates += 1;
                     continue;
                 }
                 Stamp::Same => return Err(Stamps::same(&csv)),
                 Stamp::Later => before = row,
             }
-            for (column, value) in columns.iter_mut().zip(row) {
+            for (column, value) in held.columns.iter_mut().zip(row) {
                 column.push(value);
             }
             if let (Some(temperature), Some(&(time, _))) = (&mut temperature, stamps.of_rows.last())
             {
                 temperature.take(&csv, time);
+            }
+            match &mut long {
+                Some(long) if long.is_full(&held) => long
+                    .take(&mut held, &mut stamps, false)
+                    .map_err(|error| csv.placed(error))?,
+                None if held.len() == sizes.long => {
+                    csv.pack();
+                    let layout = layout.clone();
+                    let begun = LongLog::new(self, (layout, sizes), &held, &stamps);
+                    long = Some(begun.map_err(|error| csv.placed(error))?);
+                }
+                _ => {}
             }
         }
         notes.extend(csv.cut_off("It is left out"));
@@ -292,25 +493,26 @@ impl ImuLog<'_> {
                 self.source.file.display()
             ));
         }
-        if stamps.of_rows.len() < FEWEST_SAMPLES {
+        if long.is_none() && held.len() < FEWEST_SAMPLES {
             return Err(csv.error(
-                format_args!("{} samples", stamps.of_rows.len()),
+                format_args!("{} samples", held.len()),
                 format_args!("at least {FEWEST_SAMPLES}"),
                 "Record a run with dwells and turns.",
             ));
         }
-        let PerSensor { gyro, accel } = found;
-        let clock = Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period);
+        let samples = match long {
+            Some(mut long) => long
+                .take(&mut held, &mut stamps, true)
+                .and_then(|()| long.finish(duplicates))
+                .map(|whole| Samples::Long(Box::new(whole))),
+            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
+                .map(|clock| Samples::Held(Box::new((held, clock)))),
+        };
         Ok(Content {
-            clock: clock.map_err(|error| csv.placed(error))?,
+            samples: samples.map_err(|error| csv.placed(error))?,
             integral_error: csv.integral_error(),
+            layout,
             stamps,
-            triads: PerSensor {
-                gyro: gyro.map(|(_, column)| column),
-                accel: accel.map(|(_, column)| column),
-            },
-            columns,
-            duplicates,
             temperature,
         })
     }
@@ -327,3 +529,6 @@ impl ImuLog<'_> {
         Ok(value)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -259,6 +259,8 @@ impl<'a> TableLogFile<'a> {
             axes.extend(columns.axes(&csv)?);
         }
         notes.extend(csv.cut_off("It is left out"));
+        attitude.shrink_to_fit();
+        axes.shrink_to_fit();
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();
         let (first, last) = match time.as_slice() {
             [first, .., last] => (*first, *last),

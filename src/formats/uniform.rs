@@ -1,10 +1,13 @@
 //! The uniform clock behind stamps that are rounded, jitter and lack rows.
 
+mod following;
+
 use std::path::Path;
 
 use super::error::{FileError, Place};
 use crate::recording::nanoseconds;
 use crate::statistics::median;
+pub(super) use following::Following;
 
 /// The uniform clock of increasing stamps.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,7 +16,7 @@ pub(super) struct Uniform {
     pub first: f64,
     /// s
     pub period: f64,
-    /// The number of each row's sample; the first is 0.
+    /// The number of each row's sample; the first is 0. None where they were given out one by one.
     pub numbers: Vec<usize>,
     /// Stamps against due times, s.
     pub jitter_rms: f64,
@@ -78,16 +81,7 @@ impl Uniform {
         about: f64,
         given: bool,
     ) -> Result<Self, FileError> {
-        let gap = |row: usize| {
-            let ((before, _), (time, line)) = (stamps[row - 1], stamps[row]);
-            FileError::new(
-                file,
-                Place::Line(line),
-                format_args!("a gap in time from {before} s to {time} s"),
-                "fewer rows missing than there are",
-                "Correct the clock, or split the record there.",
-            )
-        };
+        let gap = |row: usize| gap(file, stamps[row - 1].0, stamps[row]);
 
         let mut numbers = numbers(stamps, about, given).map_err(gap)?;
         let (mut first, mut period) = fit(stamps, &numbers, about, given);
@@ -106,13 +100,7 @@ impl Uniform {
             let due = first + number as f64 * period;
             let off = (time - due).abs();
             if off > 0.5 * period {
-                return Err(FileError::new(
-                    file,
-                    Place::Line(line),
-                    format_args!("time {time} s at sample {}", number + 1),
-                    format_args!("{} s at {period} s a sample", nanoseconds(due)),
-                    "Correct sample_period_s, or resample the record to a uniform clock.",
-                ));
+                return Err(not_uniform(file, (time, line), number, (due, period)));
             }
             squares += off * off;
             largest = largest.max(off);
@@ -128,29 +116,75 @@ impl Uniform {
     }
 }
 
-/// Number of each sample by steps from row to row, with a clock that follows the stamps slowly; the row
-/// after a gap longer than all rows together if there is one.
+/// Counts samples by steps from row to row, with a clock that follows the stamps slowly.
+#[derive(Debug, Clone)]
+struct Counter {
+    number: usize,
+    period: f64,
+    due: f64,
+    /// Whether the period stays as it is.
+    given: bool,
+}
+
+impl Counter {
+    /// The number of the sample of a stamp, which may be beyond any.
+    fn next(&mut self, time: f64) -> f64 {
+        let step = ((time - self.due) / self.period).round().max(1.0);
+        let next = self.number as f64 + step;
+        self.number = next as usize;
+        self.due += step * self.period;
+        let off = time - self.due;
+        self.due += PHASE * off;
+        if !self.given {
+            self.period += PERIOD * off / step;
+        }
+        next
+    }
+}
+
+/// Number of each sample; the row after a gap longer than all rows together if there is one.
 fn numbers(stamps: &[(f64, u64)], about: f64, given: bool) -> Result<Vec<usize>, usize> {
     let most = 2 * stamps.len();
     let mut numbers = Vec::with_capacity(stamps.len());
     numbers.push(0);
-    let (mut number, mut period) = (0, about);
-    let mut due = stamps[0].0 + phase(stamps, about);
+    let mut counter = Counter {
+        number: 0,
+        period: about,
+        due: stamps[0].0 + phase(stamps, about),
+        given,
+    };
     for (row, &(time, _)) in stamps.iter().enumerate().skip(1) {
-        let step = ((time - due) / period).round().max(1.0);
-        if number as f64 + step > most as f64 {
+        if counter.next(time) > most as f64 {
             return Err(row);
         }
-        number += step as usize;
-        numbers.push(number);
-        due += step * period;
-        let off = time - due;
-        due += PHASE * off;
-        if !given {
-            period += PERIOD * off / step;
-        }
+        numbers.push(counter.number);
     }
     Ok(numbers)
+}
+
+fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
+    FileError::new(
+        file,
+        Place::Line(line),
+        format_args!("a gap in time from {before} s to {time} s"),
+        "fewer rows missing than there are",
+        "Correct the clock, or split the record there.",
+    )
+}
+
+fn not_uniform(
+    file: &Path,
+    (time, line): (f64, u64),
+    number: usize,
+    (due, period): (f64, f64),
+) -> FileError {
+    FileError::new(
+        file,
+        Place::Line(line),
+        format_args!("time {time} s at sample {}", number + 1),
+        format_args!("{} s at {period} s a sample", nanoseconds(due)),
+        "Correct sample_period_s, or resample the record to a uniform clock.",
+    )
 }
 
 /// Rows over which steps are compared: more hide jitter, fewer are seldom without a gap.

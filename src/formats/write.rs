@@ -125,7 +125,7 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
         ""
     };
     writeln!(file, "t,gx,gy,gz,ax,ay,az{further}")?;
-    for (k, samples) in gyro.iter().zip(accel).enumerate() {
+    for (k, samples) in gyro.iter().zip(accel.iter()).enumerate() {
         write!(file, "{}", nanoseconds(run.recording.imu.time(k)))?;
         for (sensor, sample) in [(Sensor::Gyro, samples.0), (Sensor::Accel, samples.1)] {
             let quantity = sample.component_mul(&run.instrument.nominal.get(sensor).0);

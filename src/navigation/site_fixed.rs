@@ -17,7 +17,7 @@ use crate::imu::{
     PerSensor, Sensed, Sensor, TermResponse, TermVector, ThermalCoefficients, ThermalModel,
     ThermalState, Triad,
 };
-use crate::recording::ImuSamples;
+use crate::recording::{ImuSamples, Near};
 
 /// Within this time, s, what happened first is taken to act on all that follows as a whole; the sensitivity of
 /// navigation to errors is of second order in it.
@@ -32,6 +32,7 @@ pub(crate) fn samples_of(time: f64, period: f64) -> usize {
 #[derive(Debug, Clone)]
 pub struct Navigator<'a> {
     imu: &'a ImuSamples,
+    near: Near<'a>,
     gravity: Vector3<f64>,
     earth_rate: Vector3<f64>,
     earth_turn: Matrix3<f64>,
@@ -91,6 +92,7 @@ impl<'a> Navigator<'a> {
         let earth_rate = site.earth_rate_n();
         Some(Self {
             imu,
+            near: Near::new(imu),
             gravity: site.gravity_n(),
             earth_rate,
             earth_turn: exp(-earth_rate * imu.period),
@@ -202,9 +204,10 @@ impl<'a> Navigator<'a> {
     #[inline]
     fn of_triads(&self, k: usize) -> Increments {
         let PerSensor { gyro, accel } = &self.instrument;
+        let raw = self.near.at(k);
         Increments {
-            angle: gyro.correction * self.imu.gyro[k] - gyro.bias,
-            velocity: accel.correction * self.imu.accel[k] - accel.bias,
+            angle: gyro.correction * raw.gyro - gyro.bias,
+            velocity: accel.correction * raw.accel - accel.bias,
         }
     }
 
@@ -319,6 +322,9 @@ impl<'a> Navigator<'a> {
     #[inline]
     fn navigate(&mut self, samples: Range<usize>, mut each: impl FnMut(&Self, &Step)) {
         let period = self.imu.period;
+        // Coning asks for the sample before, angular acceleration for those beside.
+        self.near
+            .reach(&(samples.start.saturating_sub(2)..samples.end + 1));
         let mut state = self.state;
         let mut before = samples
             .start
@@ -379,10 +385,11 @@ impl<'a> Navigator<'a> {
     fn bridged(&self, samples: &Range<usize>) -> PerSensor<Matrix3<f64>> {
         let mut covariance = PerSensor::<Matrix3<f64>>::default();
         for (bridge, part) in self.imu.bridged(samples) {
-            let correction = &self.instrument.get(bridge.sensor).correction;
-            let error = self.state.attitude * correction.column(bridge.axis);
-            *covariance.get_mut(bridge.sensor) +=
-                error * error.transpose() * (bridge.variance * part);
+            for (sensor, axis, variance) in bridge.each() {
+                let correction = &self.instrument.get(sensor).correction;
+                let error = self.state.attitude * correction.column(axis);
+                *covariance.get_mut(sensor) += error * error.transpose() * (variance * part);
+            }
         }
         covariance
     }

@@ -34,18 +34,16 @@ impl Sums {
     /// Of these samples of a record.
     pub fn new(imu: &ImuSamples, samples: Range<usize>) -> Self {
         let n = samples.len() as f64;
-        let all = PerSensor {
-            gyro: &imu.gyro,
-            accel: &imu.accel,
-        };
+        let first = samples.start.saturating_sub(1);
+        let all = PerSensor::from_fn(|sensor| imu.of(sensor).part(first..samples.end));
         let total = PerSensor::from_fn(|sensor| {
-            let of_sensor = &all.get(sensor)[samples.clone()];
+            let of_sensor = &all.get(sensor)[samples.start - first..];
             of_sensor.iter().sum::<Vector3<f64>>()
         });
         let mean = PerSensor::from_fn(|sensor| total.get(sensor) / n);
         let deviation = |k: usize| PerSensor {
-            gyro: imu.gyro[k] - mean.gyro,
-            accel: imu.accel[k] - mean.accel,
+            gyro: all.gyro[k - first] - mean.gyro,
+            accel: all.accel[k - first] - mean.accel,
         };
         let mut sums = Self {
             samples: samples.len(),

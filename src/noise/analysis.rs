@@ -70,8 +70,8 @@ impl NoiseAnalysis {
         let clusters = Clusters::new(stretch.samples.len(), period, sizes);
         let triads = PerSensor::from_fn(|sensor| {
             let all = run.recording.imu.of(sensor);
-            let samples = all.get(stretch.samples.clone()).unwrap_or_default();
-            TriadNoise::new(samples, period, &clusters)
+            let samples = all.part(stretch.samples.clone());
+            TriadNoise::new(&samples, period, &clusters)
         });
         Self {
             period,

@@ -37,7 +37,7 @@ impl RestNoise {
                 Sensor::Accel => &imu.accel,
             };
             let variances = used.iter().zip(&freedoms).map(|(dwell, weight)| {
-                let of_dwell = increments[(*dwell).clone()].iter().map(|v| v[axis]);
+                let of_dwell = increments.within((*dwell).clone()).map(|v| v[axis]);
                 let curve = overlapping(of_dwell, imu.period, &[size]);
                 weight * curve.variance.first().copied().unwrap_or_default()
             });

@@ -124,6 +124,44 @@ impl ColumnFacts {
     }
 }
 
+impl ColumnFacts {
+    /// The same of a column of which these are the rows that follow.
+    pub(crate) fn and(self, later: &Self) -> Self {
+        let counts = |end: f64, of: &Self| {
+            [
+                (of.smallest == end).then_some(of.at_smallest),
+                (of.largest == end).then_some(of.at_largest),
+            ]
+        };
+        let count = |end: f64| {
+            let of = |of: &Self| counts(end, of).into_iter().flatten().max().unwrap_or(0);
+            of(&self) + of(later)
+        };
+        let smallest = self.smallest.min(later.smallest);
+        let largest = self.largest.max(later.largest);
+        let constant = |of: &Self| of.smallest == of.largest;
+        let step = match (self.step, later.step) {
+            (step, _) if constant(later) => step,
+            (_, step) if constant(&self) => step,
+            (Some(one), Some(other)) => {
+                let (fine, coarse) = (one.min(other), one.max(other));
+                let steps = coarse / fine;
+                ((steps - steps.round()).abs() <= OFF_GRID).then_some(fine)
+            }
+            _ => None,
+        };
+        Self {
+            at_smallest: count(smallest),
+            at_largest: count(largest),
+            name: self.name,
+            smallest,
+            largest,
+            step,
+            unit: later.unit,
+        }
+    }
+}
+
 /// Values are on a grid if no difference between two in a row is further than this from a multiple of
 /// its step.
 const OFF_GRID: f64 = 0.05;

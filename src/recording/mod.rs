@@ -4,21 +4,26 @@
 
 pub(crate) mod faults;
 mod log_facts;
+mod near;
 mod samples;
 mod segment;
+mod series;
 mod temperature;
 
 pub use faults::{Bridge, Fault, FaultKind};
 pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
+pub(crate) use near::Near;
 pub(crate) use samples::stretches_between;
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
+pub use series::Series;
+pub(crate) use series::{Packed, Packer, finest_step};
 pub use temperature::{SPACING as TEMPERATURE_SPACING, Temperature};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use crate::turntable::AxisAngles;
 
@@ -58,8 +63,8 @@ impl Recording {
         name: &str,
         start: f64,
         period: f64,
-        gyro: Vec<Vector3<f64>>,
-        accel: Vec<Vector3<f64>>,
+        gyro: impl Into<Series>,
+        accel: impl Into<Series>,
     ) -> Result<Self, SampleError> {
         Ok(Self {
             name: name.to_owned(),

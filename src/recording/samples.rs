@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::{Bridge, Fault, LogFacts, Temperature};
+use super::{Bridge, Fault, LogFacts, Series, Temperature};
 use crate::imu::{PerSensor, Sensor};
 
 /// The samples of both triads, at one period, in one stretch or several.
@@ -20,14 +20,15 @@ pub struct ImuSamples {
     /// end to end, and only a labelled section or a dwell is of one piece.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
-    pub gyro: Vec<Vector3<f64>>,
+    pub gyro: Series,
     /// Integrals of the normalised accelerometer output over each sample, m/s.
-    pub accel: Vec<Vector3<f64>>,
+    pub accel: Series,
     /// One pulse, rad and m/s, where samples are whole pulses; zero otherwise.
     pub pulse: PerSensor<f64>,
     /// What was wrong with the file's samples, in order of kind, axis and time.
     pub faults: Vec<Fault>,
-    /// Interpolated samples, in order of triad, axis and time; those of one axis do not overlap.
+    /// Interpolated samples, those of the same axes together, in order of time; those of one axis do not
+    /// overlap.
     pub bridges: Vec<Bridge>,
     /// The instrument's temperature meanwhile, where it is known.
     pub temperature: Option<Temperature>,
@@ -76,11 +77,16 @@ pub enum SampleError {
 
 impl ImuSamples {
     /// Increments of one triad's output.
-    pub fn of(&self, sensor: Sensor) -> &[Vector3<f64>] {
+    pub fn of(&self, sensor: Sensor) -> &Series {
         match sensor {
             Sensor::Gyro => &self.gyro,
             Sensor::Accel => &self.accel,
         }
+    }
+
+    /// Whether there were so many that they are packed.
+    pub fn is_packed(&self) -> bool {
+        self.gyro.is_packed()
     }
 
     /// Samples that follow one another without a gap, the first from `start` on, s.
@@ -90,9 +96,10 @@ impl ImuSamples {
     pub fn new(
         start: f64,
         period: f64,
-        gyro: Vec<Vector3<f64>>,
-        accel: Vec<Vector3<f64>>,
+        gyro: impl Into<Series>,
+        accel: impl Into<Series>,
     ) -> Result<Self, SampleError> {
+        let (gyro, accel) = (gyro.into(), accel.into());
         if gyro.len() != accel.len() {
             return Err(SampleError::Lengths {
                 gyro: gyro.len(),
@@ -105,8 +112,12 @@ impl ImuSamples {
         if !(period > 0.0 && period.is_finite() && start.is_finite()) {
             return Err(SampleError::Period { period });
         }
-        let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
-        if let Some(sample) = (0..gyro.len()).find(|&k| !(finite(&gyro[k]) && finite(&accel[k]))) {
+        let finite = |v: Vector3<f64>| v.iter().all(|x| x.is_finite());
+        let not_finite = gyro
+            .iter()
+            .zip(accel.iter())
+            .position(|(rate, force)| !(finite(rate) && finite(force)));
+        if let Some(sample) = not_finite {
             return Err(SampleError::NotFinite { sample });
         }
         Ok(Self::made(start, period, gyro, accel))
@@ -116,9 +127,10 @@ impl ImuSamples {
     pub(crate) fn made(
         start: f64,
         period: f64,
-        gyro: Vec<Vector3<f64>>,
-        accel: Vec<Vector3<f64>>,
+        gyro: impl Into<Series>,
+        accel: impl Into<Series>,
     ) -> Self {
+        let (gyro, accel) = (gyro.into(), accel.into());
         Self {
             period,
             stretches: vec![Stretch {
@@ -178,10 +190,15 @@ impl ImuSamples {
 
     /// Whether these samples follow one another without a break.
     pub fn unbroken(&self, samples: &Range<usize>) -> bool {
-        let of_one = |stretch: &Stretch| {
-            stretch.samples.start <= samples.start && samples.end <= stretch.samples.end
-        };
-        self.continuous && self.stretches.iter().any(of_one)
+        self.continuous && !self.is_lost(samples)
+    }
+
+    /// Whether some of these samples are not known.
+    pub fn is_lost(&self, samples: &Range<usize>) -> bool {
+        let begun = |stretch: &Stretch| stretch.samples.start <= samples.start;
+        let begun = self.stretches.partition_point(begun);
+        let stretch = self.stretches.get(begun.wrapping_sub(1));
+        stretch.is_none_or(|stretch| samples.end > stretch.samples.end)
     }
 
     /// The samples between stretches, of which nothing is known.

@@ -110,12 +110,12 @@ impl Run {
         if (longest.len() as f64) * imu.period < SHORTEST {
             return None;
         }
-        let zero = imu.gyro[longest.clone()].iter().sum::<Vector3<f64>>() / longest.len() as f64;
+        let zero = imu.gyro.sum(longest.clone()) / longest.len() as f64;
         let limit = |count: usize| {
             let random_walk = self.instrument.noise.gyro.random_walk;
             self.segment_sigma + STILL_SIGMAS * random_walk * (count as f64 * imu.period).sqrt()
         };
-        let turns = |beside: &mut dyn Iterator<Item = &Vector3<f64>>| {
+        let turns = |beside: &mut dyn Iterator<Item = Vector3<f64>>| {
             let mut angle = Vector3::zeros();
             beside.enumerate().any(|(count, increment)| {
                 angle += increment - zero;
@@ -123,8 +123,8 @@ impl Run {
             })
         };
         let (before, after) = (samples.start..longest.start, longest.end..samples.end);
-        let beside =
-            turns(&mut imu.gyro[before].iter().rev()) || turns(&mut imu.gyro[after].iter());
+        let mut before = imu.gyro.part(before).into_owned().into_iter().rev();
+        let beside = turns(&mut before) || turns(&mut imu.gyro.within(after));
         beside.then_some(longest)
     }
 
@@ -145,14 +145,13 @@ impl Run {
     /// Whether the gyros turn during these samples, with their mean output at rest as zero.
     fn turns(&self, samples: Range<usize>, at_rest: &Dwell) -> bool {
         let gyro = &self.recording.imu.gyro;
-        let zero = gyro[at_rest.samples.clone()].iter().sum::<Vector3<f64>>()
-            / at_rest.samples.len() as f64;
+        let zero = gyro.sum(at_rest.samples.clone()) / at_rest.samples.len() as f64;
         let duration = samples.len() as f64 * self.recording.imu.period;
         let limit = STILL_ANGLE
             + STILL_SIGMAS * self.instrument.noise.gyro.random_walk * duration.sqrt()
             + STILL_RATE * duration;
         let mut angle = Vector3::zeros();
-        gyro[samples].iter().any(|increment| {
+        gyro.within(samples).any(|increment| {
             angle += increment - zero;
             angle.norm() > limit
         })
@@ -189,11 +188,12 @@ impl Dwell {
     pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
         let samples = run.recording.imu.of(sensor);
         let duration = self.samples.len() as f64 * run.recording.imu.period;
-        let sum: Vector3<f64> = samples[self.samples.clone()].iter().sum();
+        let sum = samples.sum(self.samples.clone());
         let mut interpolated = Vector3::<f64>::zeros();
         for (bridge, part) in run.recording.imu.bridged(&self.samples) {
-            if bridge.sensor == sensor {
-                interpolated[bridge.axis] += bridge.variance * part;
+            let of_sensor = bridge.each().filter(|&(of, ..)| of == sensor);
+            for (_, axis, variance) in of_sensor {
+                interpolated[axis] += variance * part;
             }
         }
         let span = self.times(run);
@@ -275,7 +275,7 @@ mod tests {
             .sum();
         assert!((310.0..330.0).contains(&standing), "{standing} s");
         for dwell in &dwells {
-            let rate = |k: usize| (run.recording.imu.gyro[k] / run.recording.imu.period).norm();
+            let rate = |k: usize| (run.recording.imu.gyro.at(k) / run.recording.imu.period).norm();
             // Earth rate and 25 °/h of bias; a table that turns is thousands of times faster.
             let fastest = dwell.samples.clone().map(rate).fold(0.0, f64::max);
             assert!(fastest < 1e-3, "{fastest} rad/s");

@@ -181,8 +181,8 @@ mod tests {
             let still = sample(start) + 1..sample(end) - 1;
             let time = still.len() as f64 * PERIOD;
             let attitude = motion.at(start).attitude;
-            let angle: Vector3<f64> = ideal.gyro[still.clone()].iter().sum();
-            let velocity: Vector3<f64> = ideal.accel[still].iter().sum();
+            let angle = ideal.gyro[still.clone()].iter().sum::<Vector3<f64>>();
+            let velocity = ideal.accel[still].iter().sum::<Vector3<f64>>();
             let up = Vector3::new(0.0, 0.0, site.gravity * time);
             assert_relative_eq!(attitude * velocity, up, epsilon = 1e-10 * time);
             assert_relative_eq!(angle.norm(), ROTATION_RATE * time, max_relative = 1e-10);

@@ -113,8 +113,8 @@ fn what_a_run_lacks_is_not_promised() {
     // The first turns are about one axis, level: gravity shows neither the others nor their up.
     let few = 2 * run.recording.imu.len() / 10;
     let mut short = alone.clone();
-    short.recording.imu.gyro.truncate(few);
-    short.recording.imu.accel.truncate(few);
+    short.recording.imu.gyro.to_mut().truncate(few);
+    short.recording.imu.accel.to_mut().truncate(few);
     short.recording.imu.stretches[0].samples.end = few;
     let expected = of(&short, Path::VelocityAiding).unwrap();
     assert!(

@@ -45,9 +45,12 @@ fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
 
 /// The first 200 s of the demo's run.
 fn short() -> Run {
-    let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-    run.recording.imu.gyro.truncate(20_000);
-    run.recording.imu.accel.truncate(20_000);
+    shortened(Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run)
+}
+
+fn shortened(mut run: Run) -> Run {
+    run.recording.imu.gyro.to_mut().truncate(20_000);
+    run.recording.imu.accel.to_mut().truncate(20_000);
     run.recording.imu.stretches[0].samples.end = 20_000;
     if let Some(table) = &mut run.recording.table {
         let readings = table.time.partition_point(|&t| t <= 200.0);
@@ -89,15 +92,8 @@ fn it_agrees_where_gyros_or_table_have_no_error_and_the_problem_fewer_unknowns()
 fn two_recordings_together_are_both_stacked() {
     let scenario = Scenario::load("demo").unwrap();
     let one = short();
-    let mut other = short();
-    let second = scenario.simulate_recording(1, 0, 1, &Default::default());
-    let second = second.unwrap().run;
-    other.recording.imu.gyro = second.recording.imu.gyro[..20_000].to_vec();
-    other.recording.imu.accel = second.recording.imu.accel[..20_000].to_vec();
-    if let (Some(table), Some(of)) = (&mut other.recording.table, &second.recording.table) {
-        let readings = table.attitude.len();
-        table.attitude = of.attitude[..readings].to_vec();
-    }
+    let other = scenario.simulate_recording(1, 0, 1, &Default::default());
+    let other = shortened(other.unwrap().run);
     let problem = Problem::new(&one, &stated()).and(&other);
     let outcome = estimate(&problem, &|_| {}).unwrap();
     assert!(outcome.converged);

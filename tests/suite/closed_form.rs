@@ -352,7 +352,7 @@ fn one_position_that_is_off_costs_no_more_than_that_position() {
     let period = made.run.recording.imu.period;
     // Something turns the IMU by 4″ a second on its face, too slowly for a standstill to end by it.
     for k in dwells[9].samples.clone() {
-        made.run.recording.imu.gyro[k].x += 4.0 * ARCSEC * period;
+        made.run.recording.imu.gyro.to_mut()[k].x += 4.0 * ARCSEC * period;
     }
     let spoilt = solved(&made.run);
     let named = spoilt.findings.iter().find_map(|finding| match finding {
@@ -379,7 +379,7 @@ fn labels_that_no_prior_allows_are_believed_and_the_mount_is_named() {
     let mut made = by_hand(&Scenario::load("mems").unwrap(), DEGREE, 3);
     let turned = exp(Vector3::z() * (8.0 * DEGREE));
     let imu = &mut made.run.recording.imu;
-    for triad in [&mut imu.gyro, &mut imu.accel] {
+    for triad in [imu.gyro.to_mut(), imu.accel.to_mut()] {
         triad.iter_mut().for_each(|row| *row = turned * *row);
     }
     made.run

@@ -50,7 +50,8 @@ fn raw(run: &Run, sensor: Sensor, k: usize) -> [f64; 3] {
         Sensor::Gyro => &run.recording.imu.gyro,
         Sensor::Accel => &run.recording.imu.accel,
     };
-    samples[k]
+    samples
+        .at(k)
         .component_mul(&run.instrument.nominal.get(sensor).0)
         .into()
 }
@@ -365,7 +366,7 @@ fn nine_shapes_of_one_record_are_one_run_once_the_place_is_filled_in() {
         assert!(found.faults.is_empty(), "{name}: {:?}", found.faults);
         for sensor in Sensor::ALL {
             assert_eq!(found.of(sensor).len(), expected.of(sensor).len(), "{name}");
-            for (a, b) in found.of(sensor).iter().zip(expected.of(sensor)) {
+            for (a, b) in found.of(sensor).iter().zip(expected.of(sensor).iter()) {
                 assert!((a - b).norm() < 1e-7 * (b.norm() + 1e-3), "{name}: {a} {b}");
             }
             let scale = |run: &Run| run.instrument.nominal.get(sensor).0;

@@ -42,12 +42,14 @@ fn simulated(here: &Path) -> Vec<turncal::calibration::ParameterVector> {
             let mut rng = ChaCha8Rng::seed_from_u64(3);
             let more = Normal::new(0.0, sigma).unwrap();
             imu.gyro
+                .to_mut()
                 .iter_mut()
                 .for_each(|of| of.x += more.sample(&mut rng));
         }
         if unit == SCALED {
             let factor = Vector3::new(1.0, 1.0 + WRONG, 1.0);
             imu.gyro
+                .to_mut()
                 .iter_mut()
                 .for_each(|of| of.component_mul_assign(&factor));
         }

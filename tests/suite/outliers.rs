@@ -43,8 +43,8 @@ fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
     let variance = run.instrument.noise.accel.random_walk.powi(2) * 0.1
         + run.recording.imu.pulse.accel.powi(2) / 12.0;
     let velocity = direction(rng) * (SIZE * variance.sqrt());
-    run.recording.imu.accel[sample] += velocity;
-    run.recording.imu.accel[sample + 1] -= velocity;
+    run.recording.imu.accel.to_mut()[sample] += velocity;
+    run.recording.imu.accel.to_mut()[sample + 1] -= velocity;
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {

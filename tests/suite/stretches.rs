@@ -8,7 +8,7 @@ use turncal::calibration::{
     mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
-use turncal::recording::{Bridge, Recording, SampleError, Stretch, TableLog};
+use turncal::recording::{Bridge, Recording, SampleError, Series, Stretch, TableLog};
 use turncal::run::{Aiding, Run};
 use turncal::simulation::{Given, Scenario, Simulated};
 
@@ -76,8 +76,8 @@ fn broken(run: &Run, lost: &Range<usize>) -> Run {
     imu.stretches[0].samples.end = lost.start;
     imu.stretches.push(after);
     // Whatever lies there, nothing may look at it.
-    imu.gyro[lost.clone()].fill(Vector3::repeat(0.3));
-    imu.accel[lost.clone()].fill(Vector3::repeat(-7.0));
+    imu.gyro.to_mut()[lost.clone()].fill(Vector3::repeat(0.3));
+    imu.accel.to_mut()[lost.clone()].fill(Vector3::repeat(-7.0));
     run
 }
 
@@ -87,7 +87,7 @@ fn part(run: &Run, samples: Range<usize>) -> Run {
         name, imu, table, ..
     } = &run.recording;
     let (begin, end) = (imu.time(samples.start), imu.time(samples.end));
-    let of_part = |all: &[Vector3<f64>]| all[samples.clone()].to_vec();
+    let of_part = |all: &Series| all.part(samples.clone()).to_vec();
     let (gyro, accel) = (of_part(&imu.gyro), of_part(&imu.accel));
     let mut recording = Recording::from_samples(name, begin, imu.period, gyro, accel).unwrap();
     recording.imu.pulse = imu.pulse;
@@ -162,16 +162,13 @@ fn a_break_of_ten_seconds_in_a_move_costs_no_more_than_what_is_lost() {
     // The same samples with an error without bound, and no break: attitude and velocity after them are
     // as unknown, by another way through the filter.
     let mut bridged = run.clone();
-    let bridges = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let samples = lost.clone();
-        (0..3).map(move |axis| Bridge {
-            sensor,
-            axis,
-            samples: samples.clone(),
-            variance: [1.0, 1e4][sensor as usize],
-        })
+    let axes = Sensor::ALL
+        .into_iter()
+        .flat_map(|sensor| [0, 1, 2].map(|axis| (sensor, axis)));
+    let bridge = axes.fold(Bridge::new(lost.clone()), |bridge, (sensor, axis)| {
+        bridge.with(sensor, axis, [1.0, 1e4][sensor as usize])
     });
-    bridged.recording.imu.bridges = bridges.collect();
+    bridged.recording.imu.bridges = vec![bridge];
     let bridged = Problem::new(&bridged, &Options::default());
     let without = bound(&bridged, &truth, &terms).unwrap().estimate;
     let (_, change) = apart(&without, &least);

@@ -149,7 +149,7 @@ fn streams_of_one_clock_are_as_one() {
     let two = Run::read(&path).unwrap().recording.imu;
     assert_eq!(one.len(), two.len());
     let off = |sensor| {
-        let pairs = one.of(sensor).iter().zip(two.of(sensor));
+        let pairs = one.of(sensor).iter().zip(two.of(sensor).iter());
         pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
     };
     assert!(

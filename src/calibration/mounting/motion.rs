@@ -186,8 +186,8 @@ impl Legs<'_> {
         table: &TableLog,
         readings: Range<usize>,
     ) -> impl Iterator<Item = (usize, Matrix3<f64>)> {
-        let times = table.time.iter().zip(&table.attitude);
-        let times = times.skip(readings.start).take(readings.len());
+        let attitudes = &table.attitude[readings.clone()];
+        let times = table.time[readings].iter().zip(attitudes);
         times.map(|(&time, attitude)| {
             let edge = self.run.recording.imu.edge(time).round().max(0.0);
             (edge as usize, *attitude)
@@ -196,7 +196,7 @@ impl Legs<'_> {
 
     /// How far it turns in all, one way and the other, rad.
     fn way(&self, samples: Range<usize>) -> f64 {
-        let increments = self.run.recording.imu.gyro[samples].iter();
+        let increments = self.run.recording.imu.gyro.within(samples);
         increments
             .map(|increment| (increment - self.zero).norm())
             .sum()
@@ -204,7 +204,7 @@ impl Legs<'_> {
 
     fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>) -> Move {
         let increments = || {
-            let of = self.run.recording.imu.gyro[samples.clone()].iter();
+            let of = self.run.recording.imu.gyro.within(samples.clone());
             of.map(|increment| increment - self.zero)
         };
         let turned = |sign: f64| {

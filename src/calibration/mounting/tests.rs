@@ -34,8 +34,8 @@ fn mounted(run: &Run, orders: &PerSensor<AxisOrder>) -> Run {
     let mut run = run.clone();
     let imu = &mut run.recording.imu;
     for (sensor, samples) in [
-        (Sensor::Gyro, &mut imu.gyro),
-        (Sensor::Accel, &mut imu.accel),
+        (Sensor::Gyro, imu.gyro.to_mut()),
+        (Sensor::Accel, imu.accel.to_mut()),
     ] {
         for sample in samples {
             *sample = orders.get(sensor).apply(sample);
@@ -120,8 +120,8 @@ fn a_turn_of_both_triads_is_a_body_frame_but_left_handed_axes_are_none() {
 fn a_record_that_does_not_tell_says_nothing() {
     // One dwell of a MEMS instrument has neither a move nor an Earth rate.
     let mut run = without_table("mems");
-    run.recording.imu.gyro.truncate(3000);
-    run.recording.imu.accel.truncate(3000);
+    run.recording.imu.gyro.to_mut().truncate(3000);
+    run.recording.imu.accel.to_mut().truncate(3000);
     run.recording.imu.stretches[0].samples = 0..3000;
     for order in wrong() {
         assert_eq!(found(&mounted(&run, &pair(order, SOUND))), None);

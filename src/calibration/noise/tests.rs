@@ -57,7 +57,7 @@ fn attitude_noise_of_moves_is_found() {
     for pair in dwells.windows(2) {
         for k in pair[0].samples.end..pair[1].samples.start {
             let normal = Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng));
-            run.recording.imu.gyro[k] += normal * (density * period.sqrt());
+            run.recording.imu.gyro.to_mut()[k] += normal * (density * period.sqrt());
         }
     }
     let outcome = estimated(&run, NoisePolicy::Auto);

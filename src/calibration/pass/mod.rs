@@ -6,6 +6,7 @@ mod gate;
 mod local;
 mod measurement;
 mod mode;
+mod posteriors;
 mod result;
 mod segment;
 mod sensitivity;
@@ -22,6 +23,7 @@ pub(super) use filter::{
 };
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
+use posteriors::Posteriors;
 use result::Sums;
 pub use result::{Epoch, Own};
 pub(super) use result::{PassResult, Tried};
@@ -59,7 +61,7 @@ pub(super) fn pass_trying(
         filter: Filter::new(model, &errors).trying(tried),
         innovations: Vec::new(),
         history: Vec::new(),
-        posteriors: Vec::new(),
+        posteriors: Posteriors::default(),
         cost: 0.0,
         log_determinant: 0.0,
         attitudes: Vec::new(),
@@ -78,7 +80,7 @@ pub(super) fn pass_trying(
         let start = stretch.start(&known, &at.initial_attitudes[number]);
         begin(&mut sums.filter, model, before, stretch, &start, at);
         if before.is_none() {
-            sums.posteriors.push(sums.filter.constants());
+            sums.posteriors.begin(sums.filter.constants());
         }
         before = Some(stretch);
         let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;

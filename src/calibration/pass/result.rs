@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::earlier::Earlier;
 use super::filter::Filter;
+use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
 use crate::calibration::dwell_scatter::Posterior;
@@ -58,7 +59,7 @@ pub(in crate::calibration) struct PassResult {
     pub log_determinant: f64,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
-    /// What is known of the constants before the first dwell and after each.
+    /// What is known of the constants before the first dwell and after each, or each so many.
     pub posteriors: Vec<Posterior>,
     /// What auxiliary parameters that were tried would do to it.
     pub tried: Option<Tried>,
@@ -91,7 +92,7 @@ pub(super) struct Sums {
     pub filter: Filter,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
-    pub posteriors: Vec<Posterior>,
+    pub posteriors: Posteriors,
     pub cost: f64,
     pub log_determinant: f64,
     /// What is of each recording that has ended.
@@ -177,7 +178,7 @@ impl Sums {
             log_determinant: self.log_determinant,
             innovations: self.innovations,
             history: self.history,
-            posteriors: self.posteriors,
+            posteriors: self.posteriors.finish(),
             at: self.at,
             tried,
         }

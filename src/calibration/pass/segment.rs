@@ -52,8 +52,8 @@ pub(in crate::calibration) struct Seen {
     pub readings: usize,
 }
 
-/// Steps of a dwell that are taken in at once: 5 s of them, in which a body that is held by hand keeps its
-/// attitude, too.
+/// Steps of a dwell that are taken in at once, of the length of its first: 5 s of them, in which a body that is
+/// held by hand keeps its attitude, too.
 const STEPS: usize = 50;
 
 /// Where the linearisation follows the estimates, a part of a dwell is so many times as long as the one before:
@@ -71,8 +71,13 @@ pub(in crate::calibration) fn segments(
     });
     let mut rest: VecDeque<_> = of_dwell.collect();
     let mut length = if linearisation_held { STEPS } else { 1 };
+    let longest = STEPS * steps.first().map_or(0, |step| step.samples.len());
     std::iter::from_fn(move || {
-        let part = rest.drain(..length.min(rest.len())).collect::<Vec<_>>();
+        let begin = rest.front().map_or(0, |(step, _)| step.samples.start);
+        let within = |(step, _): &(&Step, _)| step.samples.end <= begin + longest;
+        let few = rest.iter().take(length).take_while(|&step| within(step));
+        let few = few.count().max(1).min(rest.len());
+        let part = rest.drain(..few).collect::<Vec<_>>();
         length = STEPS.min(GROWTH * length);
         (!part.is_empty()).then_some(part)
     })
@@ -107,7 +112,9 @@ impl Segment {
         let begin = navigator.state;
         let mut segment = Self {
             begin,
-            axes: steps.first().and_then(|(_, at_rest)| at_rest.axes.clone()),
+            axes: steps
+                .first()
+                .and_then(|(_, at_rest)| at_rest.dwell.axes.clone()),
             models: Vec::new(),
             steps: Vec::with_capacity(steps.len()),
         };

@@ -18,8 +18,10 @@ use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::schedule::{AtRest, Step};
 use crate::navigation::{Navigator, State, TermValues};
 
-/// Spacing of the history, s.
+/// Spacing of the history, s …
 const EPOCH: f64 = 1.0;
+/// … and how many there are of a recording at most.
+const EPOCHS: f64 = 3600.0;
 
 /// A pass within a stretch.
 pub(super) struct OneStretch<'a> {
@@ -129,14 +131,15 @@ impl<'a> OneStretch<'a> {
             }
         }
         let posterior = self.sums.filter.constants();
-        self.sums.posteriors.push(posterior);
+        self.sums.posteriors.after_dwell(posterior);
         Ok(done)
     }
 
     /// Keeps what is known at this time for the history.
     fn remember(&mut self, time: f64) {
         let last = self.sums.history.last();
-        if last.is_none_or(|last| (time - last.time).abs() >= EPOCH) {
+        let apart = EPOCH.max(self.stretch.run.recording.imu.duration() / EPOCHS);
+        if last.is_none_or(|last| (time - last.time).abs() >= apart) {
             let epoch = self.sums.epoch(time);
             self.sums.history.push(epoch);
         }
@@ -217,7 +220,7 @@ impl<'a> OneStretch<'a> {
             model: &problem.model,
             mode: self.mode,
             limit: problem.gate(),
-            dwell: sums.posteriors.len() - 1,
+            dwell: sums.posteriors.dwells(),
             memory: &mut self.gate,
             innovations: &mut sums.innovations,
             cost: &mut sums.cost,

@@ -84,7 +84,7 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
             super::super::parameters::to_vector(&solved.iterated.held.estimate.triads),
             solved.priors,
             solved.iterated.held.estimate.initial_attitudes.clone(),
-            solved.iterated.converged.then(|| Estimate {
+            solved.iterated.converged.then_some(Estimate {
                 triads: solved.iterated.held.estimate.triads,
                 covariance: solved.iterated.held.covariance,
             }),

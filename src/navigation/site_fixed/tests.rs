@@ -18,10 +18,10 @@ fn record() -> ImuSamples {
         PERIOD,
         (0..SAMPLES)
             .map(|k| Vector3::new(0.5, 0.3 * t(k), -0.2) * PERIOD)
-            .collect(),
+            .collect::<Vec<_>>(),
         (0..SAMPLES)
             .map(|k| Vector3::new(1.0, -2.0 * t(k), 9.6) * PERIOD)
-            .collect(),
+            .collect::<Vec<_>>(),
     )
 }
 
@@ -167,8 +167,8 @@ fn an_ideal_instrument_at_rest_stays_at_rest() {
     let attitude = exp(Vector3::new(0.4, -0.3, 1.0));
     let samples = 6000;
     let record = ImuSamples {
-        gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; samples],
-        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; samples],
+        gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; samples].into(),
+        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; samples].into(),
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
@@ -183,8 +183,8 @@ fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
     let site = site();
     let attitude = start().attitude;
     let record = ImuSamples {
-        gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; SAMPLES],
-        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES],
+        gyro: vec![attitude.tr_mul(&site.earth_rate_n()) * PERIOD; SAMPLES].into(),
+        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES].into(),
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
@@ -204,8 +204,8 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
     // At rest the mean force is exact, so but for the Earth's turn noise must compose: Q(0,2) = Φ Q(0,1) Φᵀ + Q(1,2).
     let site = site();
     let record = ImuSamples {
-        gyro: vec![Vector3::zeros(); SAMPLES],
-        accel: vec![-site.gravity_n() * PERIOD; SAMPLES],
+        gyro: vec![Vector3::zeros(); SAMPLES].into(),
+        accel: vec![-site.gravity_n() * PERIOD; SAMPLES].into(),
         ..record()
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
@@ -231,15 +231,13 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
 fn an_interpolated_axis_adds_its_error_along_that_axis() {
     let site = site();
     let attitude = start().attitude;
-    let bridge = |sensor, axis, samples| Bridge {
-        sensor,
-        axis,
-        samples,
-        variance: if sensor == Sensor::Gyro { 4e-8 } else { 9e-6 },
+    let bridge = |sensor, axis, samples| {
+        let variance = if sensor == Sensor::Gyro { 4e-8 } else { 9e-6 };
+        Bridge::new(samples).with(sensor, axis, variance)
     };
     let record = ImuSamples {
-        gyro: vec![Vector3::zeros(); SAMPLES],
-        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES],
+        gyro: vec![Vector3::zeros(); SAMPLES].into(),
+        accel: vec![attitude.tr_mul(&-site.gravity_n()) * PERIOD; SAMPLES].into(),
         bridges: vec![
             bridge(Sensor::Gyro, 1, 0..2),
             bridge(Sensor::Gyro, 1, 3..7),

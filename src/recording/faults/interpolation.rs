@@ -36,61 +36,75 @@ const UNTRIED: f64 = 2.0;
 /// σ within which two ways to fill a hole agree.
 const AGREE: f64 = 3.0;
 
-/// Fills these samples of an axis, which are not sound, as `sound` says of all. Gives the mean square
-/// of the error of their sum; none if it cannot be told, or if the hole is longer than `longest`.
-pub(super) fn fill(
-    axis: &mut [f64],
-    sound: &[bool],
-    hole: &Range<usize>,
-    longest: usize,
-) -> Option<f64> {
-    let sides = [
-        neighbours(sound, (0..hole.start).rev(), hole.len()),
-        neighbours(sound, hole.end..axis.len(), hole.len()),
-    ];
-    let both = sides.iter().all(|side| !side.is_empty());
-    let candidates: &[_] = if both { &CANDIDATES } else { &ONE_SIDED };
-    let mut best: Option<Trial> = None;
-    for &(degree, count) in candidates {
-        let enough = |side: &Vec<usize>| side.len() >= count || (!both && side.is_empty());
-        if hole.len() > longest || !sides.iter().all(enough) {
-            continue;
+/// The ways to fill samples that are not sound, whatever axis they are of.
+pub(super) struct Hole {
+    samples: Range<usize>,
+    /// The sound samples next to it.
+    ends: [Option<usize>; 2],
+    fills: Vec<Fill>,
+}
+
+impl Hole {
+    /// These samples, `sound` telling it of all; a hole longer than `longest` is not to be vouched for.
+    pub fn new(sound: &[bool], samples: Range<usize>, longest: usize) -> Self {
+        let sides = [
+            neighbours(sound, (0..samples.start).rev(), samples.len()),
+            neighbours(sound, samples.end..sound.len(), samples.len()),
+        ];
+        let both = sides.iter().all(|side| !side.is_empty());
+        let candidates: &[_] = match both {
+            true => &CANDIDATES,
+            false => &ONE_SIDED,
+        };
+        let fill = |&(degree, count): &(usize, usize)| {
+            let enough = |side: &Vec<usize>| side.len() >= count || (!both && side.is_empty());
+            let used = sides
+                .iter()
+                .flat_map(|side| side.iter().take(count).copied());
+            let possible = samples.len() <= longest && sides.iter().all(enough);
+            possible
+                .then(|| Fill::new(degree, used.collect(), samples.clone(), sound))
+                .flatten()
+        };
+        Self {
+            fills: candidates.iter().filter_map(fill).collect(),
+            ends: sides.each_ref().map(|side| side.first().copied()),
+            samples,
         }
-        let used = sides
-            .iter()
-            .flat_map(|side| side.iter().take(count).copied());
-        let Some(fill) = Fill::new(degree, used.collect(), hole.clone()) else {
-            continue;
-        };
-        let Some(variances) = fill.measured(axis, sound) else {
-            continue;
-        };
-        let sum = fill.sum(axis, 0);
-        let better = best.as_ref().is_none_or(|best| {
-            variances[0] < best.variances[0]
-                && (sum - best.sum).powi(2) <= AGREE * AGREE * best.variance()
-        });
-        if better {
-            best = Some(Trial {
-                fill,
-                sum,
-                variances,
+    }
+
+    /// Fills them on an axis. Gives the mean square of the error of their sum; none if it cannot be told.
+    pub fn fill(&self, axis: &mut [f64]) -> Option<f64> {
+        let mut best: Option<Trial> = None;
+        for fill in &self.fills {
+            let variances = fill.measured(axis);
+            let (sum, _) = fill.sum_and_change(axis, 0);
+            let better = best.as_ref().is_none_or(|best| {
+                variances[0] < best.variances[0]
+                    && (sum - best.sum).powi(2) <= AGREE * AGREE * best.variance()
             });
+            if better {
+                best = Some(Trial {
+                    fill,
+                    sum,
+                    variances,
+                });
+            }
         }
+        if let Some(best) = best {
+            best.fill.apply(axis);
+            return Some(best.variance());
+        }
+        // Nobody may integrate over these, but what is read there must not be wild.
+        let [before, after] = self.ends.map(|end| end.map(|k| axis[k]));
+        let from = before.or(after).unwrap_or(0.0);
+        let to = after.unwrap_or(from);
+        let steps = self.samples.len() as f64 + 1.0;
+        for (step, k) in self.samples.clone().enumerate() {
+            axis[k] = from + (to - from) * (step as f64 + 1.0) / steps;
+        }
+        None
     }
-    if let Some(best) = best {
-        best.fill.apply(axis);
-        return Some(best.variance());
-    }
-    // Nobody may integrate over these, but what is read there must not be wild.
-    let [before, after] = [&sides[0], &sides[1]].map(|side| side.first().map(|&k| axis[k]));
-    let from = before.or(after).unwrap_or(0.0);
-    let to = after.unwrap_or(from);
-    let steps = hole.len() as f64 + 1.0;
-    for (step, k) in hole.clone().enumerate() {
-        axis[k] = from + (to - from) * (step as f64 + 1.0) / steps;
-    }
-    None
 }
 
 /// The nearest sound samples, outwards.
@@ -103,14 +117,14 @@ fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize
 }
 
 /// A way to fill a hole that has been tried.
-struct Trial {
-    fill: Fill,
+struct Trial<'a> {
+    fill: &'a Fill,
     sum: f64,
     /// Mean square of the error, by one half of the intact stretches and by the other.
     variances: [f64; 2],
 }
 
-impl Trial {
+impl Trial<'_> {
     /// The least of many by the first half is too small by chance; the second half knows.
     fn variance(&self) -> f64 {
         self.variances[0].max(self.variances[1])
@@ -123,23 +137,42 @@ struct Fill {
     used: Vec<usize>,
     /// Of each neighbour in the sum over the hole.
     weights: Vec<f64>,
+    /// The same in the mean after the hole less that before it.
+    changes: Vec<f64>,
+    /// By how many samples later or earlier intact stretches near by are.
+    shifts: Vec<isize>,
     degree: usize,
     inverse: Matrix4<f64>,
     scale: f64,
 }
 
 impl Fill {
-    fn new(degree: usize, used: Vec<usize>, hole: Range<usize>) -> Option<Self> {
+    fn new(degree: usize, used: Vec<usize>, hole: Range<usize>, sound: &[bool]) -> Option<Self> {
         let first = hole.start.min(*used.iter().min()?);
         let last = hole.end.max(*used.iter().max()?);
         let mut fill = Self {
             hole,
             used,
             weights: Vec::new(),
+            changes: Vec::new(),
+            shifts: Vec::new(),
             degree,
             inverse: Matrix4::zeros(),
             scale: 2.0 / (last - first) as f64,
         };
+        fill.shifts = fill.intact(sound);
+        if fill.shifts.len() < FEWEST_TRIALS {
+            return None;
+        }
+        let after = |k: &usize| *k >= fill.hole.end;
+        let count_after = fill.used.iter().filter(|k| after(k)).count();
+        let counts = [fill.used.len() - count_after, count_after].map(|count| count as f64);
+        let change = |k: &usize| match (counts, after(k)) {
+            ([0.0, _] | [_, 0.0], _) => 0.0,
+            ([before, _], false) => -1.0 / before,
+            ([_, after], true) => 1.0 / after,
+        };
+        fill.changes = fill.used.iter().map(change).collect();
         let powers = fill.used.iter().map(|&k| fill.powers(k));
         let mut normal: Matrix4<f64> = powers.map(|x| x * x.transpose()).sum();
         // Powers beyond the degree stay out.
@@ -169,14 +202,6 @@ impl Fill {
         })
     }
 
-    /// Sum over the hole, `shift` samples later.
-    fn sum(&self, axis: &[f64], shift: isize) -> f64 {
-        let weighted = self.used.iter().zip(&self.weights);
-        weighted
-            .map(|(&k, weight)| weight * axis[k.wrapping_add_signed(shift)])
-            .sum()
-    }
-
     fn apply(&self, axis: &mut [f64]) {
         let moments: Vector4<f64> = self.used.iter().map(|&k| self.powers(k) * axis[k]).sum();
         let polynomial = self.inverse * moments;
@@ -185,8 +210,8 @@ impl Fill {
         }
     }
 
-    /// Mean square of the sum's error over intact stretches near by, every other and the rest.
-    fn measured(&self, axis: &[f64], sound: &[bool]) -> Option<[f64; 2]> {
+    /// By how much later the same samples are all sound, for so many places on either side as are tried.
+    fn intact(&self, sound: &[bool]) -> Vec<isize> {
         let intact = |shift: isize| {
             let mut needed = self.used.iter().copied().chain(self.hole.clone());
             needed.all(|k| {
@@ -197,49 +222,55 @@ impl Fill {
         let length = self.hole.len();
         let stride = length.div_ceil(2);
         let reach = (6 * (length + self.used.len()) + MOST) as isize;
-        let mut errors = Vec::with_capacity(2 * TRIALS);
-        let mut largest_change = 0f64;
-        for direction in [-1, 1] {
-            let shifts = (1..).map(|k: isize| k * stride as isize);
-            let shifts = shifts
-                .take_while(|&shift| shift <= reach)
-                .map(|shift| direction * shift)
+        let of_side = |direction: isize| {
+            let shifts = (1..).map(move |k: isize| k * stride as isize);
+            shifts
+                .take_while(move |&shift| shift <= reach)
+                .map(move |shift| direction * shift)
                 .filter(|&shift| intact(shift))
-                .take(TRIALS);
-            for shift in shifts {
-                let hole = self.hole.start.wrapping_add_signed(shift)
-                    ..self.hole.end.wrapping_add_signed(shift);
-                errors.push(self.sum(axis, shift) - axis[hole].iter().sum::<f64>());
-                largest_change = largest_change.max(self.change(axis, shift).abs());
-            }
+                .take(TRIALS)
+        };
+        of_side(-1).chain(of_side(1)).collect()
+    }
+
+    /// Mean square of the sum's error over intact stretches near by, every other and the rest.
+    fn measured(&self, axis: &[f64]) -> [f64; 2] {
+        let length = self.hole.len();
+        let mut squares = [0.0; 2];
+        let mut largest_change = 0f64;
+        for (number, &shift) in self.shifts.iter().enumerate() {
+            let hole = self.hole.start.wrapping_add_signed(shift)
+                ..self.hole.end.wrapping_add_signed(shift);
+            let (sum, change) = self.sum_and_change(axis, shift);
+            let error = sum - axis[hole].iter().sum::<f64>();
+            squares[number % 2] += error * error;
+            largest_change = largest_change.max(change.abs());
         }
         // A larger change than any tried may have come at any moment.
-        let change = self.change(axis, 0).abs();
+        let change = self.sum_and_change(axis, 0).1.abs();
         let sudden = if change > UNTRIED * largest_change {
             (change * length as f64).powi(2) / 12.0
         } else {
             0.0
         };
-        let mean_square = |first: usize| {
-            let half = errors.iter().skip(first).step_by(2);
-            let count = half.len() as f64;
-            f64::max(half.map(|error| error * error).sum::<f64>() / count, sudden)
+        let count = self.shifts.len();
+        let mean_square = |half: usize| {
+            let of_half = (count + 1 - half) / 2;
+            f64::max(squares[half] / of_half as f64, sudden)
         };
-        (errors.len() >= FEWEST_TRIALS).then(|| [mean_square(0), mean_square(1)])
+        [mean_square(0), mean_square(1)]
     }
 
-    /// Mean of the neighbours after less that of those before, `shift` samples later.
-    fn change(&self, axis: &[f64], shift: isize) -> f64 {
-        let mean = |after: bool| {
-            let side = self.used.iter().filter(|&&k| (k >= self.hole.end) == after);
-            let (count, sum) = side.fold((0.0, 0.0), |(count, sum), &k| {
-                (count + 1.0, sum + axis[k.wrapping_add_signed(shift)])
-            });
-            (count > 0.0).then_some(sum / count)
-        };
-        mean(true)
-            .zip(mean(false))
-            .map_or(0.0, |(after, before)| after - before)
+    /// Sum over the hole, and mean of the neighbours after less that of those before, `shift` samples later.
+    fn sum_and_change(&self, axis: &[f64], shift: isize) -> (f64, f64) {
+        let weights = self.weights.iter().zip(&self.changes);
+        let (mut sum, mut change) = (0.0, 0.0);
+        for (&k, (weight, of_change)) in self.used.iter().zip(weights) {
+            let value = axis[k.wrapping_add_signed(shift)];
+            sum += weight * value;
+            change += of_change * value;
+        }
+        (sum, change)
     }
 }
 
@@ -250,6 +281,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     const HOLES: usize = 300;
+
+    fn fill(axis: &mut [f64], sound: &[bool], hole: &Range<usize>) -> Option<f64> {
+        Hole::new(sound, hole.clone(), 1000).fill(axis)
+    }
 
     /// Mean square of the error over the mean variance stated, for holes of this length in a signal.
     fn consistency(signal: impl Fn(f64) -> f64, sigma: f64, length: usize) -> f64 {
@@ -265,7 +300,7 @@ mod tests {
             let mut axis = truth.clone();
             axis[hole.clone()].fill(f64::NAN);
             let sound: Vec<bool> = axis.iter().map(|value| !value.is_nan()).collect();
-            let variance = fill(&mut axis, &sound, &hole, 1000).unwrap();
+            let variance = fill(&mut axis, &sound, &hole).unwrap();
             let error: f64 = hole.clone().map(|k| axis[k] - truth[k]).sum();
             squares += error * error;
             variances += variance;
@@ -292,7 +327,7 @@ mod tests {
         let mut axis: Vec<f64> = (0..1000).map(truth).collect();
         axis[500] = f64::NAN;
         let sound: Vec<bool> = axis.iter().map(|value| !value.is_nan()).collect();
-        let variance = fill(&mut axis, &sound, &(500..501), 1000).unwrap();
+        let variance = fill(&mut axis, &sound, &(500..501)).unwrap();
         let error = axis[500] - truth(500);
         // Between two neighbours the parabola alone would leave 0.05.
         assert!(
@@ -309,7 +344,7 @@ mod tests {
             .collect();
         let truth: f64 = axis[500..600].iter().sum();
         let sound: Vec<bool> = (0..1000).map(|k| !(500..600).contains(&k)).collect();
-        let variance = fill(&mut axis, &sound, &(500..600), 1000).unwrap();
+        let variance = fill(&mut axis, &sound, &(500..600)).unwrap();
         let error = axis[500..600].iter().sum::<f64>() - truth;
         assert!(error.abs() > 250.0, "{error}");
         assert!(error * error < 4.0 * variance, "{error} {variance}");
@@ -320,7 +355,7 @@ mod tests {
         let mut axis: Vec<f64> = (0..1000).map(f64::from).collect();
         let sound: Vec<bool> = (0..1000).map(|k| !(500..600).contains(&k)).collect();
         axis[500..600].fill(1e9);
-        assert_eq!(fill(&mut axis, &sound, &(500..600), 99), None);
+        assert_eq!(Hole::new(&sound, 500..600, 99).fill(&mut axis), None);
         assert!((axis[550] - 550.0).abs() < 1e-9);
     }
 }

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::imu::Sensor;
+use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
 pub(crate) use notes::notes;
@@ -81,18 +81,49 @@ impl FaultKind {
     }
 }
 
-/// Samples of one axis that were interpolated.
+/// Samples that were interpolated on some axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bridge {
-    /// Which triad.
-    pub sensor: Sensor,
-    /// Body axis: right, front, up.
-    pub axis: usize,
     /// The samples.
     pub samples: Range<usize>,
-    /// Variance that interpolation adds to the integral of the normalised output over all of them,
-    /// rad² or (m/s)².
-    pub variance: f64,
+    /// Variance that interpolation adds to the integral of the normalised output over all of them, along each
+    /// body axis right, front, up, rad² or (m/s)².
+    pub variance: PerSensor<[f64; 3]>,
+    /// Which axes were interpolated.
+    pub axes: PerSensor<[bool; 3]>,
+}
+
+impl Bridge {
+    /// Of no axis yet.
+    pub fn new(samples: Range<usize>) -> Self {
+        Self {
+            samples,
+            variance: PerSensor::default(),
+            axes: PerSensor::default(),
+        }
+    }
+
+    /// The same of one axis more, with its variance.
+    pub fn with(mut self, sensor: Sensor, axis: usize, variance: f64) -> Self {
+        self.variance.get_mut(sensor)[axis] = variance;
+        self.axes.get_mut(sensor)[axis] = true;
+        self
+    }
+
+    /// Puts those of the same axes together, in order of time.
+    pub(crate) fn sort(bridges: &mut [Self]) {
+        let axes = |bridge: &Self| (bridge.axes.gyro, bridge.axes.accel);
+        bridges.sort_unstable_by_key(|bridge| (axes(bridge), bridge.samples.start));
+    }
+
+    /// The axes that were interpolated, each with its variance.
+    pub fn each(&self) -> impl Iterator<Item = (Sensor, usize, f64)> {
+        let all = Sensor::ALL
+            .into_iter()
+            .flat_map(|sensor| [0, 1, 2].map(|axis| (sensor, axis)));
+        all.filter(|&(sensor, axis)| self.axes.get(sensor)[axis])
+            .map(|(sensor, axis)| (sensor, axis, self.variance.get(sensor)[axis]))
+    }
 }
 
 impl ImuSamples {
@@ -101,12 +132,12 @@ impl ImuSamples {
         let mut rest = self.bridges.as_slice();
         let touched = std::iter::from_fn(move || {
             let first = rest.first()?;
-            let of_axis = |b: &Bridge| (b.sensor, b.axis) == (first.sensor, first.axis);
-            let (axis, others) = rest.split_at(rest.partition_point(of_axis));
+            let of_axes = |bridge: &Bridge| bridge.axes == first.axes;
+            let (alike, others) = rest.split_at(rest.partition_point(of_axes));
             rest = others;
-            let begin = axis.partition_point(|b| b.samples.end <= samples.start);
-            let touched = axis[begin..].partition_point(|b| b.samples.start < samples.end);
-            Some(&axis[begin..begin + touched])
+            let begin = alike.partition_point(|b| b.samples.end <= samples.start);
+            let touched = alike[begin..].partition_point(|b| b.samples.start < samples.end);
+            Some(&alike[begin..begin + touched])
         });
         touched.flatten().map(|bridge| {
             let Range { start, end } = bridge.samples;

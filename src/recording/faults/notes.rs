@@ -1,7 +1,5 @@
 //! Faults in words.
 
-use std::ops::Range;
-
 use super::{Fault, FaultKind};
 use crate::recording::ImuSamples;
 
@@ -42,14 +40,6 @@ pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
 }
 
 impl ImuSamples {
-    /// Whether some of these samples are not known.
-    pub fn is_lost(&self, samples: &Range<usize>) -> bool {
-        let lost = |fault: &Fault| {
-            !fault.bridged && fault.samples.start < samples.end && samples.start < fault.samples.end
-        };
-        self.faults.iter().any(lost)
-    }
-
     /// So many rows or samples, the columns of the latter, and what is wrong with them.
     fn what<'a>(
         &self,

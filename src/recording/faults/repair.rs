@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::impossible::Impossible;
-use super::interpolation::fill;
+use super::interpolation::Hole;
 use super::{Bridge, Fault, FaultKind, Found, find, ranges};
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
@@ -47,6 +47,21 @@ pub(crate) struct Repaired {
     pub bridges: Vec<Bridge>,
 }
 
+impl Repaired {
+    /// The samples of each fault and each bridge.
+    pub fn samples_mut(&mut self) -> impl Iterator<Item = &mut Range<usize>> {
+        let faults = self.faults.iter_mut().map(|fault| &mut fault.samples);
+        faults.chain(self.bridges.iter_mut().map(|bridge| &mut bridge.samples))
+    }
+
+    /// Whether no fault has this sample.
+    pub fn is_sound(&self, sample: usize) -> bool {
+        let concerns =
+            |fault: &Fault| fault.kind != FaultKind::Duplicate && fault.samples.contains(&sample);
+        !self.faults.iter().any(concerns)
+    }
+}
+
 fn sensor(column: usize) -> Sensor {
     Sensor::ALL[column / 3]
 }
@@ -83,62 +98,58 @@ impl Rows<'_> {
             (fault.kind as usize, axis, fault.samples.start)
         });
 
+        let Self {
+            columns,
+            numbers,
+            period,
+            body_axes,
+            units,
+            ..
+        } = self;
+        let mut columns = columns.map(|rows| placed(rows, &numbers));
         let mut bridges = Vec::new();
-        let (numbers, period) = (&self.numbers, self.period);
-        let columns = self.columns.into_iter().enumerate().map(|(k, rows)| {
-            let (sensor, axis) = (sensor(k), self.body_axes[k]);
-            let mut samples = placed(rows, numbers);
-            let concerned = |fault: &Fault| {
-                fault.kind != FaultKind::Duplicate
-                    && fault.axis.is_none_or(|of| of == (sensor, axis))
-            };
-            if !faults.iter().any(concerned) {
-                return samples;
-            }
-            let mut sound = vec![true; samples.len()];
-            for fault in faults.iter().filter(|fault| concerned(fault)) {
-                sound[fault.samples.clone()].fill(false);
-            }
-            let longest = (LONGEST / period) as usize;
+        let longest = (LONGEST / period) as usize;
+        for Holes { of, mut sound } in holes_of_columns(&faults, &body_axes, columns[0].len()) {
             let mut holes = ranges(sound.len(), |k| !sound[k]);
             holes.sort_by_key(Range::len);
             let mut filled = 0;
-            for (number, hole) in holes.iter().enumerate() {
+            for (number, samples) in holes.iter().enumerate() {
                 // Beside a long hole short ones, once filled, are as good as sound.
-                while filled < number && SHORT * holes[filled].len() <= hole.len() {
+                while filled < number && SHORT * holes[filled].len() <= samples.len() {
                     sound[holes[filled].clone()].fill(true);
                     filled += 1;
                 }
-                let variance = fill(&mut samples, &sound, hole, longest);
-                let variance = variance.map(|variance| variance * self.units[k].powi(2));
-                let linear =
-                    |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
-                match variance.filter(linear) {
-                    Some(variance) => bridges.push(Bridge {
-                        sensor,
-                        axis,
-                        samples: hole.clone(),
-                        variance,
-                    }),
-                    None => {
-                        let within = |fault: &&mut Fault| {
-                            concerned(fault)
-                                && fault.samples.start < hole.end
-                                && hole.start < fault.samples.end
-                        };
-                        faults
-                            .iter_mut()
-                            .filter(within)
-                            .for_each(|fault| fault.bridged = false);
+                let hole = Hole::new(&sound, samples.clone(), longest);
+                let mut bridge = Bridge::new(samples.clone());
+                for &k in &of {
+                    let (sensor, axis) = (sensor(k), body_axes[k]);
+                    let variance = hole.fill(&mut columns[k]);
+                    let variance = variance.map(|variance| variance * units[k].powi(2));
+                    let linear =
+                        |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
+                    match variance.filter(linear) {
+                        Some(variance) => bridge = bridge.with(sensor, axis, variance),
+                        None => {
+                            let within = |fault: &&mut Fault| {
+                                fault.concerns(sensor, axis)
+                                    && fault.samples.start < samples.end
+                                    && samples.start < fault.samples.end
+                            };
+                            faults
+                                .iter_mut()
+                                .filter(within)
+                                .for_each(|fault| fault.bridged = false);
+                        }
                     }
                 }
+                if bridge.each().next().is_some() {
+                    bridges.push(bridge);
+                }
             }
-            samples
-        });
-        let columns: Vec<_> = columns.collect();
-        bridges.sort_by_key(|b| (b.sensor as usize, b.axis, b.samples.start));
+        }
+        Bridge::sort(&mut bridges);
         Repaired {
-            columns: columns.try_into().unwrap_or_default(),
+            columns,
             faults,
             bridges,
         }
@@ -190,6 +201,39 @@ impl Rows<'_> {
             })
             .collect()
     }
+}
+
+impl Fault {
+    /// Whether it leaves samples of an axis unknown.
+    fn concerns(&self, sensor: Sensor, axis: usize) -> bool {
+        self.kind != FaultKind::Duplicate && self.axis.is_none_or(|of| of == (sensor, axis))
+    }
+}
+
+/// Columns with the same holes.
+struct Holes {
+    of: Vec<usize>,
+    sound: Vec<bool>,
+}
+
+/// Columns with holes, those with the same ones together: rows that are missing lack all of them.
+fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) -> Vec<Holes> {
+    let mut all: Vec<Holes> = Vec::new();
+    for (k, &axis) in body_axes.iter().enumerate() {
+        let concerned = |fault: &&Fault| fault.concerns(sensor(k), axis);
+        if !faults.iter().any(|fault| concerned(&fault)) {
+            continue;
+        }
+        let mut sound = vec![true; samples];
+        for fault in faults.iter().filter(concerned) {
+            sound[fault.samples.clone()].fill(false);
+        }
+        match all.iter_mut().find(|holes| holes.sound == sound) {
+            Some(holes) => holes.of.push(k),
+            None => all.push(Holes { of: vec![k], sound }),
+        }
+    }
+    all
 }
 
 /// Values of rows at their samples; between them anything.

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::super::plot::{Axis, Panel, Plot, Point, Series};
+use super::super::plot::{Axis, Panel, Plot, Point, Series, thinned};
 use super::report::Report;
 use crate::imu::AXES;
 use crate::recording::{ImuSamples, TableLog};
@@ -89,13 +89,13 @@ fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
 /// Mean rate of each sample about a body axis in degrees a second.
 fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
     let samples = imu.gyro.iter().enumerate();
-    let rate = |(k, angle): (usize, &nalgebra::Vector3<f64>)| {
+    let rate = |(k, angle): (usize, nalgebra::Vector3<f64>)| {
         (
             imu.time(k) + 0.5 * imu.period,
             angle[axis] / imu.period / DEGREE,
         )
     };
-    samples.map(rate).collect()
+    thinned(samples.map(rate))
 }
 
 #[cfg(test)]

@@ -256,9 +256,9 @@ fn residuals(outcome: &Outcome) -> Plot {
     let panel = |title: &str, x: Axis, of: &dyn Fn(usize) -> f64| {
         let mut panel = Panel::new(title, x, Axis::linear("")).with(Series::zero());
         for (axis, name) in names.into_iter().enumerate() {
-            let points = outcome.by_dwell().into_iter().filter_map(|(dwell, sums)| {
-                (of(dwell).is_finite()).then(|| (of(dwell), sums[axis]))
-            });
+            let sums = outcome.by_dwell().into_iter();
+            let known = sums.filter(|&(dwell, _)| of(dwell).is_finite());
+            let points = known.map(|(dwell, sums)| (of(dwell), sums[axis]));
             panel = panel.with(Series::marks(Mark::Ring, points).nth(axis).key(name));
         }
         panel

@@ -294,8 +294,8 @@ fn a_filter_that_saw_next_to_nothing_is_reported() {
             table.time.clear();
             table.attitude.clear();
         }
-        made_up.run.recording.imu.gyro.truncate(moments);
-        made_up.run.recording.imu.accel.truncate(moments);
+        made_up.run.recording.imu.gyro.to_mut().truncate(moments);
+        made_up.run.recording.imu.accel.to_mut().truncate(moments);
         let page = page(&made_up.report());
         assert!(!page.contains("NaN"));
         assert!(page.contains("NOT CONVERGED"));

@@ -52,8 +52,7 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
     let faults: Vec<f64> = faults.map(|fault| imu.time(fault.samples.start)).collect();
     let lowest = samples
         .iter()
-        .flat_map(|s| s.iter())
-        .fold(0.0, |low: f64, &x| low.min(x));
+        .fold(0.0, |low: f64, sample| low.min(sample.min()));
     let foot = lowest / imu.period / unit;
     let x = Axis::linear("time, s").between(imu.start(), imu.start() + imu.duration());
     let y = Axis::linear("").including([0.0]).room(0.1, 0.3);

@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn gyros_of_the_wrong_sign_or_unit_are_found_by_table_and_gravity() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        for sample in &mut run.recording.imu.gyro {
+        for sample in run.recording.imu.gyro.to_mut() {
             sample.x = -sample.x;
         }
         let said = terminal::text(&checked(&run), None);

@@ -2,11 +2,13 @@
 
 mod axis;
 mod series;
+mod thinned;
 
 use std::ops::Range;
 
 pub use axis::{Axis, Kind, Scale};
 pub use series::{Anchor, Color, Dash, Mark, Pen, Point, Series, Shape};
+pub(super) use thinned::thinned;
 
 /// A figure with its file, heading and caption.
 #[derive(Debug, Clone, PartialEq)]

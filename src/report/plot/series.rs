@@ -1,5 +1,7 @@
 //! What is drawn into a panel.
 
+use super::thinned::thinned;
+
 /// Abscissa and ordinate. A line is interrupted where one of them is not a number.
 pub type Point = (f64, f64);
 
@@ -166,9 +168,9 @@ impl Series {
         }
     }
 
-    /// Points joined in order.
+    /// Points joined in order; of very many the lowest and highest.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
-        Self::new(Shape::Line(points.into_iter().collect()))
+        Self::new(Shape::Line(thinned(points)))
     }
 
     /// The area between two lines.

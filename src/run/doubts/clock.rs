@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector3;
-
 use crate::attitude::log;
 use crate::earth::ROTATION_RATE;
 use crate::recording::{TableLog, nanoseconds};
@@ -205,7 +203,7 @@ fn of_samples(run: &Run, table: &TableLog, samples: Range<usize>) -> Option<Move
     let by_gyros = starts.map(|start| {
         let part = start..(start + length).min(samples.end);
         let duration = part.len() as f64 * imu.period;
-        let sum: Vector3<f64> = imu.gyro[part.clone()].iter().sum();
+        let sum = imu.gyro.sum(part.clone());
         let time = imu.time(part.start) + 0.5 * duration;
         (time, duration, (sum - prior.bias * duration).norm())
     });
@@ -237,7 +235,7 @@ mod tests {
     fn lose(run: &mut Run, lost: impl Fn(usize) -> bool) {
         let imu = &mut run.recording.imu;
         let count = imu.len();
-        for triad in [&mut imu.gyro, &mut imu.accel] {
+        for triad in [imu.gyro.to_mut(), imu.accel.to_mut()] {
             let mut number = 0..count;
             triad.retain(|_| !lost(number.next().unwrap()));
         }

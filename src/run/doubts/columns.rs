@@ -1,8 +1,7 @@
 //! Columns that no instrument gives.
 
-use nalgebra::Vector3;
-
 use crate::imu::{AXES, Sensor};
+use crate::recording::Series;
 use crate::run::Run;
 
 /// Axes that give the same as another in every row.
@@ -25,8 +24,9 @@ pub(super) fn columns(run: &Run) -> Option<String> {
     })
 }
 
-fn alike(rows: &[Vector3<f64>]) -> Vec<[char; 2]> {
-    let changes = |axis: usize| rows.windows(2).any(|pair| pair[0][axis] != pair[1][axis]);
+fn alike(rows: &Series) -> Vec<[char; 2]> {
+    let first = rows.at(0);
+    let changes = |axis: usize| rows.iter().any(|row| row[axis] != first[axis]);
     let same = |one: usize, other: usize| rows.iter().all(|row| row[one].abs() == row[other].abs());
     let pairs = [[0, 1], [0, 2], [1, 2]].into_iter();
     let alike = pairs.filter(|&[one, other]| changes(one) && same(one, other));
@@ -43,8 +43,8 @@ mod tests {
         let mut run = Scenario::load("mems").unwrap().simulate(1, 0).unwrap().run;
         assert_eq!(columns(&run), None);
         let imu = &mut run.recording.imu;
-        imu.gyro.iter_mut().for_each(|row| row.x = -row.y);
-        imu.accel.iter_mut().for_each(|row| *row *= 0.0);
+        imu.gyro.to_mut().iter_mut().for_each(|row| row.x = -row.y);
+        imu.accel.to_mut().iter_mut().for_each(|row| *row *= 0.0);
         let said = columns(&run).unwrap();
         assert!(said.contains("every row: gyro x and gyro y."), "{said}");
     }

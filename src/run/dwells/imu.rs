@@ -119,8 +119,8 @@ impl Run {
     fn windows(&self, sensor: Sensor, length: usize) -> Windows {
         let samples = self.recording.imu.of(sensor);
         let duration = length as f64 * self.recording.imu.period;
-        let mean = |samples: &[Vector3<f64>]| samples.iter().sum::<Vector3<f64>>() / duration;
-        let mut means: Vec<_> = samples.chunks_exact(length).map(mean).collect();
+        let sums = samples.sums(0..samples.len(), length);
+        let mut means: Vec<_> = sums.map(|sum| sum / duration).collect();
         for missing in self.recording.imu.missing() {
             let windows = missing.start / length..missing.end.div_ceil(length).min(means.len());
             means[windows].fill(Vector3::repeat(f64::NAN));

@@ -260,8 +260,8 @@ fn verdict(run: &Run, rests: &[Rest], standstills: &[Dwell], segment: &Segment) 
 
 /// Sum of the gyros over some samples, rad.
 fn angle(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Vector3<f64> {
-    let section = &run.recording.imu.gyro[samples];
-    section.iter().sum::<Vector3<f64>>() - zero * (section.len() as f64 * run.recording.imu.period)
+    let imu = &run.recording.imu;
+    imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
 }
 
 /// Some samples and those between them and the rests before and after.

@@ -51,9 +51,9 @@ impl Turn {
         let length = ((STEP / period).round() as usize).max(1);
         let mut attitude = Matrix3::identity();
         let (mut sum, mut way, mut fastest) = (Vector3::zeros(), 0.0, 0.0f64);
-        for step in run.recording.imu.gyro[samples.clone()].chunks(length) {
+        for step in run.recording.imu.gyro.parts(samples.clone(), length) {
             let turned = step.iter().sum::<Vector3<f64>>() - zero * (step.len() as f64 * period);
-            for increment in step {
+            for increment in step.iter() {
                 attitude *= exp(increment - zero * period);
             }
             sum += turned;

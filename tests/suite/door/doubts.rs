@@ -126,9 +126,9 @@ fn rows_of_zeros_and_values_beyond_any_instrument_are_found_and_bridged() {
     ] {
         assert!(of(kind).all(|fault| fault.bridged));
         // Interpolated, not zero and not four billion.
-        let off = imu.accel[sample] - sound.accel[sample];
-        assert!(off.norm() < 1e-3 * sound.accel[sample].norm(), "{off}");
-        assert!(imu.gyro[sample].norm() < 0.1);
+        let off = imu.accel.at(sample) - sound.accel.at(sample);
+        assert!(off.norm() < 1e-3 * sound.accel.at(sample).norm(), "{off}");
+        assert!(imu.gyro.at(sample).norm() < 0.1);
     }
 }
 

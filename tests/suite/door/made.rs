@@ -14,7 +14,7 @@ pub fn made_run(name: &str) -> Run {
     let gyro = (0..300).map(|k| Vector3::new(1.0, -2.0, 0.01) * 1e-3 * f64::from(k).sin());
     let accel =
         (0..300).map(|k| Vector3::new(0.1, -0.02, 9.8) / 128.0 * (1.0 + 1e-3 * f64::from(k)));
-    let (gyro, accel) = (gyro.collect(), accel.collect());
+    let (gyro, accel): (Vec<_>, Vec<_>) = (gyro.collect(), accel.collect());
     let samples = Recording::from_samples(name, 3.25, 1.0 / 128.0, gyro, accel).unwrap();
     let recording = Recording {
         meta: [("serial", "A \"7\""), ("notes", "two\nlines")]
@@ -173,11 +173,17 @@ pub fn assert_same(a: &Run, b: &Run) {
         near3(prior_a.bias, prior_b.bias);
         near3(prior_a.bias_sigma, prior_b.bias_sigma);
     }
-    for (a, b) in a.recording.imu.gyro.iter().zip(&b.recording.imu.gyro) {
-        near3(*a, *b);
+    for (a, b) in a.recording.imu.gyro.iter().zip(b.recording.imu.gyro.iter()) {
+        near3(a, b);
     }
-    for (a, b) in a.recording.imu.accel.iter().zip(&b.recording.imu.accel) {
-        near3(*a, *b);
+    for (a, b) in a
+        .recording
+        .imu
+        .accel
+        .iter()
+        .zip(b.recording.imu.accel.iter())
+    {
+        near3(a, b);
     }
     assert_eq!(a.recording.table.is_some(), b.recording.table.is_some());
     if let (Some(log_a), Some(log_b)) = (&a.recording.table, &b.recording.table) {

@@ -54,7 +54,7 @@ fn reread(change: impl Fn(&str) -> String, imu: impl Fn(usize, [f64; 7]) -> Stri
     fs::write(place.join("run.toml"), change(&text)).unwrap();
     let mut rows = "t,gx,gy,gz,ax,ay,az,temp\n".to_owned();
     for k in 0..run.recording.imu.len() {
-        let (g, a) = (run.recording.imu.gyro[k], run.recording.imu.accel[k]);
+        let (g, a) = (run.recording.imu.gyro.at(k), run.recording.imu.accel.at(k));
         rows += &imu(k, [run.recording.imu.time(k), g.x, g.y, g.z, a.x, a.y, a.z]);
         rows += ",25.0\n";
     }

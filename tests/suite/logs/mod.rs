@@ -120,7 +120,7 @@ fn every_format_gives_the_samples_of_the_text() {
         // 24 bits of the largest value, times the sample's length.
         let limit = if SHORT.contains(&format) { 4e-8 } else { 1e-12 };
         for sensor in Sensor::ALL {
-            let pairs = expected.of(sensor).iter().zip(imu.of(sensor));
+            let pairs = expected.of(sensor).iter().zip(imu.of(sensor).iter());
             let off = pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
             assert!(off < limit, "{format}: {} off by {off}", sensor.name());
         }
@@ -394,7 +394,7 @@ fn a_phones_two_files_are_drafted_as_one_run() {
     let expected = read(directory.path()).recording.imu;
     assert_eq!(found.len(), expected.len());
     for sensor in Sensor::ALL {
-        let pairs = expected.of(sensor).iter().zip(found.of(sensor));
+        let pairs = expected.of(sensor).iter().zip(found.of(sensor).iter());
         let off = pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(off < 1e-9, "{}: {off}", sensor.name());
     }

@@ -1,0 +1,67 @@
+//! Samples of both triads near the one that is looked at.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::ImuSamples;
+use crate::imu::PerSensor;
+
+/// Samples that are unpacked ahead.
+const AHEAD: usize = 1024;
+
+/// Samples of a record about one place, which moves on; where the record is not packed, all of them.
+#[derive(Debug, Clone)]
+pub(crate) struct Near<'a> {
+    imu: &'a ImuSamples,
+    first: usize,
+    triads: PerSensor<Cow<'a, [Vector3<f64>]>>,
+}
+
+impl<'a> Near<'a> {
+    /// At the begin of a record.
+    pub fn new(imu: &'a ImuSamples) -> Self {
+        let mut near = Self {
+            imu,
+            first: 0,
+            triads: PerSensor {
+                gyro: Cow::Borrowed(&[]),
+                accel: Cow::Borrowed(&[]),
+            },
+        };
+        let many = match imu.is_packed() {
+            true => 0,
+            false => imu.len(),
+        };
+        near.load(0..many);
+        near
+    }
+
+    /// Goes to where these samples are, which the next ones follow.
+    #[inline]
+    pub fn reach(&mut self, samples: &Range<usize>) {
+        let end = samples.end.min(self.imu.len());
+        if samples.start < self.first || end > self.first + self.triads.gyro.len() {
+            self.load(samples.start..end.max(samples.start + AHEAD));
+        }
+    }
+
+    fn load(&mut self, samples: Range<usize>) {
+        self.first = samples.start;
+        self.triads = PerSensor {
+            gyro: self.imu.gyro.part(samples.clone()),
+            accel: self.imu.accel.part(samples),
+        };
+    }
+
+    /// Increments of both triads in a sample that is reached.
+    #[inline]
+    pub fn at(&self, k: usize) -> PerSensor<Vector3<f64>> {
+        let PerSensor { gyro, accel } = &self.triads;
+        PerSensor {
+            gyro: gyro[k - self.first],
+            accel: accel[k - self.first],
+        }
+    }
+}
