@@ -1,14 +1,15 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
 mod back;
+mod operation;
 mod propagation;
 mod standing;
 mod tape;
 mod update;
 
 pub(in crate::calibration) use back::{Effect, Followed, Told};
+pub(in crate::calibration) use operation::{Driver, Operation};
 pub(in crate::calibration) use standing::{Innovations, Observer, Taken, Verdict};
-pub(in crate::calibration) use tape::{Driver, Operation};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

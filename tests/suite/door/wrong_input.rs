@@ -468,7 +468,7 @@ fn each_wrong_calibration_has_its_message() {
     fs::write(&path, &good).unwrap();
     assert!(Calibration::read(&path).is_ok());
     for (from, to, words) in [
-        ("tion/1", "tion/2", "calibration/2"),
+        ("tion/1", "tion/3", "calibration/3"),
         ("\"accel\":", "\"axel\":", "missing field `accel` & line"),
         (
             "\"gyro\":{\"scale\":[1,1,1]",

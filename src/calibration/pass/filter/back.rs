@@ -7,8 +7,8 @@
 
 use super::super::local::{Given, Local, Look, StepModel, roots};
 use super::super::segment::{Seen, Segment};
+use super::operation::{Driver, Operation};
 use super::standing::{Done, Observer, Taken, begins};
-use super::tape::{Driver, Operation};
 use super::{ATTITUDE, Filter, NAVIGATION};
 use crate::calibration::parameters::PARAMETERS;
 use crate::navigation::Block;

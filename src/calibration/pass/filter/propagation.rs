@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::Filter;
-use super::tape::Operation;
+use super::operation::Operation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::imu::{PerSensor, Sensor};

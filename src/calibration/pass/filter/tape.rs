@@ -1,66 +1,13 @@
 //! What a filter does to its errors, one operation after the other: enough to follow an error of its
 //! estimate back to where it comes from.
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::DMatrix;
 
 use super::Filter;
+use super::operation::{Driver, Operation};
 use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::imu::{PerSensor, Sensor};
 use crate::navigation::{Block, ProcessNoise};
-
-/// What is done to errors, true − estimated.
-#[derive(Debug, Clone)]
-pub(in crate::calibration) enum Operation {
-    /// One error with this 1σ is drawn anew, the same in all of these states.
-    Drawn { states: Vec<usize>, sigma: f64 },
-    /// Three errors from a first on become more by the attitude error times a matrix.
-    Turned { first: usize, by: Matrix3<f64> },
-    /// An error is forgotten but for a part, and driven by noise of this variance.
-    Varied {
-        state: usize,
-        keep: f64,
-        variance: f64,
-    },
-    /// A scalar of this row and variance of noise is taken in by this gain.
-    Taken {
-        row: Vec<f64>,
-        gain: Vec<f64>,
-        variance: f64,
-    },
-    /// The states that move (rows, in order) become these combinations of the first states (columns).
-    Carried {
-        moving: Vec<usize>,
-        transition: DMatrix<f64>,
-    },
-}
-
-/// Noise that drives errors, by what makes it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::calibration) enum Driver {
-    /// Random walk of a triad.
-    White(Sensor),
-    /// What moves add to it.
-    Moves(Sensor),
-    /// A bias that varies.
-    Wander(Sensor),
-    /// The turn at rest.
-    Turning,
-    /// Samples that were interpolated.
-    Interpolated,
-}
-
-impl Driver {
-    pub const ALL: [Self; 8] = [
-        Self::White(Sensor::Gyro),
-        Self::White(Sensor::Accel),
-        Self::Moves(Sensor::Gyro),
-        Self::Moves(Sensor::Accel),
-        Self::Wander(Sensor::Gyro),
-        Self::Wander(Sensor::Accel),
-        Self::Turning,
-        Self::Interpolated,
-    ];
-}
 
 impl Filter {
     /// Begins to keep what is done to the errors.

@@ -2,7 +2,7 @@
 
 use super::super::measurement::{Measurement, ScalarInnovation};
 use super::Filter;
-use super::tape::Operation;
+use super::operation::Operation;
 
 impl Filter {
     /// Takes in a measurement, one scalar after the other.
