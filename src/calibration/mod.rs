@@ -6,6 +6,7 @@
 
 mod alone;
 mod at_rest;
+mod at_temperature;
 mod attempt;
 mod auxiliary;
 mod batch;
@@ -58,6 +59,7 @@ mod unexplained;
 
 pub use alone::Alone;
 pub use at_rest::{AtRest, AxisAtRest, Second};
+pub use at_temperature::TemperatureError;
 pub use attempt::Progress;
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
@@ -107,6 +109,6 @@ pub use solution::{Assessment, Solution};
 pub use thermal::{Coefficient, Thermal};
 pub use thermal_record::{
     CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
-    TemperatureError, ThermalRecord, ValueRecord,
+    ThermalRecord, ValueRecord,
 };
 pub use together::{Repeatability, TemperatureOptions, Together};

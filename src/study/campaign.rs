@@ -19,7 +19,7 @@ use crate::simulation::{Simulated, SimulatedCampaign, ThermalTruth};
 pub struct CampaignStudy {
     /// What is simulated.
     pub campaign: SimulatedCampaign,
-    /// The filter's installation form; σ are those of the general form where it is another.
+    /// The filter's installation form, to which the truth is brought.
     pub form: InstallationForm,
     /// Which noise the filter uses.
     pub noise: NoisePolicy,
