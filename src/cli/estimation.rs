@@ -152,6 +152,12 @@ impl Estimation {
         runs: &[&'a Run],
         together: &Together,
     ) -> anyhow::Result<Problem<'a>> {
+        if matches!(self.method, Method::SixPosition) {
+            anyhow::bail!(
+                "--method six-position: the closed form is of one recording at one temperature; leave it out, or \
+                 calibrate each run by itself"
+            );
+        }
         let mut problem = Problem::together(runs, &self.options(), together)?;
         for term in &self.with {
             term.switch_on(&mut problem)?;

@@ -11,7 +11,6 @@ use super::super::estimate::Estimate;
 use super::super::model::Model;
 use super::super::parameters::parameter;
 use super::super::problem::Problem;
-use super::solved;
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange};
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
@@ -145,4 +144,12 @@ pub(super) fn through(
         solution[k] *= sigma(k);
     }
     solution
+}
+
+/// A solution of normal equations that are positive definite by their prior; zero if not.
+fn solved(normal: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    let n = right.len();
+    normal
+        .cholesky()
+        .map_or_else(|| DVector::zeros(n), |factor| factor.solve(right))
 }

@@ -12,8 +12,6 @@ mod temperatures;
 
 use std::sync::Arc;
 
-use nalgebra::DVector;
-
 use super::alone::Alone;
 use super::attempt::Progress;
 use super::error::CalibrationError;
@@ -25,12 +23,10 @@ use super::outcome::Pass;
 use super::parameters::{ParameterVector, parameter};
 use super::pass::Gate;
 use super::problem::{Problem, Stretch};
-use crate::imu::{
-    HIGHEST_ORDER, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, RATE, Sensor,
-    ThermalCoefficients, ThermalModel, ThermalRange, Triad,
-};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::Run;
 pub use repeat::Repeatability;
+pub use temperatures::TemperatureOptions;
 use temperatures::Temperatures;
 
 /// What recordings of one instrument have in common, and what not.
@@ -51,31 +47,6 @@ impl Default for Together {
         }
     }
 }
-
-/// How parameters follow temperature.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TemperatureOptions {
-    /// Highest order of the polynomials that is tried, at most [`HIGHEST_ORDER`].
-    pub highest_order: usize,
-    /// Whether biases may follow the rate of temperature, too.
-    pub rate: bool,
-    /// At which parameters are stated, °C; none: in the middle of the range.
-    pub reference: Option<f64>,
-}
-
-impl Default for TemperatureOptions {
-    fn default() -> Self {
-        Self {
-            highest_order: 3,
-            rate: true,
-            reference: None,
-        }
-    }
-}
-
-/// What a parameter may change by within the range, in σ of what is known of it beforehand: more than an
-/// instrument of its grade, so that the data decide.
-const CHANGE: f64 = 3.0;
 
 impl<'a> Problem<'a> {
     /// The problem that recordings of one instrument pose together. The first one's instrument and table stand for
@@ -201,41 +172,4 @@ fn start(problem: &Problem, alone: &[Alone]) -> Linearisation {
     }
     at.triads = super::parameters::from_vector(model.form, &common);
     at
-}
-
-/// 1σ of a triad's coefficients before the recordings, of polynomials up to an order.
-fn prior_sigma(problem: &Problem, sensor: Sensor, order: usize, rate: bool) -> ThermalCoefficients {
-    let model = &problem.model;
-    ThermalCoefficients::from_fn(|of_triad, function| {
-        let on = match function {
-            RATE => rate && Triad::kind(of_triad) == ParameterKind::Bias,
-            _ => function < order.min(HIGHEST_ORDER),
-        };
-        let sigma = model.prior_sigma[parameter(sensor, of_triad)];
-        if on { CHANGE * sigma } else { 0.0 }
-    })
-}
-
-/// The model of polynomials up to an order in these ranges.
-fn model_of(
-    problem: &Problem,
-    range: PerSensor<ThermalRange>,
-    order: PerSensor<usize>,
-    rate: bool,
-) -> ThermalModel {
-    ThermalModel {
-        sigma: PerSensor::from_fn(|sensor| {
-            let changes = range.get(sensor).largest_rate > 0.0;
-            prior_sigma(problem, sensor, *order.get(sensor), rate && changes)
-        }),
-        range,
-    }
-}
-
-/// A solution of normal equations that are positive definite by their prior; zero if not.
-fn solved(normal: nalgebra::DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    let n = right.len();
-    normal
-        .cholesky()
-        .map_or_else(|| DVector::zeros(n), |factor| factor.solve(right))
 }

@@ -1,12 +1,40 @@
 //! The temperatures of recordings: range, and how many of them are distinct.
 
 use super::super::error::CalibrationError;
+use super::super::parameters::parameter;
 use super::super::problem::Problem;
-use super::{TemperatureOptions, model_of};
-use crate::imu::{HIGHEST_ORDER, PerSensor, Sensor, ThermalModel, ThermalRange};
+use crate::imu::{
+    HIGHEST_ORDER, ParameterKind, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalModel,
+    ThermalRange, Triad,
+};
 
 /// Recordings within this many kelvin are at one temperature: what a soaked instrument changes by itself.
 const ONE_TEMPERATURE: f64 = 1.0;
+
+/// What a parameter may change by within the range, in σ of what is known of it beforehand: more than an
+/// instrument of its grade, so that the data decide.
+const CHANGE: f64 = 3.0;
+
+/// How parameters follow temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemperatureOptions {
+    /// Highest order of the polynomials that is tried, at most [`HIGHEST_ORDER`].
+    pub highest_order: usize,
+    /// Whether biases may follow the rate of temperature, too.
+    pub rate: bool,
+    /// At which parameters are stated, °C; none: in the middle of the range.
+    pub reference: Option<f64>,
+}
+
+impl Default for TemperatureOptions {
+    fn default() -> Self {
+        Self {
+            highest_order: 3,
+            rate: true,
+            reference: None,
+        }
+    }
+}
 
 /// Temperatures that a problem's dwells were at.
 pub(super) struct Temperatures {
@@ -94,5 +122,34 @@ impl Temperatures {
             }
         }
         count
+    }
+}
+
+/// 1σ of a triad's coefficients before the recordings, of polynomials up to an order.
+fn prior_sigma(problem: &Problem, sensor: Sensor, order: usize, rate: bool) -> ThermalCoefficients {
+    let model = &problem.model;
+    ThermalCoefficients::from_fn(|of_triad, function| {
+        let on = match function {
+            RATE => rate && Triad::kind(of_triad) == ParameterKind::Bias,
+            _ => function < order.min(HIGHEST_ORDER),
+        };
+        let sigma = model.prior_sigma[parameter(sensor, of_triad)];
+        if on { CHANGE * sigma } else { 0.0 }
+    })
+}
+
+/// The model of polynomials up to an order in these ranges.
+fn model_of(
+    problem: &Problem,
+    range: PerSensor<ThermalRange>,
+    order: PerSensor<usize>,
+    rate: bool,
+) -> ThermalModel {
+    ThermalModel {
+        sigma: PerSensor::from_fn(|sensor| {
+            let changes = range.get(sensor).largest_rate > 0.0;
+            prior_sigma(problem, sensor, *order.get(sensor), rate && changes)
+        }),
+        range,
     }
 }
