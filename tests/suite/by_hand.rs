@@ -101,6 +101,7 @@ fn static_sections_laid_end_to_end_show_accelerometers_and_name_what_gyros_hide(
 }
 
 #[test]
+#[ignore = "slow: several calibrations"]
 fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
     let Some(directory) = shared("real-mems-six-position") else {
         return;

@@ -76,6 +76,7 @@ fn recovered_as_well_as_sigma_says(runs: u64) {
 }
 
 #[test]
+#[ignore = "slow: several calibrations"]
 fn each_term_is_recovered_as_well_as_its_sigma_says() {
     recovered_as_well_as_sigma_says(2);
 }
