@@ -1,6 +1,7 @@
 //! A document as a PDF/A-3 file: facts, tables and texts on A4 pages, with files attached.
 
 mod font;
+mod frame;
 mod layout;
 
 use krilla::Document as Pdf;
@@ -15,29 +16,8 @@ use krilla::paint::{Fill, Stroke};
 
 use super::document::Document;
 use font::Fonts;
+pub use frame::{Frame, PdfError};
 use layout::{Drawn, HEIGHT, Layout, WIDTH};
-
-/// A document that could not be made a PDF.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum PdfError {
-    /// A character has no glyph.
-    #[error(
-        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic: the fonts of the \
-         certificate have no other. Write it in those."
-    )]
-    NoGlyph {
-        /// The character.
-        character: char,
-        /// Where it stands.
-        text: String,
-    },
-    /// The file would not be what the standard asks for.
-    #[error("the certificate cannot be written as PDF/A-3: {reason}")]
-    Standard {
-        /// What is in the way.
-        reason: String,
-    },
-}
 
 /// A file in a PDF.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -52,23 +32,6 @@ pub struct Attached {
     pub alternative: bool,
     /// What is in it.
     pub bytes: Vec<u8>,
-}
-
-/// What stands on every page, and what the file says of itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Frame {
-    /// Upper left.
-    pub left: String,
-    /// Upper right.
-    pub right: String,
-    /// At the foot, before the page's number.
-    pub foot: String,
-    /// Below the last line.
-    pub end: String,
-    /// Author in the metadata.
-    pub author: String,
-    /// Year, month and day of the metadata.
-    pub day: (u16, u8, u8),
 }
 
 /// The bytes of a PDF/A-3 file; the same for the same document.

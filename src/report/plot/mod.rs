@@ -1,6 +1,7 @@
 //! A plot as a value: panels with axes and series, or a matrix. It knows nothing of where it is drawn.
 
 mod axis;
+mod point;
 mod series;
 mod thinned;
 

@@ -2,8 +2,7 @@
 
 use super::thinned::thinned;
 
-/// Abscissa and ordinate. A line is interrupted where one of them is not a number.
-pub type Point = (f64, f64);
+pub use super::point::Point;
 
 /// Something drawn with one pen.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! Lines of more points than any drawing shows.
 
-use super::series::Point;
+use super::point::Point;
 
 /// Points that a line keeps at most; a panel is a hundredth as wide in pixels.
 const MOST: usize = 1 << 17;
