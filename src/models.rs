@@ -138,7 +138,14 @@ embed!(
     "warming",
     "warming-mems",
 );
-embed!(CAMPAIGN, "campaign", "days", "five-soaks", "ramp");
+embed!(
+    CAMPAIGN,
+    "campaign",
+    "days",
+    "five-soaks",
+    "mountings",
+    "ramp"
+);
 embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
 
 /// Why a model cannot be had.

@@ -16,7 +16,7 @@ use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, RATE, Sensor,
     ThermalCoefficients, ThermalModel, ThermalRange, ThermalValues, Triad, TriadVector,
 };
-use crate::recording::TEMPERATURE_SPACING;
+use crate::recording::{TEMPERATURE_SPACING, Temperature};
 use crate::run::Run;
 
 /// Blocks that are left out in turn: every other one.
@@ -85,15 +85,7 @@ impl AtRest {
         let imu = &run.recording.imu;
         let temperature = imu.temperature.as_ref()?;
         let length = ((TEMPERATURE_SPACING / imu.period).round() as usize).max(1);
-        let range = PerSensor::from_fn(|sensor| {
-            let [lowest, highest] = temperature.range(sensor);
-            ThermalRange {
-                lowest,
-                highest,
-                reference: 0.5 * (lowest + highest),
-                largest_rate: temperature.largest_rate(sensor),
-            }
-        });
+        let range = Temperature::seen([temperature].into_iter());
         let mut axes = Vec::new();
         for sensor in Sensor::ALL {
             let samples = imu.of(sensor);

@@ -11,13 +11,14 @@
 //! | temperature | one for each coefficient that is on | true − estimated, see [`crate::imu::ThermalModel`] |
 //! | gravity | 1 | true − stated magnitude of gravity, m/s²; where it has a σ |
 //! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
-//! | of the recording | one for each parameter that is not common to all | by how much it differs in this recording |
+//! | of the recording | one for each parameter that is not common to all, and 3 of its mounting, rad | by how much it differs in this recording, see [`super::day_to_day::Difference`] |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
 //! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
 //! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
+use super::day_to_day::OwnState;
 use super::model::Model;
 use super::parameters::PARAMETERS;
 use super::thermal::Coefficient;
@@ -46,8 +47,8 @@ pub(super) struct Layout {
     thermal: Vec<Coefficient>,
     /// Triad and axis of each bias that varies.
     varying: Vec<(Sensor, usize)>,
-    /// The parameter of both triads that each state of the recording is of.
-    own: Vec<usize>,
+    /// What each state of the recording is.
+    own: Vec<OwnState>,
     /// Whether the table's position error is a state.
     table: bool,
     /// Whether the turn at rest is.
@@ -76,7 +77,10 @@ impl Layout {
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
                 .collect(),
             own: (0..PARAMETERS)
-                .filter(|&i| model.own_sigma[i] > 0.0 && model.prior_sigma[i] > 0.0)
+                .filter(|&i| model.prior_sigma[i] > 0.0)
+                .map(OwnState::Parameter)
+                .chain((0..3).map(OwnState::Mounting))
+                .filter(|&own| model.day_to_day.of(own) > 0.0)
                 .collect(),
             table: model.position_sigma > 0.0,
             turn: model.aiding == Aiding::Velocity,
@@ -131,8 +135,8 @@ impl Layout {
         placed(self.thermal_begin(), &self.thermal)
     }
 
-    /// State and index among [`PARAMETERS`] of each parameter that is not common to all recordings.
-    pub fn own(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    /// State of each thing that is not common to all recordings.
+    pub fn own(&self) -> impl Iterator<Item = (usize, OwnState)> + '_ {
         placed(self.own_begin(), &self.own)
     }
 

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::day_to_day::Difference;
 use super::error::CalibrationError;
 use super::model::Model;
-use super::parameters::{ParameterVector, from_vector, to_vector};
+use super::parameters::{from_vector, to_vector};
 use crate::attitude::{exp, log};
 use crate::imu::{PerSensor, Sensor, TermVector, ThermalCoefficients, Triad};
 use crate::run::Run;
@@ -24,7 +25,7 @@ pub struct Linearisation {
     pub thermal: PerSensor<ThermalCoefficients>,
     /// By how much it differs in each recording from what all have in common; of those beyond the end, by
     /// nothing.
-    pub own: Vec<ParameterVector>,
+    pub own: Vec<Difference>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
 }
@@ -48,7 +49,7 @@ impl Linearisation {
     /// The instrument in a recording, at its reference temperature.
     pub fn in_recording(&self, recording: usize) -> PerSensor<Triad> {
         match self.own.get(recording) {
-            Some(own) => from_vector(self.triads.gyro.form, &(to_vector(&self.triads) + own)),
+            Some(own) => own.applied(&self.triads),
             None => self.triads,
         }
     }
@@ -74,7 +75,7 @@ impl Linearisation {
     }
 
     /// By how much a recording differs from what all have in common.
-    pub(super) fn own(&self, recording: usize) -> ParameterVector {
+    pub(super) fn own(&self, recording: usize) -> Difference {
         self.own.get(recording).copied().unwrap_or_default()
     }
 
@@ -93,7 +94,7 @@ impl Linearisation {
                 from + (to - from) * fraction
             }),
             own: (0..self.own.len().max(other.own.len()))
-                .map(|k| self.own(k) + (other.own(k) - self.own(k)) * fraction)
+                .map(|k| self.own(k).towards(&other.own(k), fraction))
                 .collect(),
             initial_attitudes: attitudes
                 .map(|(from, to)| exp(log(&(to * from.transpose())) * fraction) * from)

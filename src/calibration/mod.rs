@@ -17,6 +17,7 @@ mod coarse;
 mod comparison;
 mod correction;
 mod curvature;
+mod day_to_day;
 mod dwell_scatter;
 mod error;
 mod error_term;
@@ -73,6 +74,7 @@ pub use closed_form::{
 pub use coarse::{CoarseStart, coarse_start};
 pub use comparison::{Comparison, Named, Side, compare};
 pub use correction::{Calibrated, Correction, CorrectionError};
+pub use day_to_day::{DayToDay, Difference};
 pub use dwell_scatter::DwellScatter;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::day_to_day::DayToDay;
 use super::error_term::ErrorTerm;
 use super::options::Options;
 use super::parameters::{ParameterVector, parameter, to_vector};
@@ -53,8 +54,8 @@ pub struct Model {
     pub term_sigma: TermVector,
     /// How the instrument changes with temperature, where it does.
     pub thermal: Option<Arc<ThermalModel>>,
-    /// 1σ by which each parameter differs from one recording to the next; zero where it is common to all.
-    pub own_sigma: ParameterVector,
+    /// By how much recordings differ.
+    pub day_to_day: DayToDay,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
     pub gravity_sigma: f64,
     /// 1σ per axis of the table's position error, rad; zero without a table.
@@ -85,7 +86,7 @@ impl Model {
             turning_at_rest: run.standstill.turning,
             term_sigma: run.instrument.term_sigma,
             thermal: None,
-            own_sigma: ParameterVector::zeros(),
+            day_to_day: DayToDay::default(),
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,

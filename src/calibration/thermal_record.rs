@@ -9,7 +9,7 @@ use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
 use super::thermal::Thermal;
 use crate::imu::{
-    InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalRange,
+    AXES, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalRange,
     ThermalState, ThermalValues, powers,
 };
 use crate::run::Run;
@@ -82,7 +82,8 @@ pub struct RecordingRecord {
     /// Its parameters alone, by name; none where it alone gives no calibration.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub alone: BTreeMap<String, ValueRecord>,
-    /// By how much its parameters differ from what all have in common.
+    /// By how much its parameters differ from what all have in common; `mounting.x` and so on, in rad: how the whole
+    /// instrument is turned on its mounting face, about body axes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub own: BTreeMap<String, ValueRecord>,
 }
@@ -254,10 +255,19 @@ impl RecordingRecord {
                     .collect::<BTreeMap<_, _>>()
             };
             let own = outcome.own.get(number).map(|own| {
-                let differ = (0..PARAMETERS).filter(|&i| own.sigma[i] > 0.0);
-                differ
-                    .filter_map(|i| named(i, own.values[i], own.sigma[i]))
-                    .collect()
+                let (values, sigma) = (&own.values, &own.sigma);
+                let differ = (0..PARAMETERS).filter(|&i| sigma.parameters[i] > 0.0);
+                let parameters =
+                    differ.filter_map(|i| named(i, values.parameters[i], sigma.parameters[i]));
+                let turned = (0..3).filter(|&axis| sigma.mounting[axis] > 0.0);
+                let mounting = turned.map(|axis| {
+                    let value = ValueRecord {
+                        value: values.mounting[axis],
+                        sigma: sigma.mounting[axis],
+                    };
+                    (format!("mounting.{}", AXES[axis]), value)
+                });
+                parameters.chain(mounting).collect()
             });
             Self {
                 name: alone.name.clone(),

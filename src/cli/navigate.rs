@@ -146,16 +146,16 @@ impl Navigate {
         let begun = self.delivery.begin(&inputs)?;
 
         let activity = Activity::new(format!("navigating {} h", self.hours));
-        let moments = match self.warming_degc {
+        let warming = self.warming_degc.map(|Two([from, to])| Warming {
+            from,
+            to,
+            time_constant: self.warming_time_constant_h * HOUR,
+        });
+        let moments = match &warming {
             None => mission.navigate(&pair),
-            Some(Two([from, to])) => {
-                let warming = Warming {
-                    from,
-                    to,
-                    time_constant: self.warming_time_constant_h * HOUR,
-                };
+            Some(warming) => {
                 let pair = WarmingPair::of_records(&calibration, &truth)?;
-                mission.navigate_warming(&pair, &warming)
+                mission.navigate_warming(&pair, warming)
             }
         };
         let moments = moments.with_context(|| self.calibration.display().to_string())?;
@@ -168,6 +168,9 @@ impl Navigate {
             body_frame,
             only,
             mission: &mission,
+            warming: warming
+                .as_ref()
+                .map(|warming| (warming, calibration.temperature.is_some())),
             trajectory: trajectory.as_deref(),
             moments: &moments,
         };

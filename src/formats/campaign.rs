@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::error::FileError;
 use super::fields::{Document, Field, Fields};
 use super::small_file;
-use crate::calibration::{Group, ParameterVector, TemperatureOptions, Together};
+use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
 use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind, Sensor};
 use crate::recording::Temperature;
 use crate::run::Run;
@@ -123,7 +123,7 @@ impl Campaign {
 }
 
 /// The `campaign.toml` of recordings with these paths, relative to it, that differ from day to day by this 1σ.
-pub fn campaign_text(paths: &[String], day_to_day: &ParameterVector) -> String {
+pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
     let mut text = format!("format = \"{FORMAT}\"\n");
     for path in paths {
         text += &format!(
@@ -137,10 +137,13 @@ pub fn campaign_text(paths: &[String], day_to_day: &ParameterVector) -> String {
             .parameters(InstallationForm::General)
             .first()
             .copied()?;
-        let sigma = day_to_day[first] / unit;
-        (sigma > 0.0).then(|| format!("{key} = {}\n", three_digits(sigma)))
+        Some((key, day_to_day.parameters[first] / unit))
     });
-    let lines: Vec<String> = lines.collect();
+    let mounting = (MOUNTING.to_owned(), day_to_day.mounting / ARCSEC);
+    let lines = lines.chain([mounting]).filter(|&(_, sigma)| sigma > 0.0);
+    let lines: Vec<String> = lines
+        .map(|(key, sigma)| format!("{key} = {}\n", three_digits(sigma)))
+        .collect();
     if !lines.is_empty() {
         text += "\n# 1σ from one recording to the next\n[day_to_day]\n";
         text.extend(lines);
@@ -236,6 +239,9 @@ fn temperature(top: &Fields) -> Result<Stated, FileError> {
     Ok(Stated::Follows(options))
 }
 
+/// The key of the mounting in `[day_to_day]`.
+const MOUNTING: &str = "mounting_arcsec";
+
 /// The key of a group in `[day_to_day]`, its name in `own`, and its unit in SI.
 fn key(group: Group) -> (String, String, f64) {
     let (kind, name, unit) = match (group.kind(), group.sensor()) {
@@ -248,13 +254,18 @@ fn key(group: Group) -> (String, String, f64) {
     (format!("{sensor}_{kind}"), format!("{sensor}.{name}"), unit)
 }
 
-/// 1σ by which each parameter differs between recordings, normalised.
-fn day_to_day(top: &Fields, runs: &[Run]) -> Result<ParameterVector, FileError> {
+/// 1σ by which recordings differ.
+fn day_to_day(top: &Fields, runs: &[Run]) -> Result<DayToDay, FileError> {
     let form = InstallationForm::General;
-    let mut sigma = ParameterVector::zeros();
+    let mut of_recordings = DayToDay::default();
+    let sigma = &mut of_recordings.parameters;
     let keys: Vec<(String, String, f64)> = Group::all().map(key).collect();
-    let known: Vec<&str> = keys.iter().map(|(key, ..)| key.as_str()).collect();
+    let known = keys.iter().map(|(key, ..)| key.as_str());
+    let known: Vec<&str> = known.chain([MOUNTING]).collect();
     if let Some(fields) = top.table("day_to_day", &known)? {
+        if let Some(field) = fields.get(MOUNTING) {
+            of_recordings.mounting = field.not_negative()? * ARCSEC;
+        }
         for (group, (key, _, unit)) in Group::all().zip(&keys) {
             if let Some(field) = fields.get(key) {
                 let stated = field.not_negative()? * unit;
@@ -266,7 +277,7 @@ fn day_to_day(top: &Fields, runs: &[Run]) -> Result<ParameterVector, FileError> 
         }
     }
     let Some(field) = top.get("own") else {
-        return Ok(sigma);
+        return Ok(of_recordings);
     };
     for name in field.texts()? {
         let named = keys.iter().position(|(_, known, _)| known == name);
@@ -287,5 +298,5 @@ fn day_to_day(top: &Fields, runs: &[Run]) -> Result<ParameterVector, FileError> 
             sigma[i] = prior.map_or(0.0, |prior| prior[of_triad]);
         }
     }
-    Ok(sigma)
+    Ok(of_recordings)
 }

@@ -68,38 +68,53 @@ pub(super) struct AccelThermalFile {
 /// Seconds in a minute: rates are stated per K/min.
 const MINUTE: f64 = 60.0;
 
+/// Scale for 1 K and 1 K² in ppm, installation for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in this
+/// unit.
+fn in_si(
+    [scale, scale2, installation]: [NonNegative; 3],
+    bias: [NonNegative; 3],
+    unit: f64,
+) -> ThermalVariation {
+    let [bias, bias2, rate] = bias.map(|bias| bias.0 * unit);
+    ThermalVariation {
+        first: [scale.0 * PPM, installation.0 * ARCSEC, bias],
+        second: [scale2.0 * PPM, 0.0, bias2],
+        rate: rate * MINUTE,
+    }
+}
+
 impl GyroThermalFile {
     pub fn in_si(self) -> ThermalVariation {
-        let Self {
-            scale_ppm_per_k: scale,
-            scale_ppm_per_k2: scale2,
-            installation_arcsec_per_k: installation,
-            bias_deg_per_h_per_k: bias,
-            bias_deg_per_h_per_k2: bias2,
-            bias_deg_per_h_per_k_per_min: rate,
-        } = self;
-        ThermalVariation {
-            first: [scale.0 * PPM, installation.0 * ARCSEC, bias.0 * DEG_PER_H],
-            second: [scale2.0 * PPM, 0.0, bias2.0 * DEG_PER_H],
-            rate: rate.0 * DEG_PER_H * MINUTE,
-        }
+        in_si(
+            [
+                self.scale_ppm_per_k,
+                self.scale_ppm_per_k2,
+                self.installation_arcsec_per_k,
+            ],
+            [
+                self.bias_deg_per_h_per_k,
+                self.bias_deg_per_h_per_k2,
+                self.bias_deg_per_h_per_k_per_min,
+            ],
+            DEG_PER_H,
+        )
     }
 }
 
 impl AccelThermalFile {
     pub fn in_si(self) -> ThermalVariation {
-        let Self {
-            scale_ppm_per_k: scale,
-            scale_ppm_per_k2: scale2,
-            installation_arcsec_per_k: installation,
-            bias_ug_per_k: bias,
-            bias_ug_per_k2: bias2,
-            bias_ug_per_k_per_min: rate,
-        } = self;
-        ThermalVariation {
-            first: [scale.0 * PPM, installation.0 * ARCSEC, bias.0 * MICRO_G],
-            second: [scale2.0 * PPM, 0.0, bias2.0 * MICRO_G],
-            rate: rate.0 * MICRO_G * MINUTE,
-        }
+        in_si(
+            [
+                self.scale_ppm_per_k,
+                self.scale_ppm_per_k2,
+                self.installation_arcsec_per_k,
+            ],
+            [
+                self.bias_ug_per_k,
+                self.bias_ug_per_k2,
+                self.bias_ug_per_k_per_min,
+            ],
+            MICRO_G,
+        )
     }
 }

@@ -1,6 +1,6 @@
 //! The instrument's temperature while it recorded.
 
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{PerSensor, Sensor, ThermalRange};
 
 /// Time between two knots, s.
 pub const SPACING: f64 = 1.0;
@@ -60,6 +60,25 @@ impl Temperature {
     /// Rate of each axis at a time, K/s.
     pub fn rate(&self, time: f64) -> PerSensor<[f64; 3]> {
         self.of_axes(time, |channel| &channel.rates)
+    }
+
+    /// The temperatures that recordings saw; parameters are stated in the middle.
+    pub fn seen<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> PerSensor<ThermalRange> {
+        PerSensor::from_fn(|sensor| {
+            let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut largest_rate = 0.0f64;
+            for temperature in all.clone() {
+                let [low, high] = temperature.range(sensor);
+                (lowest, highest) = (lowest.min(low), highest.max(high));
+                largest_rate = largest_rate.max(temperature.largest_rate(sensor));
+            }
+            ThermalRange {
+                lowest,
+                highest,
+                reference: 0.5 * (lowest + highest),
+                largest_rate,
+            }
+        })
     }
 
     /// The lowest and the highest of a triad's axes, °C.

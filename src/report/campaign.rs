@@ -32,7 +32,9 @@ pub fn document(accuracy: &CampaignAccuracy) -> Document {
         );
     }
     document.both(figures(accuracy));
-    document.both(orders(accuracy));
+    if accuracy.functions().len() > 1 {
+        document.both(orders(accuracy));
+    }
     document.data = data(accuracy);
     document
 }

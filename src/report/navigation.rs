@@ -15,7 +15,7 @@ use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::BodyFrame;
 use crate::imu::Sensor;
-use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion};
+use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion, Warming};
 use crate::units::{DEGREE, NAUTICAL_MILE};
 
 const HOUR: f64 = 3600.0;
@@ -39,6 +39,8 @@ pub struct Navigation<'a> {
     pub only: Option<Sensor>,
     /// How the body moved, and how long.
     pub mission: &'a Mission,
+    /// How the instrument warmed up meanwhile, if it did, and whether the calibration follows that.
+    pub warming: Option<(&'a Warming, bool)>,
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
@@ -90,6 +92,15 @@ impl Navigation<'_> {
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
         let start = "perfect alignment, velocity and position; height is held to the true one";
+        let warming = self.warming.map(|(warming, _)| {
+            let words = format!(
+                "from {} to {} °C with a time constant of {} h",
+                value(warming.from, 0.1),
+                value(warming.to, 0.1),
+                three_digits(warming.time_constant / HOUR),
+            );
+            ("temperature", words)
+        });
         let rows = [
             ("motion", motion),
             ("duration", format!("{} h", three_digits(self.hours()))),
@@ -97,7 +108,7 @@ impl Navigation<'_> {
             ("body frame", self.body_frame.words().to_owned()),
             ("start", start.to_owned()),
         ];
-        Facts::new("The navigation", rows)
+        Facts::new("The navigation", rows.into_iter().chain(warming))
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -105,6 +116,11 @@ impl Navigation<'_> {
         let mut warnings = Vec::new();
         if !self.converged {
             warnings.push(format!("{name} did not converge: its σ mean nothing."));
+        }
+        if let Some((_, false)) = self.warming {
+            warnings.push(format!(
+                "{name} does not change with temperature: its σ are those of the temperature that it was made at."
+            ));
         }
         if self.moments.iter().any(|m| m.covariance.is_none()) {
             warnings.push(format!("{name} claims no σ, so none is predicted."));

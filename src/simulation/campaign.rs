@@ -1,6 +1,6 @@
 //! A simulated campaign: one instrument recorded several times.
 
-use nalgebra::SVector;
+use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
@@ -8,10 +8,12 @@ use super::scenario::ChamberFile;
 use super::{Chamber, Draws, Scenario, Simulated};
 use crate::calibration::result::{Calibration, FORMAT_WITH_TEMPERATURE};
 use crate::calibration::{
-    Group, ParameterVector, TemperatureOptions, ThermalRecord, Together, truth_record,
+    DayToDay, Difference, Group, ParameterVector, TemperatureOptions, ThermalRecord, Together,
+    truth_record,
 };
-use crate::imu::{ParameterKind, PerSensor, Sensor, ThermalRange, Triad};
+use crate::imu::{ParameterKind, Sensor};
 use crate::models::{self, ModelError, NonNegative, Place, Room};
+use crate::recording::Temperature;
 use crate::turntable::TableError;
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
@@ -24,8 +26,8 @@ pub struct SimulatedCampaign {
     pub scenario: Scenario,
     /// Name of each, and the chamber that it has for itself.
     pub recordings: Vec<(String, Option<Chamber>)>,
-    /// 1σ by which each parameter differs from one recording to the next, normalised.
-    pub day_to_day: ParameterVector,
+    /// By how much they differ.
+    pub day_to_day: DayToDay,
 }
 
 /// Streams of random numbers of one campaign: more than it may have recordings.
@@ -91,10 +93,15 @@ impl SimulatedCampaign {
             scenario.chamber = chamber.clone().or(scenario.chamber);
             let of = stream.wrapping_mul(STREAMS) + number;
             let mut rng = Draws::thermal(seed, of ^ (1 << 63));
-            let own = SVector::from_fn(|i, _| {
-                let unit: f64 = StandardNormal.sample(&mut rng);
-                unit * self.day_to_day[i]
-            });
+            let mut unit = || -> f64 { StandardNormal.sample(&mut rng) };
+            let DayToDay {
+                parameters,
+                mounting,
+            } = self.day_to_day;
+            let own = Difference {
+                parameters: ParameterVector::from_fn(|i, _| unit() * parameters[i]),
+                mounting: Vector3::from_fn(|_, _| unit() * mounting),
+            };
             scenario.simulate_recording(seed, stream, of, &own)
         })
         .collect()
@@ -108,23 +115,9 @@ impl SimulatedCampaign {
         let Some(thermal) = &first.thermal else {
             return Some(truth_record(&first.common, run));
         };
-        let range = PerSensor::from_fn(|sensor| {
-            let all = simulated.iter();
-            let known = all.filter_map(|one| one.run.recording.imu.temperature.as_ref());
-            let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
-            let mut largest_rate = 0.0f64;
-            for temperature in known {
-                let [low, high] = temperature.range(sensor);
-                (lowest, highest) = (lowest.min(low), highest.max(high));
-                largest_rate = largest_rate.max(temperature.largest_rate(sensor));
-            }
-            ThermalRange {
-                lowest,
-                highest,
-                reference: 0.5 * (lowest + highest),
-                largest_rate,
-            }
-        });
+        let known = simulated.iter();
+        let known = known.filter_map(|one| one.run.recording.imu.temperature.as_ref());
+        let range = Temperature::seen(known);
         let at = thermal.at(&first.common, range.gyro.reference, 0.0);
         let coefficients = thermal.coefficients(&range);
         Some(Calibration {
@@ -143,12 +136,6 @@ impl SimulatedCampaign {
             temperature: warms.then(TemperatureOptions::default),
         }
     }
-}
-
-/// A triad changed by what is a recording's own.
-pub(super) fn changed(triads: PerSensor<Triad>, own: &ParameterVector) -> PerSensor<Triad> {
-    let all = crate::calibration::to_vector(&triads) + own;
-    crate::calibration::from_vector(triads.gyro.form, &all)
 }
 
 #[derive(Deserialize)]
@@ -177,10 +164,11 @@ struct DayToDayFile {
     accel_scale_ppm: NonNegative,
     accel_installation_arcsec: NonNegative,
     accel_bias_ug: NonNegative,
+    mounting_arcsec: NonNegative,
 }
 
 impl DayToDayFile {
-    fn in_si(self) -> ParameterVector {
+    fn in_si(self) -> DayToDay {
         let of = |group: Group| match (group.sensor(), group.kind()) {
             (Sensor::Gyro, ParameterKind::Scale) => self.gyro_scale_ppm.0 * PPM,
             (Sensor::Gyro, ParameterKind::Installation) => self.gyro_installation_arcsec.0 * ARCSEC,
@@ -191,6 +179,9 @@ impl DayToDayFile {
             }
             (Sensor::Accel, ParameterKind::Bias) => self.accel_bias_ug.0 * MICRO_G,
         };
-        ParameterVector::from_fn(|i, _| of(Group::of(i)))
+        DayToDay {
+            parameters: ParameterVector::from_fn(|i, _| of(Group::of(i))),
+            mounting: self.mounting_arcsec.0 * ARCSEC,
+        }
     }
 }

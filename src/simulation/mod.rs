@@ -19,7 +19,7 @@ pub use scenario::{Given, Scenario};
 pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::exp;
-use crate::calibration::ParameterVector;
+use crate::calibration::Difference;
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
 };
@@ -112,7 +112,7 @@ impl Scenario {
     /// # Errors
     /// If the path is beyond the table.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
-        self.simulate_recording(seed, stream, stream, &ParameterVector::zeros())
+        self.simulate_recording(seed, stream, stream, &Difference::default())
     }
 
     /// The same of the instrument of one stream with all else from another, as of one of its recordings, in which
@@ -125,7 +125,7 @@ impl Scenario {
         seed: u64,
         instrument: u64,
         stream: u64,
-        own: &ParameterVector,
+        own: &Difference,
     ) -> Result<Simulated, TableError> {
         let mut rng = Draws::Imperfection.generator(seed, stream);
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
@@ -142,7 +142,7 @@ impl Scenario {
             self.draw_truth(sensor, &mut draws.generator(seed, instrument))
         });
         let common = truth;
-        let truth = campaign::changed(truth, own);
+        let truth = own.applied(&truth);
         let thermal = self.instrument.thermal.as_ref().map(|variation| {
             let mut rng = Draws::thermal(seed, instrument);
             let form = self.installation.form;

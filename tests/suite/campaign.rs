@@ -3,8 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use turncal::calibration::{AtRest, Calibration};
+use turncal::calibration::{AtRest, Calibration, Options, Problem, estimate, parameter};
+use turncal::formats::Campaign;
+use turncal::imu::Sensor;
 use turncal::run::Run;
+use turncal::units::ARCSEC;
 
 use super::lot::{PATH, on_threads, turncal, words};
 use super::shared::{read, shared};
@@ -101,6 +104,139 @@ run = \"mild/run.toml\"
         beyond.contains("90 °C") && beyond.contains("expected"),
         "{beyond}"
     );
+}
+
+/// The bias that an autopilot takes off at a temperature by its own equation, along front, right and down, over that
+/// at the temperature of its calibration.
+fn px4(value: &dyn Fn(&str) -> f64, letter: char, place: usize, temperature: f64) -> f64 {
+    let of = |name: &str| value(&format!("TC_{letter}0_{name}"));
+    let d = temperature.clamp(of("TMIN"), of("TMAX")) - of("TREF");
+    let x = |k: usize| of(&format!("X{k}_{place}"));
+    x(0) + d * (x(1) + d * (x(2) + d * x(3)))
+}
+
+fn ardupilot(value: &dyn Fn(&str) -> f64, letter: char, place: usize, temperature: f64) -> f64 {
+    let kind = if letter == 'G' { "GYR" } else { "ACC" };
+    let within = |t: f64| t.clamp(value("INS_TCAL1_TMIN"), value("INS_TCAL1_TMAX"));
+    let at = |t: f64| {
+        let d = within(t) - 35.0;
+        let c = |k: usize| value(&format!("INS_TCAL1_{kind}{k}_{}", ["X", "Y", "Z"][place]));
+        d * (c(1) + d * (c(2) + d * c(3))) * 1e-6
+    };
+    at(temperature) - at(value(&format!("INS_{kind}1_CALTEMP")))
+}
+
+/// A parameter of an autopilot by its name, a letter for the triad, place of the axis and temperature.
+type Evaluated = fn(&dyn Fn(&str) -> f64, char, usize, f64) -> f64;
+
+#[test]
+fn autopilots_take_off_the_bias_at_a_temperature() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    simulated(here);
+    calibrated(here, "simulated/campaign.toml", "all", "2");
+    let record = Calibration::read(&here.join("all/calibration.json")).unwrap();
+    let run = Run::read(&here.join("simulated/mild/run.toml")).unwrap();
+    let formats: [(&str, Evaluated); 2] = [("px4", px4), ("ardupilot", ardupilot)];
+    for (format, evaluate) in formats {
+        let arguments = [
+            "export",
+            "all/calibration.json",
+            "--format",
+            format,
+            "--run",
+            "simulated/mild/run.toml",
+        ];
+        let done = turncal(here, &arguments);
+        assert!(done.status.success(), "{}", words(&done));
+        let text = String::from_utf8(done.stdout).unwrap();
+        let value = |name: &str| -> f64 {
+            let line = text.lines().find(|line| {
+                let mut fields = line.split(['\t', ',']);
+                !line.starts_with('#') && fields.any(|field| field == name)
+            });
+            let mut fields = line.expect(name).split(['\t', ',']);
+            fields.find(|&field| field == name);
+            fields.next().unwrap().parse().unwrap()
+        };
+        let reference = record
+            .temperature
+            .as_ref()
+            .unwrap()
+            .range
+            .gyro
+            .reference_degc;
+        let there = record.at_temperature(reference).unwrap();
+        for temperature in [2.0, 17.0, 38.0] {
+            let at = record.at_temperature(temperature).unwrap();
+            for sensor in Sensor::ALL {
+                let letter = match sensor {
+                    Sensor::Gyro => 'G',
+                    Sensor::Accel => 'A',
+                };
+                for (place, (axis, sign)) in [(1, 1.0), (0, 1.0), (2, -1.0)].into_iter().enumerate()
+                {
+                    let name = format!("{}.bias.{}", sensor.name(), ["x", "y", "z"][axis]);
+                    let nominal = run.instrument.nominal.get(sensor).0[axis];
+                    let expected = sign * (at[&name] - there[&name]) / nominal;
+                    let found = evaluate(&value, letter, place, temperature);
+                    // Numbers of 24 bits; what cancels between two temperatures is of the size of forty kelvin.
+                    let coefficient =
+                        (record.at_temperature(0.0).unwrap()[&name] - there[&name]) / nominal;
+                    assert!(
+                        (found - expected).abs() < 1e-5 * coefficient.abs().max(expected.abs()),
+                        "{format} {name} at {temperature}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+const MOUNTINGS: &str = "scenario = \"scenario.toml\"
+[day_to_day]
+mounting_arcsec = 300.0
+[[recording]]
+name = \"first\"
+[[recording]]
+name = \"second\"
+[[recording]]
+name = \"third\"
+";
+
+#[test]
+fn an_instrument_that_is_mounted_anew_turns_as_a_whole() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    simulated(here);
+    fs::write(here.join("mountings.toml"), MOUNTINGS).unwrap();
+    let made = turncal(here, &["simulate", "mountings.toml", "-o", "mounted"]);
+    assert!(made.status.success(), "{}", words(&made));
+    let campaign = Campaign::read(&here.join("mounted/campaign.toml")).unwrap();
+    let runs: Vec<&Run> = campaign.runs.iter().collect();
+    let problem = Problem::together(&runs, &Options::default(), &campaign.together).unwrap();
+    let outcome = estimate(&problem, &|_| {}).unwrap();
+    assert!(outcome.converged);
+    let truth = Calibration::read(&here.join("mounted/truth.json")).unwrap();
+
+    // Of the turn of both triads the priors of four angles are known, 208″/√4, and the mean of three mountings,
+    // 300″/√3 …
+    let known = 1.0 / (4.0 / 208.0f64.powi(2) + 3.0 / 300.0f64.powi(2)).sqrt();
+    let xy = [Sensor::Gyro, Sensor::Accel].map(|sensor| parameter(sensor, 3));
+    let sigma = outcome.estimate.sigma()[xy[0]] / ARCSEC;
+    assert!((sigma / known - 1.0).abs() < 0.01, "{sigma} {known}");
+    // … but one triad against the other as by a single mounting.
+    let found = outcome.estimate.vector();
+    let between = truth["gyro.installation.xy"] - truth["accel.installation.xy"];
+    let off = (found[xy[0]] - found[xy[1]] - between) / ARCSEC;
+    assert!(off.abs() < 5.0, "{off}″");
+    // Each recording alone agrees with that, turned by its own mounting.
+    for number in 0..3 {
+        let (distance, limit) = outcome.distance_alone(number).unwrap();
+        assert!(distance < limit, "{number}: {distance} {limit}");
+        let own = &outcome.own[number];
+        assert!((own.sigma.mounting.x / ARCSEC / known - 1.0).abs() < 0.01);
+    }
 }
 
 #[test]

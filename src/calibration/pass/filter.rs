@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::segment::between;
 use super::sensitivity::Sensitivity;
 use crate::attitude::skew;
+use crate::calibration::day_to_day::{DayToDay, Difference, Turned};
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::{Linearisation, Start};
@@ -35,8 +36,9 @@ pub(in crate::calibration) struct Filter {
     turning: f64,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-    /// 1σ by which each parameter differs between recordings.
-    own_sigma: ParameterVector,
+    day_to_day: DayToDay,
+    /// What the mounting of the recording does to the parameters, where it has its own.
+    turned: Option<Turned>,
     /// What auxiliary parameters that are tried would do.
     pub sensitivity: Option<Sensitivity>,
     /// What was done to the errors, where that is kept.
@@ -83,7 +85,8 @@ impl Filter {
             turning: model.turning_at_rest,
             noise: model.process_noise(),
             varying,
-            own_sigma: model.own_sigma,
+            day_to_day: model.day_to_day,
+            turned: None,
             sensitivity: None,
             tape: None,
         }
@@ -99,13 +102,13 @@ impl Filter {
 
     /// A stretch begins: navigation errors and the table's position start anew. In another recording the
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, and what is of the recording, whose means `anew` tells; `gravity` is its 1σ at
-    /// another site.
+    /// 4th ed., §3.8) does, too, and what is of the recording: `anew` tells where it is linearised; `gravity` is its
+    /// 1σ at another site.
     pub fn begin(
         &mut self,
         start: &Start,
         table_sigma: f64,
-        anew: Option<&ParameterVector>,
+        anew: Option<(&Difference, Option<Turned>)>,
         gravity: Option<f64>,
     ) {
         let initial = self.layout.initial_attitude();
@@ -135,13 +138,14 @@ impl Filter {
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
             self.redraw(state, 0.0, sigma);
         }
-        if let Some(means) = anew {
+        if let Some((at, turned)) = anew {
+            self.turned = turned;
             for k in 0..self.varying.len() {
                 let (state, sigma, _) = self.varying[k];
                 self.redraw(state, 0.0, sigma);
             }
-            for (state, index) in self.layout.own().collect::<Vec<_>>() {
-                self.redraw(state, means[index], self.own_sigma[index]);
+            for (state, own) in self.layout.own().collect::<Vec<_>>() {
+                self.redraw(state, -at.get(own), self.day_to_day.of(own));
             }
         }
     }

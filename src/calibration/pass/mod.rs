@@ -109,8 +109,10 @@ pub(super) fn begin(
     at: &Linearisation,
 ) {
     let anew = before.is_none_or(|before| before.recording != stretch.recording);
-    let anew = anew.then(|| -at.own(stretch.recording));
+    let own = at.own(stretch.recording);
+    let turned = (model.day_to_day.mounting > 0.0).then(|| own.response(&at.triads));
+    let anew = anew.then_some((&own, turned));
     let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
     let gravity = moved.then_some(stretch.run.site.gravity_sigma);
-    filter.begin(start, model.position_sigma, anew.as_ref(), gravity);
+    filter.begin(start, model.position_sigma, anew, gravity);
 }

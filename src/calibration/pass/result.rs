@@ -7,6 +7,7 @@ use super::filter::Filter;
 use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
+use crate::calibration::day_to_day::Difference;
 use crate::calibration::dwell_scatter::Posterior;
 use crate::calibration::innovation::Innovation;
 use crate::calibration::layout::Layout;
@@ -76,13 +77,13 @@ pub(in crate::calibration) struct Tried {
     pub of_parameters: DMatrix<f64>,
 }
 
-/// By how much the parameters of a recording differ from what all recordings have in common.
+/// By how much a recording differs from what all recordings have in common.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Own {
-    /// Normalised as the parameters.
-    pub values: ParameterVector,
-    /// 1σ of each; zero where it is common to all.
-    pub sigma: ParameterVector,
+    /// The estimate.
+    pub values: Difference,
+    /// 1σ; zero of what is common to all.
+    pub sigma: Difference,
 }
 
 /// What a pass has come to so far.
@@ -131,11 +132,11 @@ impl Sums {
             let (mean, covariance) = own.smoothed(filter);
             let mut own = Own {
                 values: self.at.own(recording),
-                sigma: ParameterVector::zeros(),
+                sigma: Difference::default(),
             };
-            for (k, (_, index)) in filter.layout.own().enumerate() {
-                own.values[index] += mean[k];
-                own.sigma[index] = covariance[(k, k)].max(0.0).sqrt();
+            for (k, (_, of)) in filter.layout.own().enumerate() {
+                *own.values.get_mut(of) += mean[k];
+                *own.sigma.get_mut(of) = covariance[(k, k)].max(0.0).sqrt();
             }
             own
         });

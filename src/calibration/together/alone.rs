@@ -6,10 +6,11 @@ use rayon::prelude::*;
 use super::super::alone::Alone;
 use super::super::attempt::from_coarse_start;
 use super::super::coarse::coarse_start;
+use super::super::day_to_day::DayToDay;
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
 use super::super::model::Model;
-use super::super::parameters::parameter;
+use super::super::parameters::{from_vector, parameter};
 use super::super::problem::Problem;
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange};
 
@@ -33,7 +34,7 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
     let run = problem.run();
     let mut model = problem.model.clone();
     let thermal = model.thermal.take();
-    model.own_sigma.fill(0.0);
+    model.day_to_day = DayToDay::default();
     let plain = problem.with_model(model);
     let temperature = run.recording.imu.temperature.as_ref();
     let span = temperature.map_or(0.0, |temperature| {
@@ -116,12 +117,16 @@ pub(super) fn through(
             thermal.sigma.get(sensor)[(of_triad, function)]
         }),
     };
+    let prior_mean = from_vector(model.form, &model.prior_mean);
+    let own = model.day_to_day;
+    let own = own.covariance(&prior_mean);
+    let own = own.diagonal();
     let mut normal = DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(i == j)));
     let mut right = DVector::zeros(n);
     for alone in alone {
         let known = alone.estimate.as_ref();
         let variance = known.map_or(0.0, |estimate| estimate.covariance[(index, index)]);
-        let own = model.own_sigma[index].powi(2);
+        let own = own[index];
         // Without a σ the coarse start is as good as a tenth of what was known before.
         let variance = match variance > 0.0 {
             true => variance * BEYOND_NOISE.powi(2) + own,

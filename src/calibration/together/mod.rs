@@ -14,17 +14,18 @@ use std::sync::Arc;
 
 use super::alone::Alone;
 use super::attempt::Progress;
+use super::day_to_day::{DayToDay, Difference};
 use super::error::CalibrationError;
 use super::finding::Finding;
 use super::iterations::{Iterated, iterate};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::options::Options;
 use super::outcome::Pass;
-use super::parameters::{ParameterVector, parameter};
+use super::parameters::parameter;
 use super::pass::Gate;
 use super::problem::{Problem, Stretch};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
-use crate::run::Run;
+use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
 pub use temperatures::TemperatureOptions;
 use temperatures::Temperatures;
@@ -32,9 +33,8 @@ use temperatures::Temperatures;
 /// What recordings of one instrument have in common, and what not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Together {
-    /// 1σ by which each parameter differs from one recording to the next, normalised; zero where it is common
-    /// to all.
-    pub day_to_day: ParameterVector,
+    /// By how much they differ. Without a table the body axes go with the accelerometers, however they are mounted.
+    pub day_to_day: DayToDay,
     /// How parameters follow temperature; none where they do not.
     pub temperature: Option<TemperatureOptions>,
 }
@@ -42,7 +42,7 @@ pub struct Together {
 impl Default for Together {
     fn default() -> Self {
         Self {
-            day_to_day: ParameterVector::zeros(),
+            day_to_day: DayToDay::default(),
             temperature: Some(TemperatureOptions::default()),
         }
     }
@@ -65,7 +65,10 @@ impl<'a> Problem<'a> {
             problem = problem.and(run);
         }
         let mut model = problem.model.clone();
-        model.own_sigma = together.day_to_day;
+        model.day_to_day = together.day_to_day;
+        if model.aiding == Aiding::Velocity {
+            model.day_to_day.mounting = 0.0;
+        }
         if let Some(options) = together.temperature {
             let temperatures = Temperatures::of(&problem)?;
             model.thermal = temperatures.model(&problem, options).map(Arc::new);
@@ -95,7 +98,7 @@ impl<'a> Problem<'a> {
 
     /// Whether anything in it differs between recordings or temperatures.
     pub(super) fn varies(&self) -> bool {
-        self.model.thermal.is_some() || self.model.own_sigma.amax() > 0.0
+        self.model.thermal.is_some() || self.model.day_to_day.any()
     }
 }
 
@@ -171,5 +174,12 @@ fn start(problem: &Problem, alone: &[Alone]) -> Linearisation {
         }
     }
     at.triads = super::parameters::from_vector(model.form, &common);
+    if model.day_to_day.mounting > 0.0 {
+        let mountings = alone.iter().map(|alone| Difference {
+            mounting: Difference::mounting_between(&at.triads, &alone.start),
+            ..Difference::default()
+        });
+        at.own = mountings.collect();
+    }
     at
 }

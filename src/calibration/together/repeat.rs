@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::alone::Alone;
+use super::super::day_to_day::Difference;
 use super::super::innovation::Observation;
 use super::super::outcome::Outcome;
-use super::super::parameters::{PARAMETERS, ParameterVector};
+use super::super::parameters::{PARAMETERS, ParameterVector, to_vector};
 use crate::statistics::chi_square_limit;
 
 /// Chance that recordings which repeat are said not to.
@@ -29,10 +30,16 @@ pub struct Repeatability {
 }
 
 impl Outcome {
-    /// What a recording alone says less all together at its temperature, where its temperature stands.
-    fn departure(&self, alone: &Alone) -> Option<ParameterVector> {
-        let estimate = alone.estimate.as_ref()?;
-        let mut off = estimate.vector() - self.estimate.vector();
+    /// What a recording alone says less all together at its temperature, where its temperature stands, if it had been
+    /// mounted as the mean of all.
+    fn departure(&self, number: usize, alone: &Alone) -> Option<ParameterVector> {
+        let mounting = self.own.get(number).map(|own| own.values.mounting);
+        let turned_back = Difference {
+            mounting: -mounting.unwrap_or_default(),
+            ..Difference::default()
+        };
+        let triads = turned_back.applied(&alone.estimate.as_ref()?.triads);
+        let mut off = to_vector(&triads) - self.estimate.vector();
         if let Some(thermal) = &self.thermal {
             let (change, _) = thermal.at(alone.state.as_ref()?, &self.estimate.covariance);
             off -= change;
@@ -44,7 +51,7 @@ impl Outcome {
     /// stays below in 999 of 1000. `None` where it alone says nothing.
     pub fn distance_alone(&self, number: usize) -> Option<(f64, f64)> {
         let alone = self.alone.get(number)?;
-        let off = self.departure(alone)?;
+        let off = self.departure(number, alone)?;
         let estimate = alone.estimate.as_ref()?;
         let estimated: Vec<usize> = estimate.estimated().collect();
         let n = estimated.len();
@@ -57,21 +64,23 @@ impl Outcome {
             }
             None => self.estimate.covariance,
         };
+        let own = &self.model.day_to_day;
+        // All together have told the mounting already.
+        let told = if own.mounting > 0.0 { 3 } else { 0 };
+        let own = own.covariance(&self.estimate.triads);
         // What one part of the data says differs from what all say by as much as it knows less (Hausman 1978,
         // "Specification tests in econometrics", Econometrica 46(6)).
         let covariance = DMatrix::from_fn(n, n, |i, j| {
             let (i, j) = (estimated[i], estimated[j]);
-            let own = if i == j {
-                self.model.own_sigma[i].powi(2)
-            } else {
-                0.0
-            };
-            (estimate.covariance[(i, j)] + own - together[(i, j)]) / (sigma[i] * sigma[j])
+            (estimate.covariance[(i, j)] + own[(i, j)] - together[(i, j)]) / (sigma[i] * sigma[j])
         });
         let off = DVector::from_fn(n, |i, _| off[estimated[i]] / sigma[estimated[i]]);
         let squared = off.dot(&covariance.cholesky()?.solve(&off));
-        let limit = chi_square_limit(n as f64, FALSE_ALARM);
-        Some((squared / n as f64, limit / n as f64))
+        let freedom = n.checked_sub(told).filter(|&freedom| freedom > 0)? as f64;
+        Some((
+            squared / freedom,
+            chi_square_limit(freedom, FALSE_ALARM) / freedom,
+        ))
     }
 
     /// How each parameter repeats, where at least three recordings say it alone.
@@ -79,9 +88,13 @@ impl Outcome {
         let all: Vec<(ParameterVector, ParameterVector)> = self
             .alone
             .iter()
-            .filter_map(|alone| Some((self.departure(alone)?, alone.estimate.as_ref()?.sigma())))
+            .enumerate()
+            .filter_map(|(k, alone)| {
+                Some((self.departure(k, alone)?, alone.estimate.as_ref()?.sigma()))
+            })
             .collect();
         let of = |parameter: usize| {
+            let own = self.model.day_to_day.parameters[parameter];
             let known: Vec<(f64, f64)> = all
                 .iter()
                 .filter(|(_, sigma)| sigma[parameter] > 0.0)
@@ -93,7 +106,6 @@ impl Outcome {
                 .checked_sub(taken)
                 .filter(|&f| f > 0 && known.len() > 2)?;
             let freedom = freedom as f64;
-            let own = self.model.own_sigma[parameter];
             let variance = |sigma: f64| sigma * sigma + own * own;
             let squares: f64 = known.iter().map(|(off, _)| off * off).sum();
             let chi_square: f64 = known.iter().map(|(off, s)| off * off / variance(*s)).sum();

@@ -7,6 +7,7 @@ use crate::imu::{
     HIGHEST_ORDER, ParameterKind, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalModel,
     ThermalRange, Triad,
 };
+use crate::recording::Temperature;
 
 /// Recordings within this many kelvin are at one temperature: what a soaked instrument changes by itself.
 const ONE_TEMPERATURE: f64 = 1.0;
@@ -53,25 +54,9 @@ impl Temperatures {
                 });
             }
         }
-        let known = |sensor: Sensor| {
-            let runs = problem.runs();
-            runs.filter_map(move |run| Some((run.recording.imu.temperature.as_ref()?, sensor)))
-        };
-        let range = PerSensor::from_fn(|sensor| {
-            let (mut lowest, mut highest, mut largest_rate) =
-                (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
-            for (temperature, sensor) in known(sensor) {
-                let [low, high] = temperature.range(sensor);
-                (lowest, highest) = (lowest.min(low), highest.max(high));
-                largest_rate = largest_rate.max(temperature.largest_rate(sensor));
-            }
-            ThermalRange {
-                lowest,
-                highest,
-                reference: 0.5 * (lowest + highest),
-                largest_rate,
-            }
-        });
+        let runs = problem.runs();
+        let known = runs.filter_map(|run| run.recording.imu.temperature.as_ref());
+        let range = Temperature::seen(known.collect::<Vec<_>>().into_iter());
         let of_dwells = PerSensor::from_fn(|sensor| {
             let mut all: Vec<f64> = Vec::new();
             for stretch in problem.stretches() {

@@ -55,7 +55,7 @@ impl Along {
     }
 
     /// The axes in words.
-    pub fn words(&self) -> &'static str {
+    fn words(&self) -> &'static str {
         let of = |axes: BodyAxes| axes.order() == self.order;
         match (of(BodyAxes::Rfu), of(BodyAxes::Frd), of(BodyAxes::Flu)) {
             (true, ..) => "right, front, up",
@@ -71,11 +71,13 @@ impl Along {
         of.unwrap_or(axis)
     }
 
-    /// What raw output is divided by before, in words.
-    pub fn divide(&self) -> String {
-        super::source::divide(&PerSensor::from_fn(|sensor| {
-            self.triads.get(sensor).nominal.into()
-        }))
+    /// Says along which axes what follows is, `what` being what a reader does there, and what raw output is divided
+    /// by before.
+    pub fn introduce(&self, file: &mut Document, what: &str) {
+        file.comment("");
+        file.comment(&format!("{what} along {};", self.words()));
+        let nominal = |sensor| self.triads.get(sensor).nominal.into();
+        file.comment(&super::source::divide(&PerSensor::from_fn(nominal)));
     }
 }
 

@@ -117,14 +117,9 @@ fn write(source: &Source, program: &Program) -> Exported {
     let notes = lost
         .into_iter()
         .chain(program.notes.iter().map(|&note| note.to_owned()));
-    let mut file = Document::new(source, "#", notes.chain(source.terms_note(|_| false)));
-    file.comment("");
-    file.comment(&format!(
-        "{} reads rad/s and m/s^2 along {};",
-        program.name,
-        along.words()
-    ));
-    file.comment(&along.divide());
+    let mut file = Document::holding(source, "#", notes, |_| false);
+    let reads = format!("{} reads rad/s and m/s^2", program.name);
+    along.introduce(&mut file, &reads);
     left.iter().for_each(|left| left.lines(&mut file));
     for sensor in Sensor::ALL {
         let (offset, scale) = held(sensor);

@@ -37,17 +37,8 @@ pub(super) fn write(source: &Source) -> Exported {
         left[1].words(),
         "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
     ];
-    let mut file = Document::new(
-        source,
-        "#",
-        notes.into_iter().chain(source.terms_note(|_| false)),
-    );
-    file.comment("");
-    file.comment(&format!(
-        "lines for its command line, along {};",
-        along.words()
-    ));
-    file.comment(&along.divide());
+    let mut file = Document::holding(source, "#", notes, |_| false);
+    along.introduce(&mut file, "lines for its command line,");
     file.comment(&format!("counts are of an accelerometer with {COUNTS} for one g; at another number n, times n / {COUNTS}"));
     left.iter().for_each(|left| left.lines(&mut file));
     let [x, y, z] = [counts.x, counts.y, counts.z].map(|count| count as i64);

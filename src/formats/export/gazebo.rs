@@ -26,17 +26,8 @@ pub(super) fn write(source: &Source) -> Exported {
         "the sign of the bias: Gazebo draws it anew for each axis, so half of them have the other"
             .to_owned(),
     ];
-    let notes = notes.into_iter().chain(source.terms_note(|_| false));
-    let mut file = Document::new(source, "", notes);
-    for line in source.term_lines(|_| true) {
-        file.comment(&line);
-    }
-    file.comment("");
-    file.comment(&format!(
-        "Gazebo writes rad/s and m/s^2, here along {};",
-        along.words()
-    ));
-    file.comment(&along.divide());
+    let mut file = Document::holding(source, "", notes, |_| false);
+    along.introduce(&mut file, "Gazebo writes rad/s and m/s^2, here");
     left.iter().for_each(|left| left.lines(&mut file));
     if source.run.is_none() {
         file.comment("no noise: export with --run RUN.toml");

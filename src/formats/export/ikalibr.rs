@@ -25,20 +25,8 @@ pub(super) fn write(source: &Source) -> Exported {
         ),
         "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
     ];
-    let mut file = Document::new(
-        source,
-        "#",
-        notes.into_iter().chain(source.terms_note(|_| false)),
-    );
-    for line in source.term_lines(|_| true) {
-        file.comment(&line);
-    }
-    file.comment("");
-    file.comment(&format!(
-        "iKalibr reads rad/s and m/s^2, here along {};",
-        along.words()
-    ));
-    file.comment(&along.divide());
+    let mut file = Document::holding(source, "#", notes, |_| false);
+    along.introduce(&mut file, "iKalibr reads rad/s and m/s^2, here");
     for (axis, row) in ["x", "y", "z"].iter().zip(own.row_iter()) {
         let row: Vector3<f64> = row.transpose();
         file.comment(&format!(

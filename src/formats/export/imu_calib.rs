@@ -30,20 +30,8 @@ pub(super) fn write(source: &Source) -> Exported {
         ),
         "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
     ];
-    let mut file = Document::new(
-        source,
-        "#",
-        notes.into_iter().chain(source.terms_note(|_| false)),
-    );
-    for line in source.term_lines(|_| true) {
-        file.comment(&line);
-    }
-    file.comment("");
-    file.comment(&format!(
-        "imu_calib reads rad/s and m/s^2, here along {};",
-        along.words()
-    ));
-    file.comment(&along.divide());
+    let mut file = Document::holding(source, "#", notes, |_| false);
+    along.introduce(&mut file, "imu_calib reads rad/s and m/s^2, here");
     left.lines(&mut file);
     let rows: Vec<f64> = matrix.transpose().iter().copied().collect();
     file.line(&format!("SM: {}", yaml_list(&rows)));

@@ -33,11 +33,7 @@ pub(super) fn write(source: &Source) -> Exported {
         "biases, which Kalibr finds itself; they are in a comment".to_owned(),
         "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
     ];
-    let terms = source.terms_note(|term| term == Term::GSensitivity);
-    let mut file = Document::new(source, "#", notes.into_iter().chain(terms));
-    for line in source.term_lines(|term| term != Term::GSensitivity) {
-        file.comment(&line);
-    }
+    let mut file = Document::holding(source, "#", notes, |term| term == Term::GSensitivity);
     file.comment("");
     file.comment("Kalibr reads rad/s and m/s^2;");
     let nominal = PerSensor::from_fn(|sensor| triads.get(sensor).nominal.into());

@@ -62,14 +62,7 @@ pub(super) fn write(source: &Source) -> Exported {
         lost,
         "sigma of misalignment, and covariance; they are in calibration.json".to_owned(),
     ];
-    let mut file = Document::new(
-        source,
-        "#",
-        notes.into_iter().chain(source.terms_note(|_| false)),
-    );
-    for line in source.term_lines(|_| true) {
-        file.comment(&line);
-    }
+    let mut file = Document::holding(source, "#", notes, |_| false);
     file.comment("");
     let nominal = PerSensor::from_fn(|sensor| reordered(normalised.get(sensor).nominal));
     file.comment("KF-GINS reads rad and m/s a sample, along front, right, down;");

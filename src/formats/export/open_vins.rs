@@ -45,18 +45,9 @@ pub(super) fn write(source: &Source, model: Model) -> Exported {
             .to_owned(),
         "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
     ];
-    let terms = source.terms_note(|term| term == Term::GSensitivity);
-    let mut file = Document::new(source, "#", notes.into_iter().chain(terms));
+    let mut file = Document::holding(source, "#", notes, |term| term == Term::GSensitivity);
     file.begin("%YAML:1.0");
-    for line in source.term_lines(|term| term != Term::GSensitivity) {
-        file.comment(&line);
-    }
-    file.comment("");
-    file.comment(&format!(
-        "OpenVINS reads rad/s and m/s^2, here along {};",
-        along.words()
-    ));
-    file.comment(&along.divide());
+    along.introduce(&mut file, "OpenVINS reads rad/s and m/s^2, here");
     file.comment(&format!(
         "set imu_intrinsics_model: \"{name}\" in its estimator_config.yaml"
     ));

@@ -196,7 +196,23 @@ pub(super) struct Document {
 }
 
 impl Document {
-    /// Begins with what all formats say; `notes` are what this one does not hold.
+    /// Begins with what all formats say; `notes` are what this one does not hold, beside the error terms but for those
+    /// of which `held` is true.
+    pub fn holding(
+        source: &Source,
+        mark: &'static str,
+        notes: impl IntoIterator<Item = String>,
+        held: fn(Term) -> bool,
+    ) -> Self {
+        let notes = notes.into_iter().chain(source.terms_note(held));
+        let mut document = Self::new(source, mark, notes);
+        for line in source.term_lines(|term| !held(term)) {
+            document.comment(&line);
+        }
+        document
+    }
+
+    /// The same of a format in which error terms have no place.
     pub fn new(
         source: &Source,
         mark: &'static str,
@@ -219,11 +235,7 @@ impl Document {
     /// Begins a file of code: it corrects K, E and D, and has terms and test vectors in comments.
     pub fn of_code(source: &Source, mark: &'static str) -> Self {
         let sigma = "sigma and covariance of the parameters; they are in calibration.json";
-        let terms = source.terms_note(|_| false);
-        let mut document = Self::new(source, mark, [sigma.to_owned()].into_iter().chain(terms));
-        for line in source.term_lines(|_| true) {
-            document.comment(&line);
-        }
+        let mut document = Self::holding(source, mark, [sigma.to_owned()], |_| false);
         let vectors = source.test_vectors();
         if !vectors.is_empty() {
             document.comment("");

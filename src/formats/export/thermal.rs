@@ -76,10 +76,10 @@ pub(super) fn px4(source: &Source, file: &mut Document) {
     }
 }
 
-/// ArduPilot: of accelerometers `n − (p(T) − p(T_cal))`, of gyros `n − p(T)`, with
-/// `p(T) = (c₁ d + c₂ d² + c₃ d³) 10⁻⁶`, d = T − 35 °C.
+/// ArduPilot: `n − p(T) + p(T_cal)` before the offsets are taken off, with `p(T) = (c₁ d + c₂ d² + c₃ d³) 10⁻⁶`,
+/// d = T − 35 °C.
 ///
-/// Source: ArduPilot, `AP_InertialSensor_tempcal.cpp`.
+/// Source: ArduPilot, `AP_InertialSensor_tempcal.cpp`, `correct_sensor`.
 pub(super) fn ardupilot(source: &Source, file: &mut Document) {
     let Some(thermal) = &source.record.temperature else {
         return;

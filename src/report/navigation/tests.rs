@@ -47,6 +47,7 @@ fn document(moments: &[Epoch]) -> Document {
         body_frame: BodyFrame::Table,
         only: None,
         mission: &mission(),
+        warming: None,
         trajectory: None,
         moments,
     };

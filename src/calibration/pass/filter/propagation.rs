@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::Filter;
 use super::operation::Operation;
+use crate::calibration::day_to_day::OwnState;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::imu::{PerSensor, Sensor};
@@ -115,38 +116,58 @@ impl Filter {
     /// What navigation errors, and each state that drives them, make of the navigation errors.
     pub(super) fn driving_columns(&self, block: &Block) -> Vec<[f64; NAVIGATION]> {
         let PerSensor { gyro, accel } = &block.parameters;
-        let navigation = block.navigation.column_iter();
         let of_triad = |sensor: Sensor, parameter: usize| match sensor {
             Sensor::Gyro => gyro.column(parameter),
             Sensor::Accel => accel.column(parameter),
         };
-        let parameters = self.layout.parameters().map(|(_, index)| {
+        let of_parameter = |index: usize| {
             let (sensor, parameter) = sensor_and_parameter(index);
             of_triad(sensor, parameter)
-        });
-        let on = self.layout.terms().count();
-        let terms = block.terms.iter().take(on);
-        let terms = terms.map(|term| term.column.column(0));
-        let gravity = self.layout.gravity().map(|_| block.gravity.column(0));
-        let thermal = self.layout.thermal().map(|(_, coefficient)| {
+        };
+        // On an instrument that is turned, parameters do what those of the turned one do that they change.
+        let of_turned = |direction: &[f64], row: usize| -> f64 {
+            let of = |(index, by): (usize, &f64)| of_parameter(index)[row] * by;
+            direction.iter().enumerate().map(of).sum()
+        };
+        let of_common = |index: usize, row: usize| match &self.turned {
+            Some(turned) => of_turned(turned.by_parameters.column(index).as_slice(), row),
+            None => of_parameter(index)[row],
+        };
+        let mut columns: Vec<[f64; NAVIGATION]> = Vec::new();
+        let mut add = |column: &dyn Fn(usize) -> f64| columns.push(std::array::from_fn(column));
+        for column in block.navigation.column_iter() {
+            add(&|row| column[row]);
+        }
+        for (_, index) in self.layout.parameters() {
+            add(&|row| of_common(index, row));
+        }
+        for term in block.terms.iter().take(self.layout.terms().count()) {
+            add(&|row| term.column[row]);
+        }
+        for (_, coefficient) in self.layout.thermal() {
             let weight = block.thermal.as_ref();
             let weight = weight.map_or(0.0, |state| coefficient.weight(state));
-            of_triad(coefficient.sensor, coefficient.parameter) * weight
-        });
+            let column = of_triad(coefficient.sensor, coefficient.parameter);
+            add(&|row| column[row] * weight);
+        }
+        if self.layout.gravity().is_some() {
+            add(&|row| block.gravity[row]);
+        }
         // A bias does the same whether it varies or stays.
-        let varying = self.layout.varying_biases();
-        let varying = varying.map(|(_, sensor, constant)| of_triad(sensor, constant));
-        let own = self.layout.own().map(|(_, index)| {
-            let (sensor, parameter) = sensor_and_parameter(index);
-            of_triad(sensor, parameter)
-        });
-        let mut columns: Vec<[f64; NAVIGATION]> = Vec::new();
-        let of = |column: &dyn Fn(usize) -> f64| std::array::from_fn(column);
-        let constants = navigation.chain(parameters).chain(terms);
-        columns.extend(constants.map(|column| of(&|row| column[row])));
-        columns.extend(thermal.map(|column| of(&|row| column[row])));
-        let rest = gravity.into_iter().chain(varying).chain(own);
-        columns.extend(rest.map(|column| of(&|row| column[row])));
+        for (_, sensor, constant) in self.layout.varying_biases() {
+            add(&|row| of_triad(sensor, constant)[row]);
+        }
+        for (_, own) in self.layout.own() {
+            match own {
+                OwnState::Parameter(index) => add(&|row| of_common(index, row)),
+                OwnState::Mounting(axis) => {
+                    let turned = self.turned.as_ref();
+                    let direction = turned.map(|turned| turned.by_mounting.column(axis));
+                    let direction = direction.as_ref().map_or(&[][..], |d| d.as_slice());
+                    add(&|row| of_turned(direction, row));
+                }
+            }
+        }
         columns
     }
 

@@ -61,7 +61,8 @@ impl Filter {
             noise,
             turning,
             varying,
-            own_sigma: self.own_sigma,
+            day_to_day: self.day_to_day,
+            turned: self.turned.clone(),
             sensitivity: None,
             tape: None,
         })

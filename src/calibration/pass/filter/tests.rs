@@ -37,7 +37,7 @@ fn filter() -> Filter {
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, Some(&ParameterVector::zeros()), None);
+    filter.begin(&start, 5e-6, Some((&Difference::default(), None)), None);
     assert_eq!(filter.layout.size(), STATES);
     filter
 }
@@ -165,7 +165,7 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, Some(&ParameterVector::zeros()), None);
+    filter.begin(&start, 5e-6, Some((&Difference::default(), None)), None);
     let varying: Vec<usize> = filter.layout.varying_biases().map(|(s, ..)| s).collect();
     assert_eq!(varying.len(), 6);
     for k in 0..5 {
@@ -342,7 +342,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         filter.begin(
             &start,
             model.position_sigma,
-            Some(&ParameterVector::zeros()),
+            Some((&Difference::default(), None)),
             None,
         );
         let at = State::at_rest(Matrix3::identity());
