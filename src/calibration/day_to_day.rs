@@ -2,9 +2,11 @@
 
 use nalgebra::{SMatrix, Vector3};
 
+use super::group::Group;
 use super::parameters::{PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector};
 use crate::attitude::exp;
-use crate::imu::{PerSensor, Triad};
+use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// What an instrument that is turned on its mounting face makes of parameters: derivatives of those of the recording.
 #[derive(Debug, Clone)]
@@ -53,6 +55,17 @@ impl DayToDay {
     /// Whether anything differs.
     pub fn any(&self) -> bool {
         self.parameters.amax() > 0.0 || self.mounting > 0.0
+    }
+
+    /// The key of a group in a campaign's `[day_to_day]`, and its unit in SI.
+    pub fn key(group: Group) -> (String, f64) {
+        let (kind, unit) = match (group.kind(), group.sensor()) {
+            (ParameterKind::Scale, _) => ("scale_ppm", PPM),
+            (ParameterKind::Installation, _) => ("installation_arcsec", ARCSEC),
+            (ParameterKind::Bias, Sensor::Gyro) => ("bias_deg_per_h", DEG_PER_H),
+            (ParameterKind::Bias, Sensor::Accel) => ("bias_ug", MICRO_G),
+        };
+        (format!("{}_{kind}", group.sensor().name()), unit)
     }
 
     /// All that a recording has of its own, with its 1σ.

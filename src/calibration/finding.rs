@@ -49,6 +49,11 @@ pub enum Finding {
         /// Their names.
         parameters: Vec<String>,
     },
+    /// Recordings that differ by more than is stated.
+    RecordingsDiffer {
+        /// Of each group that does.
+        differences: Vec<RecordingDifference>,
+    },
     /// Second order and asymmetry of the accelerometers cannot be told apart.
     EvenTermsInseparable,
     /// The data reject the installation form.
@@ -196,6 +201,22 @@ impl fmt::Display for Finding {
                  recordings only; turn the instrument at more of them.",
                 listed(parameters)
             ),
+            Self::RecordingsDiffer { differences } => {
+                let lines = differences.iter().map(|of| {
+                    let RecordingDifference {
+                        key, stated, found, ..
+                    } = of;
+                    format!("{key} = {found:.2e} (stated {stated})")
+                });
+                let lines: Vec<String> = lines.collect();
+                write!(
+                    f,
+                    "Recordings differ by more than their σ and what [day_to_day] states: as by {}. That is used and in \
+                     all σ. Biases differ from one switch-on to the next, installation where the instrument was mounted \
+                     anew (mounting_arcsec), all where its temperature is not that of its sensor.",
+                    lines.join(", ")
+                )
+            }
             Self::CombinationsNotObserved { combinations } => write!(
                 f,
                 "Not observed by this path though each parameter alone was: {}.",
@@ -379,6 +400,21 @@ impl fmt::Display for Finding {
             }
         }
     }
+}
+
+/// By how much recordings differ in a group of parameters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordingDifference {
+    /// The key of `[day_to_day]`.
+    pub key: String,
+    /// What it states, in its unit.
+    pub stated: f64,
+    /// 1σ that the recordings show, in its unit.
+    pub found: f64,
+    /// −2 ln of the likelihood ratio of stated to found …
+    pub ratio: f64,
+    /// … and what it stays below but for this group's share of one false alarm in a thousand campaigns.
+    pub limit: f64,
 }
 
 /// Parameters by sensor and kind, such as `gyro scale x, y; accel bias z`.

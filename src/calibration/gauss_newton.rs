@@ -41,7 +41,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         problem,
         alone,
         findings: of_temperature,
-    } = match problem.varies() {
+    } = match problem.varies() || problem.runs().nth(1).is_some() {
         true => Solved::of(together::solve(problem, progress)?),
         false => Solved {
             attempt: from_coarse_start(problem, progress)?,

@@ -80,7 +80,7 @@ pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
 pub use error_term_test::{ErrorTermTest, LeftOff, Role, test_error_terms};
 pub use estimate::Estimate;
-pub use finding::Finding;
+pub use finding::{Finding, RecordingDifference};
 pub use form::FormTest;
 pub use frame::{Canonical, in_body_frame};
 pub use gauss_newton::estimate;

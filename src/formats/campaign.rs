@@ -8,10 +8,10 @@ use super::error::FileError;
 use super::fields::{Document, Field, Fields};
 use super::small_file;
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
-use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind, Sensor};
+use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
 use crate::recording::Temperature;
 use crate::run::Run;
-use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+use crate::units::ARCSEC;
 
 /// The version of the format.
 const FORMAT: &str = "turncal-campaign/1";
@@ -132,7 +132,7 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
         );
     }
     let lines = Group::all().filter_map(|group| {
-        let (key, _, unit) = key(group);
+        let (key, unit) = DayToDay::key(group);
         let first = group
             .parameters(InstallationForm::General)
             .first()
@@ -242,16 +242,14 @@ fn temperature(top: &Fields) -> Result<Stated, FileError> {
 /// The key of the mounting in `[day_to_day]`.
 const MOUNTING: &str = "mounting_arcsec";
 
-/// The key of a group in `[day_to_day]`, its name in `own`, and its unit in SI.
-fn key(group: Group) -> (String, String, f64) {
-    let (kind, name, unit) = match (group.kind(), group.sensor()) {
-        (ParameterKind::Scale, _) => ("scale_ppm", "scale", PPM),
-        (ParameterKind::Installation, _) => ("installation_arcsec", "installation", ARCSEC),
-        (ParameterKind::Bias, Sensor::Gyro) => ("bias_deg_per_h", "bias", DEG_PER_H),
-        (ParameterKind::Bias, Sensor::Accel) => ("bias_ug", "bias", MICRO_G),
+/// The name of a group in `own`.
+fn own_name(group: Group) -> String {
+    let kind = match group.kind() {
+        ParameterKind::Scale => "scale",
+        ParameterKind::Installation => "installation",
+        ParameterKind::Bias => "bias",
     };
-    let sensor = group.sensor().name();
-    (format!("{sensor}_{kind}"), format!("{sensor}.{name}"), unit)
+    format!("{}.{kind}", group.sensor().name())
 }
 
 /// 1σ by which recordings differ.
@@ -259,14 +257,14 @@ fn day_to_day(top: &Fields, runs: &[Run]) -> Result<DayToDay, FileError> {
     let form = InstallationForm::General;
     let mut of_recordings = DayToDay::default();
     let sigma = &mut of_recordings.parameters;
-    let keys: Vec<(String, String, f64)> = Group::all().map(key).collect();
-    let known = keys.iter().map(|(key, ..)| key.as_str());
+    let keys: Vec<(String, f64)> = Group::all().map(DayToDay::key).collect();
+    let known = keys.iter().map(|(key, _)| key.as_str());
     let known: Vec<&str> = known.chain([MOUNTING]).collect();
     if let Some(fields) = top.table("day_to_day", &known)? {
         if let Some(field) = fields.get(MOUNTING) {
             of_recordings.mounting = field.not_negative()? * ARCSEC;
         }
-        for (group, (key, _, unit)) in Group::all().zip(&keys) {
+        for (group, (key, unit)) in Group::all().zip(&keys) {
             if let Some(field) = fields.get(key) {
                 let stated = field.not_negative()? * unit;
                 group
@@ -280,10 +278,8 @@ fn day_to_day(top: &Fields, runs: &[Run]) -> Result<DayToDay, FileError> {
         return Ok(of_recordings);
     };
     for name in field.texts()? {
-        let named = keys.iter().position(|(_, known, _)| known == name);
-        let group = named.and_then(|place| Group::all().nth(place));
-        let Some(group) = group else {
-            let known: Vec<&str> = keys.iter().map(|(_, name, _)| name.as_str()).collect();
+        let Some(group) = Group::all().find(|&group| own_name(group) == *name) else {
+            let known: Vec<String> = Group::all().map(own_name).collect();
             return Err(field.error(
                 format_args!("names among {}", known.join(", ")),
                 "Name groups of parameters that each recording has for itself.",

@@ -1,5 +1,7 @@
 //! The instrument's temperature while it recorded.
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::imu::{PerSensor, Sensor, ThermalRange};
 
 /// Time between two knots, s.
@@ -112,25 +114,33 @@ impl Temperature {
 
 impl Channel {
     fn new(values: Vec<f64>) -> Self {
-        let (values, rates) = (0..values.len()).map(|k| line(&values, k)).unzip();
+        let (values, rates) = (0..values.len()).map(|k| parabola(&values, k)).unzip();
         Self { values, rates }
     }
 }
 
-/// Value at a knot, and slope per s, of the straight line through the knots about it.
-fn line(values: &[f64], knot: usize) -> (f64, f64) {
+/// Value at a knot, and slope per s, of the parabola through the knots about it: a straight line would cut the corners
+/// of a ramp by hundredths of a kelvin.
+fn parabola(values: &[f64], knot: usize) -> (f64, f64) {
     let over = knot.saturating_sub(OVER)..(knot + OVER + 1).min(values.len());
-    let (count, middle) = (over.len() as f64, 0.5 * (over.start + over.end - 1) as f64);
-    let (mut sum, mut moment, mut squares) = (0.0, 0.0, 0.0);
-    for k in over {
-        let from = k as f64 - middle;
-        sum += values[k];
-        moment += from * values[k];
-        squares += from * from;
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for k in over.clone() {
+        let from = (k as f64 - knot as f64) / OVER as f64;
+        let row = Vector3::new(1.0, from, from * from);
+        normal += row * row.transpose();
+        right += row * (values[k] - values[knot]);
     }
-    let slope = if squares > 0.0 { moment / squares } else { 0.0 };
-    let value = sum / count + slope * (knot as f64 - middle);
-    (value, slope / SPACING)
+    // Two values have a line, one has itself.
+    let degree = over.len().min(3);
+    for k in degree..3 {
+        normal.fill_row(k, 0.0);
+        normal.fill_column(k, 0.0);
+        normal[(k, k)] = 1.0;
+        right[k] = 0.0;
+    }
+    let solved = normal.cholesky().map(|factor| factor.solve(&right));
+    let of = solved.unwrap_or_default();
+    (values[knot] + of[0], of[1] / (OVER as f64 * SPACING))
 }
 
 /// Between two knots on the straight line, beyond the ends as at the ends.
@@ -154,9 +164,24 @@ mod tests {
         let temperature = Temperature::new(5.0, vec![ramp], PerSensor::default()).unwrap();
         assert_relative_eq!(temperature.at(105.25).gyro[2], 21.0025, epsilon = 1e-12);
         assert_relative_eq!(temperature.rate(5.0).accel[0], 0.01, epsilon = 1e-12);
-        assert_relative_eq!(temperature.at(-100.0).gyro[0], 20.0);
+        assert_relative_eq!(temperature.at(-100.0).gyro[0], 20.0, epsilon = 1e-12);
         assert_relative_eq!(temperature.at(1e9).gyro[0], 25.99, epsilon = 1e-12);
         assert_relative_eq!(temperature.range(Sensor::Gyro)[0], 20.0, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn a_corner_of_a_ramp_is_followed_as_a_case_rounds_it() {
+        // A chamber that begins to warm by 0.02 K/s, and a case behind it by two minutes.
+        let case = |t: f64| match t - 600.0 {
+            since if since > 0.0 => 0.02 * (since - 120.0 * (1.0 - (-since / 120.0).exp())),
+            _ => 0.0,
+        };
+        let values: Vec<f64> = (0..1800).map(|k| case(f64::from(k))).collect();
+        let temperature = Temperature::new(0.0, vec![values], PerSensor::default()).unwrap();
+        for k in 640..1700 {
+            let off = temperature.at(f64::from(k)).gyro[0] - case(f64::from(k));
+            assert!(off.abs() < 1e-3, "{off} K at {k} s");
+        }
     }
 
     #[test]
@@ -167,7 +192,10 @@ mod tests {
         };
         let channels = vec![vec![10.0, 12.0], vec![30.0, 30.0]];
         let temperature = Temperature::new(0.0, channels.clone(), of).unwrap();
-        assert_eq!(temperature.at(0.5).gyro, [11.0, 30.0, 11.0]);
+        for (axis, expected) in [11.0, 30.0, 11.0].into_iter().enumerate() {
+            assert_relative_eq!(temperature.at(0.5).gyro[axis], expected, epsilon = 1e-12);
+        }
+        // What does not change has no rate at all.
         assert_eq!(temperature.rate(0.5).accel, [0.0; 3]);
         let missing = PerSensor {
             gyro: [0, 1, 2],

@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use turncal::calibration::{AtRest, Calibration, Options, Problem, estimate, parameter};
+use turncal::calibration::{
+    AtRest, Calibration, Finding, Options, PARAMETERS, Problem, estimate, parameter,
+};
 use turncal::formats::Campaign;
 use turncal::imu::Sensor;
 use turncal::run::Run;
-use turncal::units::ARCSEC;
+use turncal::units::{ARCSEC, DEG_PER_H};
 
 use super::lot::{PATH, on_threads, turncal, words};
 use super::shared::{read, shared};
@@ -237,6 +239,59 @@ fn an_instrument_that_is_mounted_anew_turns_as_a_whole() {
         let own = &outcome.own[number];
         assert!((own.sigma.mounting.x / ARCSEC / known - 1.0).abs() < 0.01);
     }
+}
+
+const DAYS: &str = "scenario = \"scenario.toml\"
+[day_to_day]
+gyro_bias_deg_per_h = 0.2
+[[recording]]
+name = \"monday\"
+[[recording]]
+name = \"tuesday\"
+[[recording]]
+name = \"wednesday\"
+[[recording]]
+name = \"thursday\"
+";
+
+#[test]
+fn recordings_that_differ_by_more_than_is_stated_are_found_to() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    simulated(here);
+    fs::write(here.join("days.toml"), DAYS).unwrap();
+    let made = turncal(here, &["simulate", "days.toml", "-o", "days"]);
+    assert!(made.status.success(), "{}", words(&made));
+    let path = here.join("days/campaign.toml");
+    let stated = Campaign::read(&path).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let without = text.split("# 1σ from one recording").next().unwrap();
+    fs::write(&path, without).unwrap();
+    let silent = Campaign::read(&path).unwrap();
+    let sigma = |campaign: &Campaign| {
+        let runs: Vec<&Run> = campaign.runs.iter().collect();
+        let problem = Problem::together(&runs, &Options::default(), &campaign.together).unwrap();
+        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let found = outcome.findings.iter().find_map(|finding| match finding {
+            Finding::RecordingsDiffer { differences } => Some(differences.clone()),
+            _ => None,
+        });
+        (
+            outcome.estimate.sigma()[PARAMETERS / 2 - 3] / DEG_PER_H,
+            found,
+        )
+    };
+    let (of_stated, none) = sigma(&stated);
+    assert_eq!(none, None);
+    let (of_silent, found) = sigma(&silent);
+    let found = found.unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].key, "gyro_bias_deg_per_h");
+    // Three axes on four days, less their means: nine degrees of freedom.
+    let known = 0.2 / 18.0f64.sqrt();
+    assert!((found[0].found - 0.2).abs() < 3.0 * known, "{found:?}");
+    let ratio = of_silent / of_stated * 0.2 / found[0].found;
+    assert!((ratio - 1.0).abs() < 0.02, "{of_silent} {of_stated} °/h");
 }
 
 #[test]

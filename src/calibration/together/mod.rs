@@ -6,6 +6,7 @@
 //! then with those that a likelihood ratio calls for.
 
 mod alone;
+mod differ;
 mod order;
 mod repeat;
 mod temperatures;
@@ -19,6 +20,7 @@ use super::error::CalibrationError;
 use super::finding::Finding;
 use super::iterations::{Iterated, iterate};
 use super::linearisation::{AttitudePrior, Linearisation};
+use super::noise::NoisePolicy;
 use super::options::Options;
 use super::outcome::Pass;
 use super::parameters::parameter;
@@ -113,19 +115,28 @@ pub(super) struct Joint<'a> {
     pub findings: Vec<Finding>,
 }
 
-/// Solves a problem that varies, with stated noise.
+/// Solves a problem of several recordings, or one that varies, with stated noise; recordings differ by what is stated or, where the noise may be
+/// learnt, by what they show.
 pub(super) fn solve<'a>(
     problem: &Problem<'a>,
     progress: Progress,
 ) -> Result<Joint<'a>, CalibrationError> {
     let alone = alone::each(problem)?;
+    let mut findings = Vec::new();
+    let mut problem = problem.clone();
+    if problem.options.noise != NoisePolicy::Stated
+        && let Some((day_to_day, finding)) = differ::learnt(&problem.model, &alone)
+    {
+        let mut model = problem.model.clone();
+        model.day_to_day = day_to_day;
+        problem = problem.with_model(model);
+        findings.push(finding);
+    }
     let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
-    let at = start(problem, &alone);
+    let at = start(&problem, &alone);
     let mut passes = Vec::new();
     let gate = Gate::Innovations;
-    let mut iterated = iterate(problem, &priors, at, gate, &mut passes, progress)?;
-    let mut problem = problem.clone();
-    let mut findings = Vec::new();
+    let mut iterated = iterate(&problem, &priors, at, gate, &mut passes, progress)?;
     if let Some(thermal) = &iterated.held.thermal {
         let selected = order::select(thermal, &iterated.held.covariance);
         findings.extend(selected.finding(problem.model.form));

@@ -15,6 +15,8 @@ use crate::units::{DEG_PER_H, DEGREE};
 const SHOWN: usize = 5;
 /// A latitude is usually stated to this, rad.
 const LATITUDE: f64 = 1e-3 * DEGREE;
+/// So many error terms are named that a record would not show.
+const NAMED_TERMS: usize = 3;
 /// A source is named where it adds at least this part of a variance.
 const NAMED: f64 = 1e-3;
 
@@ -141,6 +143,49 @@ pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
          noise by more time at rest, the table's position by more positions, the prior by a path that shows the \
          parameter.",
     )
+}
+
+/// What σ do not hold: error terms that the record would not show and that change a group by more than its σ.
+pub(super) fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
+    let claimed = estimate.sigma();
+    let worst = |test: &ErrorTermTest| {
+        let left_off = test.left_off?;
+        let of_group = |group: Group| {
+            let indices = group.estimated(estimate);
+            let [may, sigma] = [&left_off.shown, &claimed].map(|v| group.spread(v, &indices));
+            Some((group, may?.1 / sigma?.1))
+        };
+        let groups = Group::all().filter_map(of_group);
+        groups
+            .filter(|&(_, times)| times > 1.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(group, times)| (test.term, group, times))
+    };
+    let mut unseen: Vec<_> = report.effects.iter().filter_map(worst).collect();
+    unseen.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let named = unseen
+        .iter()
+        .take(NAMED_TERMS)
+        .map(|&(term, group, times)| {
+            format!(
+                "{} {} by {} σ",
+                term.name(),
+                group.short(),
+                value(times, 1.0)
+            )
+        });
+    let named: Vec<String> = named.collect();
+    (!named.is_empty()).then(|| {
+        format!(
+            "σ are those of this model. Errors that are not estimated and that this record would not show may \
+             change more: {}{}.",
+            named.join(", "),
+            match unseen.len() - named.len() {
+                0 => String::new(),
+                more => format!(", {more} more"),
+            }
+        )
+    })
 }
 
 /// What is in no sum: error terms that are not estimated.

@@ -25,6 +25,9 @@ impl Report<'_> {
         let mut document = Document::new(self.title);
         document.lead = vec![self.verdict()];
         document.lead.extend(self.lead());
+        let estimate = self.estimate();
+        let unseen = estimate.and_then(|estimate| budget::unseen(self, estimate));
+        document.lead.extend(unseen);
         document.warnings.items = self.warnings();
         document.page(facts::item(self));
         document.both(self.groups());
