@@ -5,28 +5,40 @@
 #[cfg(unix)]
 pub fn leave_nothing_behind() {
     use std::process;
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
     use std::thread;
 
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::flag::register_conditional_default;
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
     use turncal::formats::abandon_unfinished;
 
-    // Without this thread the signals do what they do by default; the next run clears up.
-    let _ = thread::Builder::new().name("signals".into()).spawn(|| {
-        let heeded = [SIGINT, SIGTERM, SIGHUP]
-            .into_iter()
-            .filter(|&signal| !is_ignored(signal));
-        let Ok(mut signals) = Signals::new(heeded) else {
-            return;
-        };
-        if let Some(signal) = signals.forever().next() {
-            abandon_unfinished();
-            // Ended by the signal itself, so that a shell's loop over many runs ends, too.
-            let _ = emulate_default_handler(signal);
-            process::exit(128 + signal);
+    let heeded = || {
+        let all = [SIGINT, SIGTERM, SIGHUP].into_iter();
+        all.filter(|&signal| !is_ignored(signal))
+    };
+    // From here on a signal waits for the thread, however long that takes to begin.
+    let Ok(mut signals) = Signals::new(heeded()) else {
+        return;
+    };
+    let thread = thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || {
+            if let Some(signal) = signals.forever().next() {
+                abandon_unfinished();
+                // Ended by the signal itself, so that a shell's loop over many runs ends, too.
+                let _ = emulate_default_handler(signal);
+                process::exit(128 + signal);
+            }
+        });
+    // Without a thread the signals do what they do by default; the next run clears up.
+    if thread.is_err() {
+        for signal in heeded() {
+            let _ = register_conditional_default(signal, Arc::new(AtomicBool::new(true)));
         }
-    });
+    }
 }
 
 /// Whether the process was begun with a signal ignored, as `nohup` does; that stays so. Where the
