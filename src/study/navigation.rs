@@ -5,7 +5,7 @@ mod course;
 mod outlook;
 mod warming;
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3, stack};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
@@ -185,7 +185,7 @@ impl Sensed {
 impl PerSensor<Sensed> {
     fn errors(&self, at: &Instant) -> InputError {
         let (rate, force) = (self.gyro.error(&at.rate), self.accel.error(&at.force));
-        stack![rate; force]
+        InputError::new(rate.x, rate.y, rate.z, force.x, force.y, force.z)
     }
 }
 
