@@ -4,7 +4,6 @@ use nalgebra::{SMatrix, Vector3};
 
 use super::block::CorrectedResponse;
 use super::error_model::{ErrorMatrix, ErrorModel, INPUTS, PARAMETERS, STATES, Sensitivity};
-use super::strapdown::Height;
 use super::stride::Instant;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
@@ -70,11 +69,7 @@ pub struct Linearisation {
 impl Linearisation {
     /// About a true motion.
     pub fn about(at: &Instant, sensed: &SensedErrors) -> Self {
-        let held = Height::Held {
-            height: at.truth.height,
-            velocity: at.truth.velocity.z,
-        };
-        let ErrorModel { dynamics, input } = ErrorModel::about(&at.truth, &at.force, held);
+        let ErrorModel { dynamics, input } = at.linear_model();
         let mut forcing = [[0.0; PARAMETERS]; STATES];
         add_product::<INPUTS>(&mut forcing, &input, &sensed.rows(&at.rate, &at.force));
         Self { dynamics, forcing }

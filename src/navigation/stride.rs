@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::strapdown::Solution;
+use super::error_model::ErrorModel;
+use super::strapdown::{Height, Solution};
 
 /// The longest step, s: an eightieth of a radian of the Schuler oscillation, of which Runge and Kutta then keep
 /// the phase over 40 h to 1e-7 rad.
@@ -27,6 +28,15 @@ impl Instant {
         let (rate, force) = truth.steady();
         let truth = *truth;
         Self { truth, rate, force }
+    }
+
+    /// The linear error model here, height held.
+    pub fn linear_model(&self) -> ErrorModel {
+        let held = Height::Held {
+            height: self.truth.height,
+            velocity: self.truth.velocity.z,
+        };
+        ErrorModel::about(&self.truth, &self.force, held)
     }
 }
 

@@ -290,16 +290,26 @@ impl Mission {
         let sensed = sensed_errors(truth)?;
         let linear = |at: &Instant| Linearisation::about(at, &sensed);
         let mut start = linear(course.here());
+        // At rest one exact step does for all intervals.
+        let at_rest = match &self.motion {
+            Motion::Standing(truth) => Some(Instant::steady(truth)),
+            Motion::Moving(_) => None,
+        };
+        let at_rest = at_rest.map(|at| (at, at.linear_model().over(self.interval)));
 
         let mut exposures = vec![exposure(0.0, &sensitivity, &course.here().truth)?];
         for interval in 1..=self.intervals {
             let time = f64::from(interval) * self.interval;
-            course.go(time, 0.0, |stride| {
-                let [middle, end] = [&stride.middle, &stride.end].map(linear);
-                sensitivity.follow(stride.duration, [&start, &middle, &end]);
-                start = end;
-                Ok::<_, NavigationStudyError>(())
-            })?;
+            if let Some((at, transition)) = &at_rest {
+                sensitivity.advance(transition, &sensed.at(&at.rate, &at.force));
+            } else {
+                course.go(time, 0.0, |stride| {
+                    let [middle, end] = [&stride.middle, &stride.end].map(linear);
+                    sensitivity.follow(stride.duration, [&start, &middle, &end]);
+                    start = end;
+                    Ok::<_, NavigationStudyError>(())
+                })?;
+            }
             exposures.push(exposure(time, &sensitivity, &course.here().truth)?);
         }
         Ok(exposures)
