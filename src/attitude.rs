@@ -64,7 +64,18 @@ pub fn mean(attitudes: &[Matrix3<f64>]) -> Option<Matrix3<f64>> {
 /// `C_b_n = Rz(−heading) Rx(pitch) Ry(roll)`: body right-front-up to East-North-Up, all in radians,
 /// heading clockwise from North.
 pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f64> {
-    exp(Vector3::z() * -heading) * exp(Vector3::x() * pitch) * exp(Vector3::y() * roll)
+    let [(sp, cp), (sr, cr), (sh, ch)] = [pitch, roll, heading].map(f64::sin_cos);
+    Matrix3::new(
+        ch * cr + sh * sp * sr,
+        sh * cp,
+        ch * sr - sh * sp * cr,
+        ch * sp * sr - sh * cr,
+        ch * cp,
+        -sh * sr - ch * sp * cr,
+        -cp * sr,
+        sp,
+        cp * cr,
+    )
 }
 
 /// Pitch, roll and heading in radians of `C_b_n`, the inverse of [`from_pitch_roll_heading`]. Pitch is
@@ -134,6 +145,18 @@ mod tests {
     fn heading_east_points_the_front_axis_east() {
         let c = from_pitch_roll_heading(0.0, 0.0, std::f64::consts::FRAC_PI_2);
         assert_relative_eq!(c * Vector3::y(), Vector3::x(), epsilon = 1e-15);
+    }
+
+    #[test]
+    fn pitch_roll_and_heading_are_turns_about_y_x_and_down_in_this_order() {
+        let [pitch, roll, heading] = [0.3, -0.2, 2.9];
+        let expected =
+            exp(Vector3::z() * -heading) * exp(Vector3::x() * pitch) * exp(Vector3::y() * roll);
+        assert_relative_eq!(
+            from_pitch_roll_heading(pitch, roll, heading),
+            expected,
+            epsilon = 1e-15
+        );
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What navigation hands to a filter: the error model over a range of samples.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::process_noise::NoiseInputs;
 use super::state::State;
@@ -64,10 +64,5 @@ impl CorrectedResponse {
     /// Of each parameter the weights of the columns of `C_b_n b_k`, one `b_k` after the other.
     pub(super) fn columns(&self) -> [SVector<f64, 12>; PER_TRIAD] {
         self.0.map(|w| SVector::from_column_slice(w.as_slice()))
-    }
-
-    /// Error of the computed input by one parameter's error, at an input.
-    pub(super) fn error(&self, parameter: usize, u: &Vector3<f64>) -> Vector3<f64> {
-        self.0[parameter] * u.push(1.0)
     }
 }

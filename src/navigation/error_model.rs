@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::block::CorrectedResponse;
+use super::sensitivity::SensedErrors;
 use super::strapdown::{Height, Solution};
 use crate::attitude::{exp, skew};
 use crate::earth::{
     Curvature, ROTATION_RATE, SEMI_MAJOR_AXIS, earth_rate_n, normal_gravity_gradient,
 };
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
 use crate::units::STANDARD_GRAVITY;
 
 /// Attitude error φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad.
@@ -251,17 +251,7 @@ pub fn sensed_errors(
     rate: &Vector3<f64>,
     force: &Vector3<f64>,
 ) -> Option<SMatrix<f64, INPUTS, PARAMETERS>> {
-    let mut sensed = SMatrix::<f64, INPUTS, PARAMETERS>::zeros();
-    for (place, (sensor, u)) in Sensor::ALL.into_iter().zip([rate, force]).enumerate() {
-        let triad = triads.get(sensor);
-        let response = CorrectedResponse::new(triad, &triad.correction()?);
-        for parameter in 0..PER_TRIAD {
-            sensed
-                .fixed_view_mut::<3, 1>(3 * place, PER_TRIAD * place + parameter)
-                .copy_from(&response.error(parameter, u));
-        }
-    }
-    Some(sensed)
+    Some(SensedErrors::new(triads).ok()?.at(rate, force))
 }
 
 impl Solution {

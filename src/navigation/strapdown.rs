@@ -44,7 +44,8 @@ impl Solution {
         } = Curvature::at(self.latitude);
         let east = self.velocity.x / (prime_vertical + self.height);
         let north = self.velocity.y / (meridian + self.height);
-        Vector3::new(-north, east, east * self.latitude.tan())
+        let (sin, cos) = self.latitude.sin_cos();
+        Vector3::new(-north, east, east * (sin / cos))
     }
 
     /// Acceleration relative to the Earth in East-North-Up, m/s², under a specific force in the same
@@ -55,6 +56,27 @@ impl Solution {
         let mut acceleration = force - turning.cross(&self.velocity);
         acceleration.z -= normal_gravity(self.latitude, self.height);
         acceleration
+    }
+
+    /// Rates of latitude and longitude, rad/s, and of height, m/s.
+    #[inline]
+    pub(super) fn position_rate(&self) -> Vector3<f64> {
+        let transport = self.transport_rate();
+        Vector3::new(
+            -transport.x,
+            transport.y / self.latitude.cos(),
+            self.velocity.z,
+        )
+    }
+
+    /// The same attitude and velocity elsewhere: so much further in latitude and longitude (rad) and height (m).
+    pub(super) fn moved(&self, by: &Vector3<f64>) -> Self {
+        Self {
+            latitude: self.latitude + by.x,
+            longitude: self.longitude + by.y,
+            height: self.height + by.z,
+            ..*self
+        }
     }
 
     /// Angular rate `ω_ib` (rad/s) and specific force (m/s²) along body axes of a body that keeps its
@@ -111,12 +133,12 @@ pub struct Strapdown {
 
 /// Derivatives, or changes, of what moves slowly.
 #[derive(Debug, Clone, Copy)]
-struct Slow {
+pub(super) struct Slow {
     /// Rotation vector of East-North-Up since the step began, rad.
-    turn: Vector3<f64>,
-    velocity: Vector3<f64>,
+    pub turn: Vector3<f64>,
+    pub velocity: Vector3<f64>,
     /// Latitude and longitude in rad, height in m.
-    position: Vector3<f64>,
+    pub position: Vector3<f64>,
 }
 
 impl Strapdown {
@@ -215,6 +237,12 @@ impl Solution {
             state.height = self.height + (height - self.height) * part + bulge;
         }
         (state, turn)
+    }
+
+    /// What changes slowly, at this velocity and position, under no specific force.
+    #[inline]
+    pub(super) fn coasting(&self) -> Slow {
+        self.slow(&Vector3::zeros(), &Vector3::zeros())
     }
 
     /// What changes slowly, at this velocity and position, when East-North-Up has turned since the

@@ -5,12 +5,16 @@
 //! the velocity.
 
 mod leg;
+mod strides;
 mod travel;
 
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::navigation::Solution;
 use leg::Leg;
+pub use strides::Strides;
 pub use travel::Travel;
 
 /// The least horizontal speed over the climb rate: beyond, pitch would be steeper than a body flies.
@@ -93,6 +97,19 @@ pub enum TrajectoryError {
     },
 }
 
+impl Start {
+    /// Where it is, attitude and velocity still to be set.
+    fn place(&self) -> Solution {
+        Solution {
+            attitude: Matrix3::identity(),
+            velocity: Vector3::zeros(),
+            latitude: self.latitude,
+            longitude: self.longitude,
+            height: self.height,
+        }
+    }
+}
+
 impl Trajectory {
     /// A trajectory whose segments fit each other.
     ///
@@ -152,6 +169,11 @@ impl Trajectory {
     /// Goes through it in steps of `period` seconds.
     pub fn travel(&self, period: f64) -> Travel<'_> {
         Travel::new(self, period)
+    }
+
+    /// Goes through it in steps as long as its motion allows.
+    pub fn strides(&self) -> Strides<'_> {
+        Strides::new(self)
     }
 }
 

@@ -4,9 +4,12 @@
 //! readings draw from generators of their own, so that changing one leaves the others as they were.
 
 mod campaign;
+mod drive;
 mod increments;
 mod scenario;
 mod thermal;
+
+use std::borrow::Cow;
 
 use nalgebra::{Matrix3, SVector, Vector3};
 use rand::SeedableRng;
@@ -14,6 +17,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 pub use campaign::SimulatedCampaign;
+use drive::Drive;
+pub use drive::Runs;
 pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 pub use thermal::{Chamber, ThermalTruth};
@@ -26,10 +31,8 @@ use crate::imu::{
 use crate::navigation::samples_of;
 use crate::recording::{ImuSamples, Recording, TableLog};
 use crate::run::{Run, SET_BY_HAND, Standstill};
-use crate::turntable::{
-    AxisAngles, AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across, axis_angles,
-};
-use crate::turntable::{Imperfection, Motion, Moves, TableError};
+use crate::turntable::{AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across};
+use crate::turntable::{Imperfection, Moves, TableError};
 
 /// A run and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,12 +130,27 @@ impl Scenario {
         stream: u64,
         own: &Difference,
     ) -> Result<Simulated, TableError> {
+        self.simulate_on(None, seed, instrument, stream, own)
+    }
+
+    /// The same on a drive that was made before, if it is the one that this recording has.
+    fn simulate_on(
+        &self,
+        made: Option<&Drive>,
+        seed: u64,
+        instrument: u64,
+        stream: u64,
+        own: &ParameterVector,
+    ) -> Result<Simulated, TableError> {
         let mut rng = Draws::Imperfection.generator(seed, stream);
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
-        let motion = Motion::new(&self.table, &self.path, &imperfection)?;
-        let read = Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))?;
         let terms = self.draw_terms(&mut Draws::Terms.generator(seed, instrument));
-        let ideal = true_increments(&motion, &self.site, &self.integrator, &terms);
+        let geometry = self.geometry(&imperfection);
+        let drive = match made.filter(|drive| drive.is_of(&imperfection, &terms)) {
+            Some(drive) => Cow::Borrowed(drive),
+            None => Cow::Owned(Drive::new(self, imperfection, terms)?),
+        };
+        let ideal = &drive.ideal;
 
         let truth = PerSensor::from_fn(|sensor| {
             let draws = match sensor {
@@ -151,7 +169,7 @@ impl Scenario {
         let warming = self
             .chamber
             .as_ref()
-            .map(|chamber| chamber.instrument(motion.duration()));
+            .map(|chamber| chamber.instrument(drive.duration));
         let nominal = PerSensor::from_fn(|sensor| {
             let per_unit = match self.output {
                 Output::Pulse => 1.0 / self.instrument.pulse.get(sensor),
@@ -186,7 +204,7 @@ impl Scenario {
         let temperature = self.chamber.as_ref().zip(warming.as_ref());
         let temperature = temperature.and_then(|(chamber, warming)| {
             let mut rng = Draws::thermal(seed, !stream);
-            warming.recorded(motion.duration(), chamber.sensor_noise, &mut rng)
+            warming.recorded(drive.duration, chamber.sensor_noise, &mut rng)
         });
         let imu = ImuSamples {
             pulse,
@@ -209,7 +227,7 @@ impl Scenario {
                     .map(|(key, value)| (key.to_owned(), value.clone()))
                     .into(),
                 imu,
-                table: Some(self.readings(&read, seed, stream)),
+                table: Some(self.readings(&drive, seed, stream)),
                 segments: Vec::new(),
                 files: Vec::new(),
                 notes: Vec::new(),
@@ -239,7 +257,7 @@ impl Scenario {
             truth,
             common,
             terms,
-            geometry: self.geometry(&imperfection),
+            geometry,
             thermal,
             output: self.output,
         })
@@ -301,45 +319,27 @@ impl Scenario {
             .collect()
     }
 
-    /// The table's axes in the position that it has or leaves at each time.
-    fn axes(&self, motion: &Motion, times: &[f64]) -> Vec<AxisAngles> {
-        let Moves::Axes { start, steps } = &self.path.moves else {
-            return Vec::new();
-        };
-        let axes = || self.table.axes.iter().map(|axis| axis.direction);
-        let mut angles = start.clone();
-        let mut of_positions = vec![axis_angles(axes().zip(angles.iter().copied()))];
-        for step in steps {
-            for (angle, by) in angles.iter_mut().zip(&step.angles) {
-                *angle += by;
-            }
-            of_positions.push(axis_angles(axes().zip(angles.iter().copied())));
-        }
-        let at = |&time: &f64| of_positions.get(motion.position(time)).copied();
-        times.iter().filter_map(at).collect()
-    }
-
     /// The table's log: `exp(−[τ×]) C_b_n`, τ the error of the position in force and white noise.
-    fn readings(&self, motion: &Motion, seed: u64, stream: u64) -> TableLog {
+    fn readings(&self, drive: &Drive, seed: u64, stream: u64) -> TableLog {
         let errors = &self.table.errors;
         let mut positions = Draws::Positions.generator(seed, stream);
         let mut readings = Draws::Readings.generator(seed, stream);
         let mut position = 0;
         let mut of_position = normal(&mut positions) * errors.position;
-        let count = (motion.duration() * self.reading_rate + 1e-6) as usize;
-        let (time, attitude): (Vec<f64>, Vec<Matrix3<f64>>) = (0..=count)
-            .map(|k| k as f64 / self.reading_rate)
-            .map(|time| {
-                while position < motion.position(time) {
+        let (time, attitude): (Vec<f64>, Vec<Matrix3<f64>>) = drive
+            .read
+            .iter()
+            .map(|(time, of, attitude)| {
+                while position < *of {
                     position += 1;
                     of_position = normal(&mut positions) * errors.position;
                 }
                 let tau = of_position + normal(&mut readings) * errors.reading;
-                (time, exp(-tau) * motion.at(time).attitude)
+                (*time, exp(-tau) * attitude)
             })
             .unzip();
         TableLog {
-            axes: self.axes(motion, &time),
+            axes: drive.axes.clone(),
             time,
             attitude,
         }

@@ -3,7 +3,7 @@ use crate::attitude::log;
 use crate::calibration::ErrorTerm;
 use crate::imu::InstallationForm;
 use crate::models::{InstallationModel, Place};
-use crate::turntable::{AXIS_ERRORS, axis_response};
+use crate::turntable::{AXIS_ERRORS, Motion, axis_response};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, PPM};
 
 fn demo() -> Scenario {
@@ -269,15 +269,17 @@ fn the_axes_of_a_table_turn_it_by_their_errors_wherever_it_stands() {
         motion(&imperfection),
         motion(&Imperfection::none(&scenario.table)),
     );
+    let none = Imperfection::none(&scenario.table);
+    let drive = Drive::new(&scenario, none, TermVector::zeros()).unwrap();
     let errors = scenario.geometry(&imperfection);
     let errors = errors.fixed_rows::<AXIS_ERRORS>(3);
     assert!(errors.iter().all(|&error| error != 0.0));
     for (start, end) in read.dwells() {
         let time = 0.5 * (start + end);
-        let axes = scenario.axes(&read, &[time]);
+        let reading = (time * scenario.reading_rate) as usize;
         let turned = log(&(real.at(time).attitude * read.at(time).attitude.transpose()));
         // Of second order in some tens of seconds of arc.
-        let off = turned - axis_response(&axes[0]) * errors;
+        let off = turned - axis_response(&drive.axes[reading]) * errors;
         assert!(off.norm() < 0.01 * ARCSEC, "{time}: {off} of {turned}");
     }
 }

@@ -20,7 +20,7 @@ use crate::calibration::{CalibrationError, ErrorTermTest, Group, mean_square_int
 use crate::calibration::{PARAMETERS, ParameterVector};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
-use crate::simulation::Scenario;
+use crate::simulation::{Runs, Scenario};
 use crate::turntable::TableError;
 
 use figures::{Squares, rms};
@@ -166,8 +166,9 @@ impl AccuracyStudy {
         runs: &[u64],
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<Trial>, StudyError> {
+        let simulated = [Runs::new(&self.scenario)?, Runs::new(&baseline.scenario)?];
         let all = runs.par_iter().with_max_len(1).map(|&run| {
-            let trial = self.trial(baseline, run);
+            let trial = self.trial(baseline, &simulated, run);
             done();
             trial
         });

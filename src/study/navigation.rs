@@ -14,10 +14,10 @@ use crate::calibration::{PARAMETERS, ParameterMatrix, parameter};
 use crate::earth::Site;
 use crate::imu::BodyFrame;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
-use crate::navigation::error_model::{INPUTS, STATES};
+use crate::navigation::error_model::{POSITION, STATES};
 use crate::navigation::{
-    ErrorMatrix, ErrorModel, ErrorVector, Height, Increments, NavigationError, NearPole,
-    Sensitivity, Solution, Strapdown, Trajectory, Transition, sensed_errors, within_reach,
+    ErrorMatrix, ErrorVector, Forcing, InputError, Instant, Linearisation, NavigationError,
+    NearPole, NonlinearError, SensedErrors, Sensitivity, Solution, Trajectory, within_reach,
 };
 use course::Course;
 
@@ -28,18 +28,6 @@ pub use warming::{Warming, WarmingError, WarmingPair};
 pub const INTERVAL: f64 = 60.0;
 /// Intervals in the 40 h of the paper's study.
 pub const FORTY_HOURS: u32 = 40 * 60;
-/// Steps between two moments for a body that stands: 10 s. Against steps of a tenth 40 h differ by
-/// 1e-8°.
-const STANDING_STEPS: u32 = 6;
-/// Steps between two moments for a body that moves: 0.1 s. An ideal instrument then errs by a
-/// decimetre in a flight of four hours.
-const MOVING_STEPS: u32 = 600;
-/// Steps of the linear model between two moments for a body that moves: 0.25 s, in which a vehicle turns
-/// by 5°.
-const LINEAR_STEPS: u32 = 240;
-/// Steps after which the linear model of a steady motion is made anew: 10 s.
-const RENEWED: u32 = 40;
-
 /// How a body moves while it navigates.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
@@ -189,9 +177,15 @@ struct Sensed {
 }
 
 impl Sensed {
-    /// The integral over a step from that of the input.
-    fn over(&self, input: &Vector3<f64>, period: f64) -> Vector3<f64> {
-        input + self.relative * input + self.constant * period
+    fn error(&self, input: &Vector3<f64>) -> Vector3<f64> {
+        self.relative * input + self.constant
+    }
+}
+
+impl PerSensor<Sensed> {
+    fn errors(&self, at: &Instant) -> InputError {
+        let (rate, force) = (self.gyro.error(&at.rate), self.accel.error(&at.force));
+        InputError::new(rate.x, rate.y, rate.z, force.x, force.y, force.z)
     }
 }
 
@@ -251,31 +245,22 @@ impl Mission {
         start: &ErrorVector,
         sensed: impl Fn(u32) -> Result<PerSensor<Sensed>, NavigationStudyError>,
     ) -> Result<Vec<Epoch>, NavigationStudyError> {
-        let steps = match &self.motion {
-            Motion::Standing(_) => STANDING_STEPS,
-            Motion::Moving(_) => MOVING_STEPS,
-        };
-        let period = self.interval / f64::from(steps);
-        let mut course = Course::new(&self.motion, period);
-        let mut navigation = Strapdown::new(course.truth().with_errors(start), period)?;
-        let mut moments = vec![moment(0.0, &navigation, course.truth())];
+        let mut course = Course::new(&self.motion);
+        within_reach(course.here().truth.latitude + start[POSITION])?;
+        let mut errors = NonlinearError::new(start);
+        let mut moments = vec![moment(0.0, &errors, &course.here().truth)];
         for interval in 1..=self.intervals {
             let sensed = sensed(interval)?;
-            for _ in 0..steps {
-                let ideal = course.advance();
-                let truth = course.truth();
-                let held = Height::Held {
-                    height: truth.height,
-                    velocity: truth.velocity.z,
-                };
-                let increments = Increments {
-                    angle: sensed.gyro.over(&ideal.angle, period),
-                    velocity: sensed.accel.over(&ideal.velocity, period),
-                };
-                navigation.advance(&increments, held)?;
-            }
             let time = f64::from(interval) * self.interval;
-            moments.push(moment(time, &navigation, course.truth()));
+            let forcing = |at: &Instant| Forcing::of(at, &sensed.errors(at));
+            let mut start = forcing(course.here());
+            course.go(time, sensed.gyro.constant.norm(), |stride| {
+                let [middle, end] = [&stride.middle, &stride.end].map(forcing);
+                errors.advance(stride.duration, [&start, &middle, &end])?;
+                start = end;
+                Ok::<_, NavigationStudyError>(())
+            })?;
+            moments.push(moment(time, &errors, &course.here().truth));
         }
         Ok(moments)
     }
@@ -298,36 +283,34 @@ impl Mission {
     /// As for [`Self::navigate`].
     pub fn exposure_from(
         &self,
-        start: Sensitivity<PARAMETERS>,
+        mut sensitivity: Sensitivity<PARAMETERS>,
         truth: &PerSensor<Triad>,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
-        let steps = match &self.motion {
-            Motion::Standing(_) => 1,
-            Motion::Moving(_) => LINEAR_STEPS,
+        let mut course = Course::new(&self.motion);
+        let sensed = sensed_errors(truth)?;
+        let linear = |at: &Instant| Linearisation::about(at, &sensed);
+        let mut start = linear(course.here());
+        // At rest one exact step does for all intervals.
+        let at_rest = match &self.motion {
+            Motion::Standing(truth) => Some(Instant::steady(truth)),
+            Motion::Moving(_) => None,
         };
-        let step = self.interval / f64::from(steps);
-        // Each step is linearised in its middle.
-        let mut course = Course::new(&self.motion, 0.5 * step);
-        let mut sensitivity = start;
-        let mut steady: Option<Linear> = None;
-        let mut exposures = vec![exposure(0.0, &sensitivity, course.truth())?];
+        let at_rest = at_rest.map(|at| (at, at.linear_model().over(self.interval)));
+
+        let mut exposures = vec![exposure(0.0, &sensitivity, &course.here().truth)?];
         for interval in 1..=self.intervals {
-            for k in 0..steps {
-                let is_steady = course.is_steady_for(step);
-                course.advance();
-                // Motion that is steady leads over the Earth nevertheless.
-                let renewed = k % RENEWED == 0 && matches!(self.motion, Motion::Moving(_));
-                let kept = steady.take().filter(|_| is_steady && !renewed);
-                let linear = match kept {
-                    Some(linear) => linear,
-                    None => Linear::about(&course, truth, step)?,
-                };
-                course.advance();
-                sensitivity.advance(&linear.transition, &linear.sensed);
-                steady = is_steady.then_some(linear);
-            }
             let time = f64::from(interval) * self.interval;
-            exposures.push(exposure(time, &sensitivity, course.truth())?);
+            if let Some((at, transition)) = &at_rest {
+                sensitivity.advance(transition, &sensed.at(&at.rate, &at.force));
+            } else {
+                course.go(time, 0.0, |stride| {
+                    let [middle, end] = [&stride.middle, &stride.end].map(linear);
+                    sensitivity.follow(stride.duration, [&start, &middle, &end]);
+                    start = end;
+                    Ok::<_, NavigationStudyError>(())
+                })?;
+            }
+            exposures.push(exposure(time, &sensitivity, &course.here().truth)?);
         }
         Ok(exposures)
     }
@@ -346,10 +329,14 @@ impl Exposure {
     }
 }
 
-fn moment(time: f64, navigation: &Strapdown, truth: &Solution) -> Epoch {
+fn sensed_errors(triads: &PerSensor<Triad>) -> Result<SensedErrors, NavigationStudyError> {
+    SensedErrors::new(triads).map_err(|sensor| NavigationStudyError::Singular { sensor })
+}
+
+fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Epoch {
     Epoch {
         time,
-        error: NavigationError::of(navigation.solution(), truth),
+        error: NavigationError::of(&errors.computed(truth), truth),
         covariance: None,
     }
 }
@@ -365,36 +352,6 @@ fn exposure(
         time,
         by_parameter: by_state * sensitivity.0,
     })
-}
-
-/// The linear model over a step.
-struct Linear {
-    transition: Transition,
-    sensed: SMatrix<f64, INPUTS, PARAMETERS>,
-}
-
-impl Linear {
-    fn about(
-        course: &Course,
-        triads: &PerSensor<Triad>,
-        duration: f64,
-    ) -> Result<Self, NavigationStudyError> {
-        let truth = course.truth();
-        let (rate, force) = course.sensed();
-        let held = Height::Held {
-            height: truth.height,
-            velocity: truth.velocity.z,
-        };
-        let sensed = sensed_errors(triads, &rate, &force).ok_or_else(|| {
-            let gyro = triads.gyro.correction().is_none();
-            let sensor = if gyro { Sensor::Gyro } else { Sensor::Accel };
-            NavigationStudyError::Singular { sensor }
-        })?;
-        Ok(Self {
-            transition: ErrorModel::about(truth, &force, held).over(duration),
-            sensed,
-        })
-    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Imperfection, PHASES, Profile, Table, phases};
+use super::{Imperfection, PHASES, Profile, Table, Turned, phases};
 use crate::attitude::exp;
 
 /// Attitude and its derivatives at one moment.
@@ -157,24 +157,33 @@ impl Chain {
         for joint in &self.joints {
             let turned = joint.profile.at(time);
             let angle = joint.from + turned.angle;
-            // Cosine and sine of the angle, then of twice the angle, with their derivatives.
-            let [c, s, c2, s2] = phases(angle);
-            let slopes = [-s, c, -2.0 * s2, 2.0 * c2];
-            let curvatures = [-c, -s, -4.0 * c2, -4.0 * s2];
-            for (k, value) in [c, s, c2, s2].into_iter().enumerate() {
-                if joint.harmonics[k] != Vector3::zeros() {
-                    let along_path = curvatures[k] * turned.rate * turned.rate;
-                    state.turn(
-                        &joint.harmonics[k],
-                        value,
-                        slopes[k] * turned.rate,
-                        slopes[k] * turned.acceleration + along_path,
-                    );
-                }
+            if joint.harmonics != [Vector3::zeros(); PHASES] {
+                joint.stray(&mut state, angle, &turned);
             }
             state.turn(&joint.axis, angle, turned.rate, turned.acceleration);
             state.times(&joint.behind);
         }
         state
+    }
+}
+
+impl Joint {
+    /// Goes on through its harmonics.
+    fn stray(&self, state: &mut Kinematics, angle: f64, turned: &Turned) {
+        // Cosine and sine of the angle, then of twice the angle, with their derivatives.
+        let [c, s, c2, s2] = phases(angle);
+        let slopes = [-s, c, -2.0 * s2, 2.0 * c2];
+        let curvatures = [-c, -s, -4.0 * c2, -4.0 * s2];
+        for (k, value) in [c, s, c2, s2].into_iter().enumerate() {
+            if self.harmonics[k] != Vector3::zeros() {
+                let along_path = curvatures[k] * turned.rate * turned.rate;
+                state.turn(
+                    &self.harmonics[k],
+                    value,
+                    slopes[k] * turned.rate,
+                    slopes[k] * turned.acceleration + along_path,
+                );
+            }
+        }
     }
 }

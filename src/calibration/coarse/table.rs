@@ -1,5 +1,7 @@
 //! The coarse start from dwells and turns with known attitude.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::super::error::CalibrationError;
@@ -55,7 +57,15 @@ fn add_legs(
             let variance = 2.0 * attitude_variance + walk.gyro.powi(2) * turn.duration;
             equations.add_block(&turn, 0, error(&turn), variance);
         }
-        let stand = at_rest(attitude)?.advance_standing(dwell.samples.clone());
+        let mut navigator = at_rest(attitude)?;
+        let Range { start, end } = dwell.samples;
+        let first = stretch.steps.partition_point(|s| s.samples.start < start);
+        let steps = stretch.steps[first..].iter();
+        let of_dwell = steps.take_while(|step| step.samples.start < end);
+        for at_rest in of_dwell.filter_map(|step| step.at_rest.as_ref()) {
+            navigator.stand(&at_rest.sums);
+        }
+        let stand = navigator.standing(&navigator.state.attitude, dwell.samples.clone());
         let duration = stand.duration;
         let pulses = imu.pulse.gyro.powi(2) / 6.0;
         let variance = pulses + walk.gyro.powi(2) * duration;

@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::{Change, Segment, Start};
+use super::{Change, Segment, Start, Trajectory};
 use crate::attitude::from_pitch_roll_heading;
 use crate::earth::earth_rate_n;
-use crate::navigation::Solution;
+use crate::navigation::{Instant, Solution};
 use crate::turntable::{Profile, Turned};
 use crate::units::STANDARD_GRAVITY;
 
@@ -31,6 +31,32 @@ pub(super) struct Kinematics {
     speed: Turned,
     heading: Turned,
     pub(super) height: Turned,
+}
+
+/// The legs of a trajectory, one after the other without end.
+#[derive(Debug, Clone)]
+pub(super) struct Legs<'a> {
+    segments: &'a [Segment],
+    pub(super) current: Leg,
+    next: usize,
+}
+
+impl<'a> Legs<'a> {
+    pub(super) fn new(trajectory: &'a Trajectory) -> Self {
+        Self {
+            segments: &trajectory.segments,
+            current: Leg::before(&trajectory.start),
+            next: 0,
+        }
+    }
+
+    /// Goes to the leg of a time.
+    pub(super) fn enter(&mut self, time: f64) {
+        while self.current.end() <= time {
+            self.current = self.current.followed_by(&self.segments[self.next]);
+            self.next = (self.next + 1) % self.segments.len();
+        }
+    }
 }
 
 impl Leg {
@@ -170,6 +196,13 @@ impl Kinematics {
             height: self.height.angle,
             ..*place
         }
+    }
+
+    /// The true state at this place and what is sensed in it.
+    pub(super) fn instant(&self, place: &Solution, banks: bool) -> Instant {
+        let truth = self.placed(place, banks);
+        let (rate, force) = self.sensed(&truth, banks);
+        Instant { truth, rate, force }
     }
 
     /// Angular rate (rad/s) and specific force (m/s²) along body axes.

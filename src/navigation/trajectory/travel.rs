@@ -1,9 +1,9 @@
 //! A journey along a trajectory, step by step.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::Trajectory;
-use super::leg::Leg;
+use super::leg::Legs;
 use crate::earth::Curvature;
 use crate::navigation::{Increments, Solution};
 
@@ -19,29 +19,20 @@ pub struct Travel<'a> {
     trajectory: &'a Trajectory,
     period: f64,
     steps: u64,
-    leg: Leg,
-    next: usize,
+    legs: Legs<'a>,
     truth: Solution,
 }
 
 impl<'a> Travel<'a> {
     pub(super) fn new(trajectory: &'a Trajectory, period: f64) -> Self {
-        let start = trajectory.start();
         let mut travel = Self {
             trajectory,
             period,
             steps: 0,
-            leg: Leg::before(start),
-            next: 0,
-            truth: Solution {
-                attitude: Matrix3::identity(),
-                velocity: Vector3::zeros(),
-                latitude: start.latitude,
-                longitude: start.longitude,
-                height: start.height,
-            },
+            legs: Legs::new(trajectory),
+            truth: trajectory.start().place(),
         };
-        travel.enter(0.0);
+        travel.legs.enter(0.0);
         travel.arrive(0.0);
         travel
     }
@@ -53,16 +44,8 @@ impl<'a> Travel<'a> {
 
     /// Angular rate (rad/s) and specific force (m/s²) along body axes now.
     pub fn sensed(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let kinematics = self.leg.at(self.time());
+        let kinematics = self.legs.current.at(self.time());
         kinematics.sensed(&self.truth, self.trajectory.banks)
-    }
-
-    /// Whether velocity and attitude in East-North-Up stay as they are till a time after now, in s.
-    pub fn is_steady_for(&self, duration: f64) -> bool {
-        let (now, end) = (self.time(), self.time() + duration);
-        self.leg.next_break(now) >= end
-            && self.leg.at(now).is_steady()
-            && self.leg.at(end).is_steady()
     }
 
     /// Goes on by a step and gives the integrals over it of what an ideal instrument senses.
@@ -73,12 +56,12 @@ impl<'a> Travel<'a> {
         let mut increments = Increments::default();
         // No part reaches across a break, so quadrature keeps its order.
         while now < end {
-            self.enter(now);
-            let to = self.leg.next_break(now).min(end);
+            self.legs.enter(now);
+            let to = self.legs.current.next_break(now).min(end);
             self.integrate(now, to, &mut increments);
             now = to;
         }
-        self.enter(end);
+        self.legs.enter(end);
         self.arrive(end);
         increments
     }
@@ -87,29 +70,24 @@ impl<'a> Travel<'a> {
         self.steps as f64 * self.period
     }
 
-    /// Goes to the leg of a time.
-    fn enter(&mut self, time: f64) {
-        let segments = &self.trajectory.segments;
-        while self.leg.end() <= time {
-            self.leg = self.leg.followed_by(&segments[self.next]);
-            self.next = (self.next + 1) % segments.len();
-        }
-    }
-
     /// Sets velocity, attitude and height to those of a time.
     fn arrive(&mut self, time: f64) {
-        self.truth = self.leg.at(time).placed(&self.truth, self.trajectory.banks);
+        self.truth = self
+            .legs
+            .current
+            .at(time)
+            .placed(&self.truth, self.trajectory.banks);
     }
 
     fn integrate(&mut self, from: f64, to: f64, increments: &mut Increments) {
         let half = 0.5 * (to - from);
-        let start = self.leg.at(from);
+        let start = self.legs.current.at(from);
         let (velocity, acceleration) = (start.velocity(), start.acceleration());
         let radius = Curvature::at(self.truth.latitude).meridian + start.height.angle;
         let mut moved = Vector3::zeros();
         for (node, weight) in NODES {
             let after = half * (1.0 + node);
-            let kinematics = self.leg.at(from + after);
+            let kinematics = self.legs.current.at(from + after);
             // Millimetres are enough here: they change Earth rate and gravity by 1e-9 of themselves.
             let north = (velocity.y + 0.5 * acceleration.y * after) * after;
             let place = Solution {

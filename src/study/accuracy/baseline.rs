@@ -9,7 +9,7 @@ use crate::imu::InstallationForm;
 use crate::models::{self, ModelError, Place};
 use crate::run::Dwell;
 use crate::simulation::{Scenario, Simulated};
-use crate::turntable::{Table, TableError};
+use crate::turntable::Table;
 
 /// The closed form's runs. It is also made from the first part of every dwell, as if the table had
 /// stood for less time.
@@ -77,19 +77,18 @@ impl Baseline {
         (0..PARTS).map(|number| (number, self.time_of(Self::part(number))))
     }
 
-    /// Errors of the closed form for every part and for the filter's time; `None` where it fails.
+    /// Errors of the closed form in one of its runs for every part and for the filter's time; `None` where it
+    /// fails.
     pub(super) fn errors(
         &self,
-        seed: u64,
-        run: u64,
+        Simulated { run, truth, .. }: Simulated,
         form: InstallationForm,
-    ) -> Result<Vec<Option<ParameterVector>>, TableError> {
-        let Simulated { run, truth, .. } = self.scenario.simulate(seed, run)?;
+    ) -> Vec<Option<ParameterVector>> {
         let truth = to_vector(&in_general_form(&truth));
         let problem = Problem::new(&run, &Options::default().installation(form));
         let dwells: Vec<Dwell> = problem.dwells().cloned().collect();
         let parts = (0..PARTS).map(|number| Some(Self::part(number)));
-        Ok(parts
+        parts
             .chain([self.equal])
             .map(|part| {
                 let part = part?;
@@ -102,7 +101,7 @@ impl Baseline {
                 let estimate = in_general_form(&closed_form.estimate.triads);
                 Some(to_vector(&in_body_frame(&estimate, self.scenario.body_frame)) - truth)
             })
-            .collect())
+            .collect()
     }
 }
 

@@ -15,6 +15,7 @@ use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::BodyFrame;
 use crate::imu::{InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
+use crate::simulation::Runs;
 
 /// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -77,8 +78,14 @@ pub(super) fn moments(duration: f64) -> impl Iterator<Item = f64> {
 }
 
 impl AccuracyStudy {
-    pub(super) fn trial(&self, baseline: &Baseline, run: u64) -> Result<Trial, StudyError> {
-        let simulated = self.scenario.simulate(self.seed, run)?;
+    /// One run, of the filter's simulated runs and of the baseline's.
+    pub(super) fn trial(
+        &self,
+        baseline: &Baseline,
+        [filter_runs, baseline_runs]: &[Runs; 2],
+        run: u64,
+    ) -> Result<Trial, StudyError> {
+        let simulated = filter_runs.simulate(self.seed, run)?;
         let (record, truth) = (simulated.run, simulated.truth);
         let aiding = match self.scenario.body_frame {
             BodyFrame::Table => Aiding::Table,
@@ -120,7 +127,7 @@ impl AccuracyStudy {
             bound_track: track(&bound.history, form, duration)
                 .map(|estimate| estimate.sigma())
                 .collect(),
-            closed_form: baseline.errors(self.seed, run, self.form)?,
+            closed_form: baseline.errors(baseline_runs.simulate(self.seed, run)?, self.form),
         })
     }
 

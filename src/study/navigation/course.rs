@@ -1,65 +1,51 @@
 //! A body's true motion step by step, whether it stands or moves.
 
-use nalgebra::Vector3;
-
 use super::Motion;
-use crate::navigation::{Increments, Solution, Travel};
+use crate::navigation::{Instant, Stride, Strides};
 
 pub(super) enum Course<'a> {
-    Standing {
-        truth: &'a Solution,
-        increments: Increments,
-    },
-    Moving(Box<Travel<'a>>),
+    Standing { here: Instant, time: f64 },
+    Moving(Box<Strides<'a>>),
 }
 
 impl<'a> Course<'a> {
-    /// Begins to go in steps of `period` seconds.
-    pub(super) fn new(motion: &'a Motion, period: f64) -> Self {
+    pub(super) fn new(motion: &'a Motion) -> Self {
         match motion {
-            Motion::Standing(truth) => {
-                let (rate, force) = truth.steady();
-                Self::Standing {
-                    truth,
-                    increments: Increments {
-                        angle: rate * period,
-                        velocity: force * period,
-                    },
-                }
+            Motion::Standing(truth) => Self::Standing {
+                here: Instant::steady(truth),
+                time: 0.0,
+            },
+            Motion::Moving(trajectory) => Self::Moving(Box::new(trajectory.strides())),
+        }
+    }
+
+    /// The true state now and what is sensed in it.
+    pub(super) fn here(&self) -> &Instant {
+        match self {
+            Self::Standing { here, .. } => here,
+            Self::Moving(strides) => strides.here(),
+        }
+    }
+
+    /// Goes on until a time in s since the start, as [`Strides::go`] does.
+    pub(super) fn go<E>(
+        &mut self,
+        until: f64,
+        beside: f64,
+        mut each: impl FnMut(&Stride) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match self {
+            Self::Standing { here, time } => {
+                let steps = Stride::count(until - *time, here.rate.norm() + beside);
+                let stride = Stride {
+                    duration: (until - *time) / f64::from(steps),
+                    middle: *here,
+                    end: *here,
+                };
+                *time = until;
+                (0..steps).try_for_each(|_| each(&stride))
             }
-            Motion::Moving(trajectory) => Self::Moving(Box::new(trajectory.travel(period))),
-        }
-    }
-
-    /// The true state now.
-    pub(super) fn truth(&self) -> &Solution {
-        match self {
-            Self::Standing { truth, .. } => truth,
-            Self::Moving(travel) => travel.truth(),
-        }
-    }
-
-    /// Angular rate (rad/s) and specific force (m/s²) along body axes now.
-    pub(super) fn sensed(&self) -> (Vector3<f64>, Vector3<f64>) {
-        match self {
-            Self::Standing { truth, .. } => truth.steady(),
-            Self::Moving(travel) => travel.sensed(),
-        }
-    }
-
-    /// Whether velocity and attitude stay as they are for some seconds.
-    pub(super) fn is_steady_for(&self, duration: f64) -> bool {
-        match self {
-            Self::Standing { .. } => true,
-            Self::Moving(travel) => travel.is_steady_for(duration),
-        }
-    }
-
-    /// Goes on by a step and gives what an ideal instrument senses in it.
-    pub(super) fn advance(&mut self) -> Increments {
-        match self {
-            Self::Standing { increments, .. } => *increments,
-            Self::Moving(travel) => travel.advance(),
+            Self::Moving(strides) => strides.go(until, beside, each),
         }
     }
 }

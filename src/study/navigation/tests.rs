@@ -11,6 +11,7 @@ use crate::calibration::{ParameterVector, sensor_and_parameter};
 use crate::calibration::{from_vector, to_vector};
 use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
+use crate::navigation::{Height, Increments, Strapdown};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
 const FORM: InstallationForm = InstallationForm::General;
@@ -89,15 +90,59 @@ fn draw(run: u64) -> ParameterVector {
 #[test]
 fn an_exact_calibration_navigates_without_error_wherever_it_goes() {
     let exact = pair(&ParameterVector::zeros(), None);
-    for (mission, metres, arcsec) in [
-        (standing(2400), 1e-3, 1e-4),
-        (moving("flight", 240), 0.3, 1e-2),
-        (moving("vehicle", 240), 0.3, 1e-2),
+    for mission in [
+        standing(2400),
+        moving("flight", 240),
+        moving("vehicle", 240),
     ] {
         let end = mission.errors(&exact).unwrap().pop().unwrap().error;
-        println!("{end:?}");
-        assert!(end.attitude.amax() < arcsec * ARCSEC, "{end:?}");
-        assert!(end.horizontal_position() < metres, "{end:?}");
+        assert_eq!(end.to_vector().amax(), 0.0, "{end:?}");
+    }
+}
+
+/// Where navigation leads that takes what is sensed for what an instrument with these errors samples.
+fn sampled(
+    trajectory: &Trajectory,
+    errors: &PerSensor<Sensed>,
+    period: f64,
+    steps: u32,
+) -> Solution {
+    let mut travel = trajectory.travel(period);
+    let mut navigation = Strapdown::new(*travel.truth(), period).unwrap();
+    for _ in 0..steps {
+        let mut increments = travel.advance();
+        let Increments { angle, velocity } = increments;
+        increments.angle += errors.gyro.relative * angle + errors.gyro.constant * period;
+        increments.velocity += errors.accel.relative * velocity + errors.accel.constant * period;
+        let held = Height::Held {
+            height: travel.truth().height,
+            velocity: travel.truth().velocity.z,
+        };
+        navigation.advance(&increments, held).unwrap();
+    }
+    *navigation.solution()
+}
+
+#[test]
+fn errors_are_those_of_navigation_at_the_full_rate_of_an_instrument() {
+    for (name, intervals, period) in [("vehicle", 13, 0.01), ("flight", 36, 0.05)] {
+        let mission = moving(name, intervals);
+        let Motion::Moving(trajectory) = &mission.motion else {
+            unreachable!()
+        };
+        let wrong = pair(&draw(3), None);
+        let steps = (f64::from(intervals) * INTERVAL / period).round() as u32;
+        let of = |pair: &Pair| sampled(trajectory, &pair.sensed().unwrap(), period, steps);
+        // What navigation itself errs by is taken away.
+        let computed = of(&wrong);
+        let ideal = of(&pair(&ParameterVector::zeros(), None));
+        let expected = NavigationError::of(&computed, &ideal).to_vector();
+        let found = mission.errors(&wrong).unwrap().pop().unwrap().error;
+        let apart = found.to_vector() - expected;
+        for (first, count) in [(0, 3), (3, 2), (6, 2)] {
+            let relative = apart.rows(first, count).amax() / expected.rows(first, count).amax();
+            assert!(relative < 1e-6, "{name} {first}: {relative:e}");
+        }
     }
 }
 
@@ -110,8 +155,8 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
     ] {
         let exposures = mission.exposure(&instrument()).unwrap();
         for run in 0..2 {
-            // Large enough that the own error of navigation does not count, and linear still.
-            let error = draw(run) * 3.0;
+            // Small enough that squares do not count.
+            let error = draw(run) * 1e-3;
             let moments = mission.errors(&pair(&error, None)).unwrap();
             let mut largest = SVector::<f64, STATES>::zeros();
             let mut apart = SVector::<f64, STATES>::zeros();
@@ -123,7 +168,7 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
             // Height and vertical velocity are held.
             for i in [0, 1, 2, 3, 4, 6, 7] {
                 let relative = apart[i] / largest[i];
-                assert!(relative < 3e-3, "{name} {i}: {relative}");
+                assert!(relative < 1e-6, "{name} {i}: {relative}");
             }
         }
     }

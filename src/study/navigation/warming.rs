@@ -7,14 +7,14 @@ use super::{INTERVAL, Mission, NavigationStudyError, Pair, exposure};
 use crate::calibration::result::Calibration;
 use crate::calibration::{PARAMETERS, parameter_name, sensor_and_parameter, triads_of};
 use crate::imu::{
-    InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, RATE, Sensor,
-    ThermalCoefficients, ThermalRange, ThermalState, Triad,
+    InstallationForm, Nominal, PerSensor, RATE, ThermalCoefficients, ThermalRange, ThermalState,
+    Triad,
 };
-use crate::navigation::Sensitivity;
-use crate::navigation::error_model::{INPUTS, STATES};
+use crate::navigation::error_model::STATES;
+use crate::navigation::{Instant, Linearisation, Sensitivity};
 
 use super::course::Course;
-use super::{Epoch, LINEAR_STEPS, Linear, Motion, RENEWED};
+use super::{Epoch, sensed_errors};
 
 /// How an instrument warms up: `to + (from − to) exp(−t/τ)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -270,12 +270,7 @@ impl Mission {
         pair: &WarmingPair,
         middle: impl Fn(u32) -> (f64, f64),
     ) -> Result<Vec<DMatrix<f64>>, NavigationStudyError> {
-        let steps = match &self.motion {
-            Motion::Standing(_) => 1,
-            Motion::Moving(_) => LINEAR_STEPS,
-        };
-        let step = INTERVAL / f64::from(steps);
-        let mut course = Course::new(&self.motion, 0.5 * step);
+        let mut course = Course::new(&self.motion);
         let mut functions: Vec<usize> = pair.coefficients.iter().map(|c| c.1).collect();
         functions.sort_unstable();
         functions.dedup();
@@ -286,10 +281,10 @@ impl Mission {
                       course: &Course,
                       time: f64| {
             let n = pair.coefficients.len();
-            let own = exposure(time, constant, course.truth())?.by_parameter;
-            let by_function = changing
-                .iter()
-                .map(|sensitivity| Ok(exposure(time, sensitivity, course.truth())?.by_parameter));
+            let own = exposure(time, constant, &course.here().truth)?.by_parameter;
+            let by_function = changing.iter().map(|sensitivity| {
+                Ok(exposure(time, sensitivity, &course.here().truth)?.by_parameter)
+            });
             let by_function: Vec<_> = by_function.collect::<Result<_, NavigationStudyError>>()?;
             let mut all = DMatrix::zeros(STATES, PARAMETERS + n);
             for row in 0..STATES {
@@ -307,45 +302,29 @@ impl Mission {
         let mut exposures = vec![gather(&constant, &changing, &course, 0.0)?];
         for interval in 1..=self.intervals {
             let now = middle(interval);
-            let triads = pair.truth.at(now);
+            let sensed = sensed_errors(&pair.truth.at(now))?;
             let state = pair.calibration.state(now).unwrap_or_default();
-            let mut steady: Option<Linear> = None;
-            for k in 0..steps {
-                let is_steady = course.is_steady_for(step);
-                course.advance();
-                let kept = steady.take().filter(|_| is_steady && k % RENEWED != 0);
-                let linear = match kept {
-                    Some(linear) => linear,
-                    None => Linear::about(&course, &triads, step)?,
-                };
-                course.advance();
-                constant.advance(&linear.transition, &linear.sensed);
-                for (sensitivity, &function) in changing.iter_mut().zip(&functions) {
-                    let sensed = scaled(&linear.sensed, &state, function);
-                    sensitivity.advance(&linear.transition, &sensed);
-                }
-                steady = is_steady.then_some(linear);
-            }
             let time = f64::from(interval) * INTERVAL;
+            let linear = |at: &Instant| Linearisation::about(at, &sensed);
+            let mut start = linear(course.here());
+            course.go(time, 0.0, |stride| {
+                let [middle, end] = [&stride.middle, &stride.end].map(linear);
+                let all = [&start, &middle, &end];
+                constant.follow(stride.duration, all);
+                for (sensitivity, &function) in changing.iter_mut().zip(&functions) {
+                    let [a, b, c] = all.map(|linear| of_function(linear, &state, function));
+                    sensitivity.follow(stride.duration, [&a, &b, &c]);
+                }
+                start = end;
+                Ok::<_, NavigationStudyError>(())
+            })?;
             exposures.push(gather(&constant, &changing, &course, time)?);
         }
         Ok(exposures)
     }
 }
 
-/// What the errors of coefficients of a function do to what is sensed, in this state of all axes alike.
-fn scaled(
-    sensed: &SMatrix<f64, INPUTS, PARAMETERS>,
-    state: &ThermalState,
-    function: usize,
-) -> SMatrix<f64, INPUTS, PARAMETERS> {
-    let mut scaled = *sensed;
-    for sensor in Sensor::ALL {
-        let weight = state.get(sensor)[0][function];
-        let first = crate::calibration::parameter(sensor, 0);
-        scaled
-            .fixed_columns_mut::<PER_TRIAD>(first)
-            .scale_mut(weight);
-    }
-    scaled
+/// What the errors of coefficients of a function do, in this state of all axes alike.
+fn of_function(linear: &Linearisation, state: &ThermalState, function: usize) -> Linearisation {
+    linear.weighted(|parameter| state.get(sensor_and_parameter(parameter).0)[0][function])
 }

@@ -1,0 +1,117 @@
+//! One way of a table along its path: what runs have in common that differ in random numbers only.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Scenario, Simulated, true_increments};
+use crate::calibration::ParameterVector;
+use crate::imu::{PerSensor, TermVector};
+use crate::turntable::{AxisAngles, Imperfection, Motion, Moves, TableError, axis_angles};
+
+/// How a table moves, and what an ideal instrument on it senses.
+#[derive(Debug, Clone)]
+pub(super) struct Drive {
+    imperfection: Imperfection,
+    terms: TermVector,
+    /// How long it takes, s.
+    pub(super) duration: f64,
+    /// Integrals over each sample: see [`true_increments`].
+    pub(super) ideal: PerSensor<Vec<Vector3<f64>>>,
+    /// When the table is read, and in which position, told by number, and attitude a perfect one is then.
+    pub(super) read: Vec<(f64, usize, Matrix3<f64>)>,
+    /// Its axes in the position that it has or leaves at each of these times.
+    pub(super) axes: Vec<AxisAngles>,
+}
+
+/// Many runs of a scenario. Where the table is perfect all of them are on one drive, which is made once.
+#[derive(Debug, Clone)]
+pub struct Runs<'a> {
+    scenario: &'a Scenario,
+    perfect: Drive,
+}
+
+impl<'a> Runs<'a> {
+    /// Of a scenario.
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn new(scenario: &'a Scenario) -> Result<Self, TableError> {
+        let none = Imperfection::none(&scenario.table);
+        Ok(Self {
+            scenario,
+            perfect: Drive::new(scenario, none, TermVector::zeros())?,
+        })
+    }
+
+    /// Simulates one of them, as [`Scenario::simulate`] does.
+    ///
+    /// # Errors
+    /// If the path is beyond the table.
+    pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
+        let own = ParameterVector::zeros();
+        let shared = Some(&self.perfect);
+        self.scenario
+            .simulate_on(shared, seed, stream, stream, &own)
+    }
+}
+
+impl Drive {
+    pub(super) fn new(
+        scenario: &Scenario,
+        imperfection: Imperfection,
+        terms: TermVector,
+    ) -> Result<Self, TableError> {
+        let Scenario { table, path, .. } = scenario;
+        let motion = Motion::new(table, path, &imperfection)?;
+        let read = Motion::new(table, path, &Imperfection::none(table))?;
+        let count = (read.duration() * scenario.reading_rate + 1e-6) as usize;
+        let times = (0..=count).map(|k| k as f64 / scenario.reading_rate);
+        let read: Vec<_> = times
+            .map(|time| (time, read.position(time), read.at(time).attitude))
+            .collect();
+        Ok(Self {
+            ideal: true_increments(&motion, &scenario.site, &scenario.integrator, &terms),
+            duration: motion.duration(),
+            axes: axes(scenario, &read),
+            read,
+            imperfection,
+            terms,
+        })
+    }
+
+    /// Whether it is that of this imperfection and these error terms.
+    pub(super) fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
+        (&self.imperfection, &self.terms) == (imperfection, terms)
+    }
+}
+
+fn axes(scenario: &Scenario, read: &[(f64, usize, Matrix3<f64>)]) -> Vec<AxisAngles> {
+    let Moves::Axes { start, steps } = &scenario.path.moves else {
+        return Vec::new();
+    };
+    let axes = || scenario.table.axes.iter().map(|axis| axis.direction);
+    let mut angles = start.clone();
+    let mut of_positions = vec![axis_angles(axes().zip(angles.iter().copied()))];
+    for step in steps {
+        for (angle, by) in angles.iter_mut().zip(&step.angles) {
+            *angle += by;
+        }
+        of_positions.push(axis_angles(axes().zip(angles.iter().copied())));
+    }
+    let at = |&(_, position, _): &(f64, usize, _)| of_positions.get(position).copied();
+    read.iter().filter_map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_on_a_shared_drive_is_the_run_alone_on_perfect_tables_and_others() {
+        for name in ["demo", "real-table"] {
+            let scenario = Scenario::load(name).unwrap();
+            let runs = Runs::new(&scenario).unwrap();
+            let alone = scenario.simulate(3, 5).unwrap();
+            assert!(runs.simulate(3, 5).unwrap() == alone, "{name}");
+        }
+    }
+}
