@@ -118,64 +118,66 @@ impl Fill {
     /// Mean square of the sum's error over intact stretches near by, every other and the rest; none if the
     /// first is more than `most`.
     pub fn measured(&self, axis: &[f64], most: f64) -> Option<[f64; 2]> {
-        let length = self.hole.len();
         let count = self.shifts.len();
-        let mut largest_change = 0f64;
+        let change = self.change(axis, 0).abs();
+        let mut is_tried = false;
         let mut mean_square = |half: usize, most: f64| {
             let of_half = ((count + 1 - half) / 2) as f64;
             let mut squares = 0.0;
             for &shift in self.shifts.iter().skip(half).step_by(2) {
                 let hole = self.hole.start.wrapping_add_signed(shift)
                     ..self.hole.end.wrapping_add_signed(shift);
-                let (sum, change) = self.sum_and_change(axis, shift);
-                let error = sum - axis[hole].iter().sum::<f64>();
+                let error = self.sum_after(axis, shift) - axis[hole].iter().sum::<f64>();
                 squares += error * error;
-                largest_change = largest_change.max(change.abs());
                 if squares > most * of_half {
                     return None;
                 }
+                is_tried = is_tried || change <= UNTRIED * self.change(axis, shift).abs();
             }
             Some(squares / of_half)
         };
         let halves = [mean_square(0, most)?, mean_square(1, f64::INFINITY)?];
         // A larger change than any tried may have come at any moment.
-        let change = self.sum_and_change(axis, 0).1.abs();
-        let sudden = if change > UNTRIED * largest_change {
-            (change * length as f64).powi(2) / 12.0
-        } else {
-            0.0
+        let sudden = match is_tried {
+            true => 0.0,
+            false => (change * self.hole.len() as f64).powi(2) / 12.0,
         };
         Some(halves.map(|half| half.max(sudden)))
     }
 
     /// Sum over the hole as it is filled.
     pub fn sum(&self, axis: &[f64]) -> f64 {
-        self.sum_and_change(axis, 0).0
+        self.sum_after(axis, 0)
     }
 
-    /// Sum over the hole, and mean of the neighbours after less that of those before, `shift` samples later.
-    fn sum_and_change(&self, axis: &[f64], shift: isize) -> (f64, f64) {
-        let (before, after) = self.runs.split_at(self.before);
-        let mut weights = self.weights.as_slice();
-        let mut of_side = |runs: &[Range<usize>]| {
-            let mut all = (0.0, 0.0, 0);
-            for run in runs {
-                let (of_run, rest) = weights.split_at(run.len());
-                weights = rest;
-                let start = run.start.wrapping_add_signed(shift);
-                let (weighted, sum) = sums(of_run, &axis[start..start + run.len()]);
-                all = (all.0 + weighted, all.1 + sum, all.2 + run.len());
-            }
-            all
-        };
-        let before = of_side(before);
-        let after = of_side(after);
-        let change = match (before.2, after.2) {
-            (0, _) | (_, 0) => 0.0,
-            (of_before, of_after) => after.1 / of_after as f64 - before.1 / of_before as f64,
-        };
-        (before.0 + after.0, change)
+    /// The same of a hole `shift` samples later.
+    fn sum_after(&self, axis: &[f64], shift: isize) -> f64 {
+        let (mut weights, mut sum) = (self.weights.as_slice(), 0.0);
+        for run in &self.runs {
+            let (of_run, rest) = weights.split_at(run.len());
+            weights = rest;
+            sum += product(of_run, &axis[later(run, shift)]);
+        }
+        sum
     }
+
+    /// Mean of the neighbours after the hole less that of those before, `shift` samples later; zero where there
+    /// are none on a side.
+    fn change(&self, axis: &[f64], shift: isize) -> f64 {
+        let (before, after) = self.runs.split_at(self.before);
+        let mean = |runs: &[Range<usize>]| {
+            let count: usize = runs.iter().map(Range::len).sum();
+            let values = runs.iter().flat_map(|run| &axis[later(run, shift)]);
+            (count > 0).then(|| values.sum::<f64>() / count as f64)
+        };
+        let means = mean(before).zip(mean(after));
+        means.map_or(0.0, |(before, after)| after - before)
+    }
+}
+
+fn later(run: &Range<usize>, shift: isize) -> Range<usize> {
+    let start = run.start.wrapping_add_signed(shift);
+    start..start + run.len()
 }
 
 /// Runs of samples that follow one another, of increasing samples.
@@ -193,21 +195,16 @@ fn runs<'a>(samples: impl Iterator<Item = &'a usize>) -> Vec<Range<usize>> {
 /// Sums that are formed beside each other, so that none waits for another.
 const BESIDE: usize = 4;
 
-/// Sum of the values with their weights, and as they are.
-fn sums(weights: &[f64], values: &[f64]) -> (f64, f64) {
+fn product(weights: &[f64], values: &[f64]) -> f64 {
     let (weights, last_weights) = weights.as_chunks::<BESIDE>();
     let (values, last_values) = values.as_chunks::<BESIDE>();
-    let mut of_lanes = [[0.0; BESIDE]; 2];
+    let mut sums = [0.0; BESIDE];
     for (weights, values) in weights.iter().zip(values) {
-        for lane in 0..BESIDE {
-            of_lanes[0][lane] += weights[lane] * values[lane];
-            of_lanes[1][lane] += values[lane];
+        for (sum, (weight, value)) in sums.iter_mut().zip(weights.iter().zip(values)) {
+            *sum += weight * value;
         }
     }
-    let [mut weighted, mut sum] = of_lanes.map(|lanes| lanes.iter().sum::<f64>());
-    for (weight, value) in last_weights.iter().zip(last_values) {
-        weighted += weight * value;
-        sum += value;
-    }
-    (weighted, sum)
+    let last = last_weights.iter().zip(last_values);
+    let last: f64 = last.map(|(weight, value)| weight * value).sum();
+    sums.iter().sum::<f64>() + last
 }
