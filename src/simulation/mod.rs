@@ -8,7 +8,7 @@ mod increments;
 mod scenario;
 mod thermal;
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{SVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,7 +18,7 @@ pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 pub use thermal::{Chamber, ThermalTruth};
 
-use crate::attitude::exp;
+use crate::attitude::{exp, quaternion};
 use crate::calibration::ParameterVector;
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
@@ -327,7 +327,7 @@ impl Scenario {
         let mut position = 0;
         let mut of_position = normal(&mut positions) * errors.position;
         let count = (motion.duration() * self.reading_rate + 1e-6) as usize;
-        let (time, attitude): (Vec<f64>, Vec<Matrix3<f64>>) = (0..=count)
+        let (time, attitude): (Vec<f64>, Vec<_>) = (0..=count)
             .map(|k| k as f64 / self.reading_rate)
             .map(|time| {
                 while position < motion.position(time) {
@@ -335,7 +335,7 @@ impl Scenario {
                     of_position = normal(&mut positions) * errors.position;
                 }
                 let tau = of_position + normal(&mut readings) * errors.reading;
-                (time, exp(-tau) * motion.at(time).attitude)
+                (time, quaternion(&(exp(-tau) * motion.at(time).attitude)))
             })
             .unzip();
         TableLog {
