@@ -40,7 +40,7 @@ pub struct Block {
     pub terms: Vec<TermColumn>,
     /// Functions of temperature meanwhile: the transition from a coefficient's error is that from its
     /// parameter's error times its function. None where parameters do not change with temperature.
-    pub thermal: Option<ThermalState>,
+    pub thermal: Option<Box<ThermalState>>,
     /// What noise acts on: its covariance follows for any densities.
     pub noise: NoiseInputs,
 }

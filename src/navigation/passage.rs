@@ -120,7 +120,7 @@ impl Passage {
             parameters: Arc::new(parameters),
             gravity: self.gravity.times(&SVector::repeat(1.0)),
             terms: terms.collect(),
-            thermal,
+            thermal: thermal.map(Box::new),
             noise: self.noise.shrunk(),
         }
     }

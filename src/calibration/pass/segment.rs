@@ -39,7 +39,7 @@ pub(in crate::calibration) struct Standing {
     /// another computed state.
     pub referred: [Vector3<f64>; 3],
     /// What is observed at its end, in order.
-    pub seen: Vec<Seen>,
+    pub seen: Box<[Seen]>,
 }
 
 /// An observation of three components, alike in their variance.
@@ -189,6 +189,7 @@ impl Segment {
                 seen: seen.collect(),
             });
         }
+        segment.models.shrink_to_fit();
         segment
     }
 
