@@ -13,10 +13,6 @@ use super::sums::Sums;
 use crate::imu::Sensor;
 use crate::navigation::Block;
 
-/// Events whose operations are had at once: those of a longer record are done again on the way back, part by
-/// part, for of a day they would take more memory than its samples.
-const AT_ONCE: usize = 256;
-
 /// A pass, and where it was before each part of it.
 pub(super) struct Passed {
     filter: Filter,
@@ -26,6 +22,8 @@ pub(super) struct Passed {
     stretches: Vec<(Vec<Operation>, Vec<Part>)>,
     /// What was done in the last part of all.
     last: Vec<Done>,
+    /// Events of a part.
+    at_once: usize,
 }
 
 /// Events that follow one another.
@@ -80,11 +78,12 @@ fn through(
     events.iter().map(of_event).collect()
 }
 
-/// The pass of a script with the noise of a problem's model.
+/// The pass of a script with the noise of a problem's model. What is done in so many events is had at once.
 pub(super) fn forward(
     problem: &Problem,
     script: &Script,
     accepted: &[bool],
+    at_once: usize,
 ) -> Result<Passed, CalibrationError> {
     let model = &problem.model;
     let mut filter = script.filter(model);
@@ -99,7 +98,7 @@ pub(super) fn forward(
         before = Some(stretch);
         let begun = filter.kept();
         let mut parts = Vec::new();
-        for events in events.chunks(AT_ONCE) {
+        for events in events.chunks(at_once) {
             parts.push(Part {
                 filter: filter.clone(),
                 seen,
@@ -113,6 +112,7 @@ pub(super) fn forward(
         known,
         stretches,
         last,
+        at_once,
     })
 }
 
@@ -137,7 +137,7 @@ impl Passed {
         let mut last = Some(self.last).filter(|done| !done.is_empty());
         let stretches: Vec<_> = script.stretches(problem).collect();
         for ((stretch, _, events), (begun, parts)) in stretches.iter().zip(self.stretches).rev() {
-            let parts = events.chunks(AT_ONCE).zip(parts);
+            let parts = events.chunks(self.at_once).zip(parts);
             let mut done_in = |events, part: Part| match last.take() {
                 Some(done) => Ok(done),
                 None => {
