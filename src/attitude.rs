@@ -41,7 +41,7 @@ pub fn exp(v: Vector3<f64>) -> Matrix3<f64> {
 
 /// The rotation vector in radians of a rotation matrix, of length at most π.
 pub fn log(c: &Matrix3<f64>) -> Vector3<f64> {
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*c)).scaled_axis()
+    quaternion(c).scaled_axis()
 }
 
 /// The rotation matrix nearest to `c`, which must be one already but for rounding
@@ -52,13 +52,24 @@ pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// The mean of attitudes that lie close together; `None` of none.
-pub fn mean(attitudes: &[Matrix3<f64>]) -> Option<Matrix3<f64>> {
+pub fn mean(attitudes: &[UnitQuaternion<f64>]) -> Option<Matrix3<f64>> {
     let first = attitudes.first()?;
+    let back = first.inverse();
     let sum: Vector3<f64> = attitudes
         .iter()
-        .map(|attitude| log(&(attitude * first.transpose())))
+        .map(|attitude| (attitude * back).scaled_axis())
         .sum();
-    Some(exp(sum / attitudes.len() as f64) * first)
+    Some(exp(sum / attitudes.len() as f64) * matrix(first))
+}
+
+/// The rotation matrix of a quaternion.
+pub fn matrix(attitude: &UnitQuaternion<f64>) -> Matrix3<f64> {
+    attitude.to_rotation_matrix().into_inner()
+}
+
+/// The quaternion of a rotation matrix.
+pub fn quaternion(c: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*c))
 }
 
 /// `C_b_n = Rz(−heading) Rx(pitch) Ry(roll)`: body right-front-up to East-North-Up, all in radians,

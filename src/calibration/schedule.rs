@@ -133,7 +133,10 @@ impl AtRest {
 /// The attitude that a table's first reading gives.
 pub(super) fn first_reading(table: Option<&TableLog>, dwells: &[Dwell]) -> Option<Matrix3<f64>> {
     let position = dwells.first()?.position.as_ref()?;
-    table?.attitude.get(position.readings.start).copied()
+    table?
+        .attitude
+        .get(position.readings.start)
+        .map(attitude::matrix)
 }
 
 /// Number of samples in a step of a dwell.

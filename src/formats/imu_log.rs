@@ -240,8 +240,13 @@ impl ImuLog<'_> {
             faults,
             bridges,
         };
-        // Samples are then whole steps, as pulses are.
-        let pulse = PerSensor::from_fn(|sensor| packed.get(sensor).step());
+        // Samples are then whole steps, as pulses are. Pulses are rounded a second time where some of them are
+        // interpolated: what is not whole there stays with the sum.
+        let roundings: f64 = match self.output {
+            Output::Pulse if !read.bridges.is_empty() => 2.0,
+            _ => 1.0,
+        };
+        let pulse = PerSensor::from_fn(|sensor| packed.get(sensor).step() * roundings.sqrt());
         let series = PerSensor {
             gyro: Series::packed(packed.gyro),
             accel: Series::packed(packed.accel),

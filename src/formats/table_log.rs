@@ -105,7 +105,7 @@ impl<'a> AttitudeColumns<&'a str> {
 }
 
 impl AttitudeColumns<usize> {
-    fn reading(&self, csv: &LogRows) -> Result<Matrix3<f64>, FileError> {
+    fn reading(&self, csv: &LogRows) -> Result<UnitQuaternion<f64>, FileError> {
         match self {
             &Self::Quaternion([w, x, y, z]) => {
                 let quaternion = Quaternion::new(
@@ -122,16 +122,14 @@ impl AttitudeColumns<usize> {
                         "Correct the row, or the order of columns in run.toml: w, x, y, z.",
                     ));
                 }
-                Ok(UnitQuaternion::from_quaternion(quaternion)
-                    .to_rotation_matrix()
-                    .into_inner())
+                Ok(UnitQuaternion::from_quaternion(quaternion))
             }
             Self::Angles(angles) => {
                 let mut c_b_n = Matrix3::identity();
                 for &(column, axis) in angles {
                     c_b_n *= attitude::exp(axis * (csv.number(column)? * DEGREE));
                 }
-                Ok(c_b_n)
+                Ok(attitude::quaternion(&c_b_n))
             }
         }
     }
@@ -246,7 +244,7 @@ impl<'a> TableLogFile<'a> {
         let mut stamps = self.clock.start(&mut csv)?;
         let columns = self.attitude.find(&mut csv)?;
 
-        let mut attitude: Vec<Matrix3<f64>> = Vec::new();
+        let mut attitude: Vec<UnitQuaternion<f64>> = Vec::new();
         let mut axes = Vec::new();
         while csv.advance()? && !csv.may_be_cut() {
             let reading = columns.reading(&csv)?;

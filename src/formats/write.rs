@@ -6,7 +6,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use flate2::{Compression, GzBuilder};
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use super::error::{FileError, Place, list, suggestion};
 use super::quantity::{OUTPUTS, units};
@@ -149,9 +149,7 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
 
 fn table_rows(file: &mut dyn Write, table: &TableLog) -> io::Result<()> {
     writeln!(file, "t,qw,qx,qy,qz")?;
-    for (&time, attitude) in table.time.iter().zip(&table.attitude) {
-        let rotation = Rotation3::from_matrix_unchecked(*attitude);
-        let q = UnitQuaternion::from_rotation_matrix(&rotation);
+    for (&time, q) in table.time.iter().zip(&table.attitude) {
         let time = nanoseconds(time);
         writeln!(file, "{time},{:e},{:e},{:e},{:e}", q.w, q.i, q.j, q.k)?;
     }

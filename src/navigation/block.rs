@@ -1,5 +1,7 @@
 //! What navigation hands to a filter: the error model over a range of samples.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::process_noise::NoiseInputs;
@@ -29,18 +31,29 @@ pub struct Block {
     /// Length in s.
     pub duration: f64,
     /// Transition of the navigation errors.
-    pub navigation: BlockMatrix,
+    pub navigation: Arc<BlockMatrix>,
     /// Transition from the parameter errors of each triad.
-    pub parameters: PerSensor<ParameterBlock>,
+    pub parameters: Arc<PerSensor<ParameterBlock>>,
     /// Transition from the error of gravity's magnitude, true − stated, in m/s².
     pub gravity: SVector<f64, NAVIGATION>,
     /// Transition from the parameter errors of error terms that are on.
     pub terms: Vec<TermColumn>,
     /// Functions of temperature meanwhile: the transition from a coefficient's error is that from its
     /// parameter's error times its function. None where parameters do not change with temperature.
-    pub thermal: Option<ThermalState>,
+    pub thermal: Option<Box<ThermalState>>,
     /// What noise acts on: its covariance follows for any densities.
     pub noise: NoiseInputs,
+}
+
+impl Block {
+    /// The same of as many samples at rest in the same attitude, of which interpolated ones add this covariance
+    /// to the integral of each triad's input, rad² and (m/s)² in `n`.
+    pub(super) fn bridging(&self, bridged: PerSensor<Matrix3<f64>>) -> Self {
+        Self {
+            noise: self.noise.bridging(bridged),
+            ..self.clone()
+        }
+    }
 }
 
 /// What the error of one term parameter makes of the navigation errors.

@@ -1,5 +1,7 @@
 //! The error model of many samples from the integrals over a few at a time.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::block::{Block, BlockMatrix, CorrectedResponse, NAVIGATION, ParameterBlock, TermColumn};
@@ -112,12 +114,14 @@ impl Passage {
         Block {
             state,
             duration: self.duration,
-            navigation: BlockMatrix::from_fn(|row, column| self.navigation.component(row, column)),
-            parameters,
+            navigation: Arc::new(BlockMatrix::from_fn(|row, column| {
+                self.navigation.component(row, column)
+            })),
+            parameters: Arc::new(parameters),
             gravity: self.gravity.times(&SVector::repeat(1.0)),
             terms: terms.collect(),
-            thermal,
-            noise: self.noise,
+            thermal: thermal.map(Box::new),
+            noise: self.noise.shrunk(),
         }
     }
 }

@@ -42,6 +42,21 @@ impl NoiseInputs {
         self.parts.push(part);
     }
 
+    /// The same parts in as little memory as they take.
+    pub(super) fn shrunk(mut self) -> Self {
+        self.parts.shrink_to_fit();
+        self
+    }
+
+    /// The same over a block at rest of the same length in which interpolated samples add this covariance.
+    pub(super) fn bridging(&self, bridged: PerSensor<Matrix3<f64>>) -> Self {
+        let of_part = |part: &NoiseInput| NoiseInput::bridging(part.duration, part.force, bridged);
+        Self {
+            earth_rate: self.earth_rate,
+            parts: self.parts.iter().take(1).map(of_part).collect(),
+        }
+    }
+
     /// One part after the other.
     pub fn parts(&self) -> &[NoiseInput] {
         &self.parts
@@ -65,7 +80,7 @@ impl NoiseInputs {
 }
 
 /// What the sources of [`ProcessNoise`] act on over a short part of a block.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NoiseInput {
     /// Length in s.
     pub duration: f64,
@@ -76,8 +91,8 @@ pub struct NoiseInput {
     /// Length in s where the block is of a move, else zero.
     pub moving: f64,
     /// Covariance in `n` that interpolated samples add to the integral of each triad's input, rad² and
-    /// (m/s)².
-    bridged: PerSensor<Matrix3<f64>>,
+    /// (m/s)², where there are any.
+    bridged: Option<Box<PerSensor<Matrix3<f64>>>>,
 }
 
 impl NoiseInput {
@@ -89,7 +104,7 @@ impl NoiseInput {
             force,
             motion: PerSensor::default(),
             moving: 0.0,
-            bridged,
+            bridged: (bridged != PerSensor::default()).then(|| Box::new(bridged)),
         }
     }
 
@@ -126,7 +141,11 @@ impl NoiseInput {
             let variance = noise.random_walk.powi(2) * t
                 + noise.by_motion.powi(2) * self.motion.get(sensor)
                 + noise.by_duration.powi(2) * self.moving;
-            Matrix3::from_diagonal_element(variance) + self.bridged.get(sensor)
+            let white = Matrix3::from_diagonal_element(variance);
+            match &self.bridged {
+                Some(bridged) => white + bridged.get(sensor),
+                None => white,
+            }
         });
         let force = skew(self.force);
         let tilting = force * gyro;

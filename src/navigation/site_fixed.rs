@@ -318,6 +318,12 @@ impl<'a> Navigator<'a> {
         self.block(passage)
     }
 
+    /// The same of samples of which some are interpolated, given the block of as many where the table stands
+    /// in the same attitude.
+    pub fn standing_like(&self, block: &Block, samples: &Range<usize>) -> Block {
+        block.bridging(self.bridged(samples))
+    }
+
     /// Navigates through samples and tells `each` of every one.
     #[inline]
     fn navigate(&mut self, samples: Range<usize>, mut each: impl FnMut(&Self, &Step)) {

@@ -23,7 +23,7 @@ pub use temperature::{SPACING as TEMPERATURE_SPACING, Temperature};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use nalgebra::Matrix3;
+use nalgebra::UnitQuaternion;
 
 use crate::turntable::AxisAngles;
 
@@ -83,8 +83,8 @@ impl Recording {
 pub struct TableLog {
     /// Time of each reading, s.
     pub time: Vec<f64>,
-    /// Reading `C_b_n`, body to East-North-Up.
-    pub attitude: Vec<Matrix3<f64>>,
+    /// Reading `C_b_n`, body to East-North-Up; as quaternions, since there may be a million of them.
+    pub attitude: Vec<UnitQuaternion<f64>>,
     /// The axes at each reading; empty where it does not tell them apart.
     pub axes: Vec<AxisAngles>,
 }

@@ -254,6 +254,8 @@ impl Position {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
     use crate::recording::{Stretch, TableLog};
     use crate::simulation::Scenario;
@@ -290,7 +292,7 @@ mod tests {
         let early = 20;
         for reading in before.end - early..before.end {
             table.attitude[reading] =
-                exp(Vector3::new(0.0, 3.0 * ARCSEC, 0.0)) * table.attitude[reading];
+                UnitQuaternion::new(Vector3::y() * 3.0 * ARCSEC) * table.attitude[reading];
         }
         let after = reading(&run.dwells(run.aiding())[0]);
         assert!(after.end <= before.end - early);
@@ -303,7 +305,7 @@ mod tests {
         let before = run.dwells(run.aiding());
         let table = run.recording.table.as_mut().unwrap();
         let wild = reading(&before[3]).start + 40;
-        table.attitude[wild] = exp(Vector3::new(0.0, 0.01, 0.0)) * table.attitude[wild];
+        table.attitude[wild] = UnitQuaternion::new(Vector3::y() * 0.01) * table.attitude[wild];
         let after = run.dwells(run.aiding());
         assert_eq!(after.len(), before.len());
         assert_eq!(after[3].samples, before[3].samples);
@@ -375,7 +377,7 @@ mod tests {
         // Stands for 20 s, turns by 0.5°/s for 20 s, stands again.
         let attitude = |&t: &f64| {
             let angle = (t - 20.0).clamp(0.0, 20.0) * 0.5 * DEGREE;
-            exp(Vector3::new(0.0, 0.0, angle))
+            UnitQuaternion::new(Vector3::z() * angle)
         };
         run.recording.table = Some(TableLog {
             attitude: time.iter().map(attitude).collect(),

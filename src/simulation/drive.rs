@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Scenario, Simulated, true_increments};
-use crate::calibration::ParameterVector;
+use crate::calibration::Difference;
 use crate::imu::{PerSensor, TermVector};
 use crate::turntable::{AxisAngles, Imperfection, Motion, Moves, TableError, axis_angles};
 
@@ -47,7 +47,7 @@ impl<'a> Runs<'a> {
     /// # Errors
     /// If the path is beyond the table.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
-        let own = ParameterVector::zeros();
+        let own = Difference::default();
         let shared = Some(&self.perfect);
         self.scenario
             .simulate_on(shared, seed, stream, stream, &own)

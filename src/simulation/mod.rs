@@ -11,7 +11,7 @@ mod thermal;
 
 use std::borrow::Cow;
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{SVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -23,7 +23,7 @@ pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
 pub use thermal::{Chamber, ThermalTruth};
 
-use crate::attitude::exp;
+use crate::attitude::{exp, quaternion};
 use crate::calibration::Difference;
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
@@ -140,7 +140,7 @@ impl Scenario {
         seed: u64,
         instrument: u64,
         stream: u64,
-        own: &ParameterVector,
+        own: &Difference,
     ) -> Result<Simulated, TableError> {
         let mut rng = Draws::Imperfection.generator(seed, stream);
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
@@ -326,7 +326,7 @@ impl Scenario {
         let mut readings = Draws::Readings.generator(seed, stream);
         let mut position = 0;
         let mut of_position = normal(&mut positions) * errors.position;
-        let (time, attitude): (Vec<f64>, Vec<Matrix3<f64>>) = drive
+        let (time, attitude): (Vec<f64>, Vec<_>) = drive
             .read
             .iter()
             .map(|(time, of, attitude)| {
@@ -335,7 +335,7 @@ impl Scenario {
                     of_position = normal(&mut positions) * errors.position;
                 }
                 let tau = of_position + normal(&mut readings) * errors.reading;
-                (*time, exp(-tau) * attitude)
+                (*time, quaternion(&(exp(-tau) * attitude)))
             })
             .unzip();
         TableLog {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::attitude::log;
+use crate::attitude::{log, matrix};
 use crate::calibration::ErrorTerm;
 use crate::imu::InstallationForm;
 use crate::models::{InstallationModel, Place};
@@ -94,7 +94,7 @@ fn a_position_error_stays_while_the_table_stands_and_is_new_after_each_move() {
     let mut positions: Vec<(usize, Vector3<f64>)> = Vec::new();
     for (&time, attitude) in table.time.iter().zip(&table.attitude) {
         // Reading = exp(−[τ×]) true.
-        let tau = -log(&(attitude * motion.at(time).attitude.transpose()));
+        let tau = -log(&(matrix(attitude) * motion.at(time).attitude.transpose()));
         match positions.last() {
             Some((position, of_position)) if *position == motion.position(time) => {
                 assert!((tau - of_position).norm() < 1e-14);

@@ -2,6 +2,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
+use crate::attitude::matrix;
+
 use super::*;
 use crate::recording::{LabelledMotion, Segment};
 use crate::simulation::Scenario;
@@ -46,8 +48,9 @@ fn turns_are_those_of_the_table_full_turns_too() {
         assert!((turn.angle.abs() - full).abs() < 0.01 * full && turn.body_axis().is_some());
     }
     for (turn, pair) in survey.turns.iter().zip(survey.rests.windows(2)) {
-        let attitude =
-            |rest: &Rest| table.attitude[rest.dwell.position.as_ref().unwrap().readings.start];
+        let attitude = |rest: &Rest| {
+            matrix(&table.attitude[rest.dwell.position.as_ref().unwrap().readings.start])
+        };
         let said = attitude(&pair[0]).transpose() * attitude(&pair[1]);
         let found = crate::attitude::exp(turn.axis * turn.angle);
         let off = crate::attitude::log(&(found * said.transpose())).norm();

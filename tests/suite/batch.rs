@@ -1,7 +1,6 @@
 //! The filter against batch least squares on the same linear problem.
 
-use nalgebra::Vector3;
-use turncal::attitude::exp;
+use nalgebra::{UnitQuaternion, Vector3};
 use turncal::calibration::{
     NoisePolicy, Options, Outcome, PARAMETERS, Problem, batch_estimate, estimate,
 };
@@ -64,7 +63,7 @@ fn shortened(mut run: Run) -> Run {
 fn it_agrees_on_what_the_gate_leaves_out() {
     let mut run = short();
     if let Some(table) = &mut run.recording.table {
-        let outlier = exp(Vector3::new(0.0, 30.0 * ARCSEC, 0.0));
+        let outlier = UnitQuaternion::new(Vector3::y() * 30.0 * ARCSEC);
         table.attitude[300] = outlier * table.attitude[300];
     }
     let problem = Problem::new(&run, &stated().installation(InstallationForm::SixAngle));

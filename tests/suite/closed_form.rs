@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -239,7 +239,7 @@ fn made_wrong(scenario: &Scenario, wrong: Wrong, seed: u64) -> Simulated {
             let bumped = &dwells[(dwells.len() - 1 - seed as usize % 6).min(dwells.len() - 1)];
             let readings = bumped.position.as_ref().unwrap().readings.clone();
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let bump = exp(normal(&mut rng).normalize() * (0.1 * DEGREE));
+            let bump = UnitQuaternion::new(normal(&mut rng).normalize() * (0.1 * DEGREE));
             for attitude in &mut run.recording.table.as_mut().unwrap().attitude[readings] {
                 *attitude = bump * *attitude;
             }

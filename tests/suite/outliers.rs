@@ -1,11 +1,10 @@
 //! Wild observations: one in a hundred costs little, and none shuts the filter's gate on the others.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
-use turncal::attitude::exp;
 use turncal::calibration::{
     Finding, NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem,
     estimate, to_vector,
@@ -31,7 +30,7 @@ fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn spoil_reading(run: &mut Run, reading: usize, size: f64, rng: &mut ChaCha8Rng) {
-    let turn = exp(direction(rng) * (size * run.table.reading_sigma));
+    let turn = UnitQuaternion::new(direction(rng) * (size * run.table.reading_sigma));
     let table = run.recording.table.as_mut().unwrap();
     table.attitude[reading] = turn * table.attitude[reading];
 }

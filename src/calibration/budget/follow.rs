@@ -13,13 +13,25 @@ use super::sums::Sums;
 use crate::imu::Sensor;
 use crate::navigation::Block;
 
-/// A pass and what it did.
+/// A pass, and where it was before each part of it.
 pub(super) struct Passed {
     filter: Filter,
     /// 1σ of every state before the first stretch.
     known: Vec<f64>,
-    /// Of each stretch, what was done when it began and in each of its events.
-    done: Vec<(Vec<Operation>, Vec<Done>)>,
+    /// Of each stretch, what was done when it began, and its parts.
+    stretches: Vec<(Vec<Operation>, Vec<Part>)>,
+    /// What was done in the last part of all.
+    last: Vec<Done>,
+    /// Events of a part.
+    at_once: usize,
+}
+
+/// Events that follow one another.
+struct Part {
+    /// The filter before them.
+    filter: Filter,
+    /// Observations of all events up to its begin.
+    seen: usize,
 }
 
 /// What was done in an event: before a part of a dwell was taken in, and then.
@@ -30,11 +42,48 @@ struct Done {
     seen: usize,
 }
 
-/// The pass of a script with the noise of a problem's model.
+/// Takes a filter through events, and counts observations on.
+fn through(
+    filter: &mut Filter,
+    (problem, stretch): (&Problem, &Stretch),
+    events: &[Event],
+    accepted: &[bool],
+    seen: &mut usize,
+) -> Result<Vec<Done>, CalibrationError> {
+    let of_event = |event: &Event| {
+        let at = *seen;
+        let before = match event {
+            Event::Move(block) => {
+                filter.propagate(block);
+                Vec::new()
+            }
+            Event::Rest(rest) => {
+                rest.begin(filter, &problem.model, stretch);
+                let before = filter.kept();
+                let mut decided = Decided::new((problem, stretch), accepted, at);
+                if filter.stand(&rest.segment, &mut decided) != Taken::Whole {
+                    let time = rest.segment.end();
+                    return Err(CalibrationError::Diverged { time });
+                }
+                *seen = decided.next;
+                before
+            }
+        };
+        Ok(Done {
+            before,
+            then: filter.kept(),
+            seen: at,
+        })
+    };
+    events.iter().map(of_event).collect()
+}
+
+/// The pass of a script with the noise of a problem's model. What is done in so many events is had at once.
 pub(super) fn forward(
     problem: &Problem,
     script: &Script,
     accepted: &[bool],
+    at_once: usize,
 ) -> Result<Passed, CalibrationError> {
     let model = &problem.model;
     let mut filter = script.filter(model);
@@ -42,50 +91,35 @@ pub(super) fn forward(
     let known = states.map(|state| filter.covariance(state, state).sqrt());
     let known = known.collect();
     filter.keep();
-    let (mut done, mut before, mut seen) = (Vec::new(), None, 0);
+    let (mut stretches, mut last) = (Vec::new(), Vec::new());
+    let (mut before, mut seen) = (None, 0);
     for (stretch, start, events) in script.stretches(problem) {
         begin(&mut filter, model, before, stretch, &start, script.at());
         before = Some(stretch);
         let begun = filter.kept();
-        let mut of_events = Vec::with_capacity(events.len());
-        for event in events {
-            let at = seen;
-            let before = match event {
-                Event::Move(block) => {
-                    filter.propagate(block);
-                    Vec::new()
-                }
-                Event::Rest(rest) => {
-                    rest.begin(&mut filter, model, stretch);
-                    let before = filter.kept();
-                    let mut decided = Decided::new((problem, stretch), accepted, seen);
-                    if filter.stand(&rest.segment, &mut decided) != Taken::Whole {
-                        let time = rest.segment.end();
-                        return Err(CalibrationError::Diverged { time });
-                    }
-                    seen = decided.next;
-                    before
-                }
-            };
-            of_events.push(Done {
-                before,
-                then: filter.kept(),
-                seen: at,
+        let mut parts = Vec::new();
+        for events in events.chunks(at_once) {
+            parts.push(Part {
+                filter: filter.clone(),
+                seen,
             });
+            last = through(&mut filter, (problem, stretch), events, accepted, &mut seen)?;
         }
-        done.push((begun, of_events));
+        stretches.push((begun, parts));
     }
     Ok(Passed {
         filter,
         known,
-        done,
+        stretches,
+        last,
+        at_once,
     })
 }
 
 impl Passed {
     /// Covariance of the estimate by source, followed back from its end.
     pub fn back(
-        &self,
+        self,
         problem: &Problem,
         script: &Script,
         accepted: &[bool],
@@ -100,33 +134,53 @@ impl Passed {
             followed: Followed::of(filter),
             sums: Sums::default(),
         };
+        let mut last = Some(self.last).filter(|done| !done.is_empty());
         let stretches: Vec<_> = script.stretches(problem).collect();
-        for ((stretch, _, events), (begun, done)) in stretches.iter().zip(&self.done).rev() {
-            for (event, done) in events.iter().zip(done).rev() {
-                match event {
-                    Event::Move(block) => {
-                        back.through_move((problem, stretch), block, &drivers, &done.then)
-                    }
-                    Event::Rest(rest) => {
-                        let (at_end, of_measured) = back.through_operations(&done.then);
-                        let mut decided = Decided::new((problem, stretch), accepted, done.seen);
-                        let effects = [at_end.as_slice(), of_measured.as_slice()];
-                        let mut told = Within {
-                            of: (problem, stretch),
-                            sums: &mut back.sums,
-                        };
-                        let part = &rest.segment;
-                        let taken =
-                            filter.back_through(part, &mut decided, &drivers, effects, &mut told);
-                        if taken != Taken::Whole {
-                            let time = part.end();
-                            return Err(CalibrationError::Diverged { time });
+        for ((stretch, _, events), (begun, parts)) in stretches.iter().zip(self.stretches).rev() {
+            let parts = events.chunks(self.at_once).zip(parts);
+            let mut done_in = |events, part: Part| match last.take() {
+                Some(done) => Ok(done),
+                None => {
+                    let Part {
+                        mut filter,
+                        mut seen,
+                    } = part;
+                    through(&mut filter, (problem, stretch), events, accepted, &mut seen)
+                }
+            };
+            for (events, part) in parts.rev() {
+                let done = done_in(events, part)?;
+                for (event, done) in events.iter().zip(&done).rev() {
+                    match event {
+                        Event::Move(block) => {
+                            back.through_move((problem, stretch), block, &drivers, &done.then)
+                        }
+                        Event::Rest(rest) => {
+                            let (at_end, of_measured) = back.through_operations(&done.then);
+                            let mut decided = Decided::new((problem, stretch), accepted, done.seen);
+                            let effects = [at_end.as_slice(), of_measured.as_slice()];
+                            let mut told = Within {
+                                of: (problem, stretch),
+                                sums: &mut back.sums,
+                            };
+                            let part = &rest.segment;
+                            let taken = filter.back_through(
+                                part,
+                                &mut decided,
+                                &drivers,
+                                effects,
+                                &mut told,
+                            );
+                            if taken != Taken::Whole {
+                                let time = part.end();
+                                return Err(CalibrationError::Diverged { time });
+                            }
                         }
                     }
+                    back.through(&done.before);
                 }
-                back.through(&done.before);
             }
-            back.through(begun);
+            back.through(&begun);
         }
         for (state, sigma) in self.known.iter().enumerate() {
             let effect = back.followed.of_states[state].map(|x| x * sigma);

@@ -44,6 +44,10 @@ pub struct BudgetPart {
     pub degrees_of_freedom: f64,
 }
 
+/// Events whose operations are had at once: those of a longer record are done again on the way back, part by
+/// part, for of a day they would take more memory than its samples.
+const AT_ONCE: usize = 256;
+
 impl Budget {
     /// The budget of an outcome's estimate.
     ///
@@ -54,7 +58,7 @@ impl Budget {
         let (priors, at) = (&outcome.prior_attitudes, &outcome.linearised_at);
         let script = Script::new(problem, priors, at)?;
         let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
-        let passed = follow::forward(problem, &script, &accepted)?;
+        let passed = follow::forward(problem, &script, &accepted, AT_ONCE)?;
         let by_source = passed.back(problem, &script, &accepted)?.covariances();
         let by_source: Vec<_> = by_source.collect();
         let filter: ParameterMatrix = by_source.iter().map(|(_, covariance)| covariance).sum();

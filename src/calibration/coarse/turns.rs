@@ -1,5 +1,7 @@
 //! Gyros and attitudes from gravity's direction and the rates at rest.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
 use super::super::error::CalibrationError;
@@ -224,7 +226,8 @@ impl Chain {
             *tilt = turn * *tilt;
             *of_before = turn * *of_before;
             *of_after = turn * *of_after;
-            for mut column in block.parameters.gyro.column_iter_mut() {
+            let parameters = Arc::make_mut(&mut block.parameters);
+            for mut column in parameters.gyro.column_iter_mut() {
                 let turned = turn * column.fixed_rows::<3>(0);
                 column.fixed_rows_mut::<3>(0).copy_from(&turned);
             }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 
 use super::super::problem::{Problem, Stretch};
-use crate::attitude::exp;
+use crate::attitude::{exp, matrix};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{LabelledMotion, TableLog};
@@ -190,7 +190,7 @@ impl Legs<'_> {
         let times = table.time[readings].iter().zip(attitudes);
         times.map(|(&time, attitude)| {
             let edge = self.run.recording.imu.edge(time).round().max(0.0);
-            (edge as usize, *attitude)
+            (edge as usize, matrix(attitude))
         })
     }
 

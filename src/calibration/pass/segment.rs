@@ -39,7 +39,7 @@ pub(in crate::calibration) struct Standing {
     /// another computed state.
     pub referred: [Vector3<f64>; 3],
     /// What is observed at its end, in order.
-    pub seen: Vec<Seen>,
+    pub seen: Box<[Seen]>,
 }
 
 /// An observation of three components, alike in their variance.
@@ -123,8 +123,8 @@ impl Segment {
         let whole = ends.map_or(0..0, |((first, _), (last, _))| {
             first.samples.start..last.samples.end
         });
-        // What the last model is of: so many samples, none of them interpolated.
-        let mut alike = None;
+        // Models of so many samples: the last of which none is interpolated, and the last of all.
+        let (mut alike, mut of_length) = (None, None);
         for (step, at_rest) in steps {
             let mut referred = Default::default();
             if tied && !segment.steps.is_empty() {
@@ -133,15 +133,36 @@ impl Segment {
                 navigator.state = begin;
             }
             let samples = step.samples.clone();
+            let length = samples.len();
             let bridged = imu.bridged(&samples).next().is_some();
-            if bridged || alike != Some(samples.len()) {
-                let attitude = match tied {
-                    true => begin.attitude,
-                    false => navigator.state.attitude,
-                };
-                alike = (!bridged).then_some(samples.len());
-                navigator.warm(&whole);
-                segment.models.push(navigator.standing(&attitude, samples));
+            let number = |model: Option<(usize, usize)>| {
+                let (of, number) = model?;
+                (of == length).then_some(number)
+            };
+            let model = match number(alike).filter(|_| !bridged) {
+                Some(known) => known,
+                None => {
+                    // A pass that holds its linearisation stays in one attitude.
+                    let like = number(of_length).filter(|_| tied && bridged);
+                    let like = like.and_then(|number| segment.models.get(number));
+                    let model = match like {
+                        Some(model) => navigator.standing_like(model, &samples),
+                        None => {
+                            let attitude = match tied {
+                                true => begin.attitude,
+                                false => navigator.state.attitude,
+                            };
+                            navigator.warm(&whole);
+                            navigator.standing(&attitude, samples)
+                        }
+                    };
+                    segment.models.push(model);
+                    segment.models.len() - 1
+                }
+            };
+            of_length = Some((length, model));
+            if !bridged {
+                alike = of_length;
             }
             navigator.warm(&step.samples);
             navigator.stand(&at_rest.sums);
@@ -163,11 +184,12 @@ impl Segment {
             });
             segment.steps.push(Standing {
                 time: imu.time(step.samples.end),
-                model: segment.models.len() - 1,
+                model,
                 referred,
                 seen: seen.collect(),
             });
         }
+        segment.models.shrink_to_fit();
         segment
     }
 

@@ -192,7 +192,7 @@ fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
     let navigator = Navigator::new(&record, &site, &ideal, at_rest).unwrap();
     let moving = navigator.clone().advance(0..SAMPLES);
     let standing = navigator.clone().advance_standing(0..SAMPLES);
-    assert_relative_eq!(moving.navigation, standing.navigation, epsilon = 1e-6);
+    assert_relative_eq!(*moving.navigation, *standing.navigation, epsilon = 1e-6);
     for sensor in crate::imu::Sensor::ALL {
         let of = |block: &Block| *block.parameters.get(sensor);
         assert_relative_eq!(of(&moving), of(&standing), epsilon = 1e-6);
@@ -223,7 +223,7 @@ fn noise_of_a_long_block_equals_that_of_its_parts() {
     let first = navigator.advance(0..SAMPLES / 2);
     let second = navigator.advance(SAMPLES / 2..SAMPLES);
     let of = |block: &Block| block.noise.covariance(&noise);
-    let composed = second.navigation * of(&first) * second.navigation.transpose() + of(&second);
+    let composed = *second.navigation * of(&first) * second.navigation.transpose() + of(&second);
     assert_relative_eq!(of(&whole), composed, epsilon = 1e-7);
 }
 

@@ -6,6 +6,7 @@ mod interpolation;
 mod notes;
 mod repair;
 mod saturated;
+mod sound;
 mod spikes;
 mod stuck;
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::impossible::Impossible;
 use super::interpolation::Hole;
+use super::sound::Sound;
 use super::{Bridge, Fault, FaultKind, Found, find, ranges};
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
@@ -104,26 +105,34 @@ impl Rows<'_> {
             period,
             body_axes,
             units,
+            facts,
+            pulses,
             ..
         } = self;
         let mut columns = columns.map(|rows| placed(rows, &numbers));
         let mut bridges = Vec::new();
         let longest = (LONGEST / period) as usize;
+        // Rounding stays within a step: of the sum where what is left over is carried, else of each sample.
+        let rounding = |facts: &ColumnFacts, samples: usize| {
+            let step = facts.step.unwrap_or(0.0);
+            step * step * if pulses { 1.0 } else { samples as f64 }
+        };
         for Holes { of, mut sound } in holes_of_columns(&faults, &body_axes, columns[0].len()) {
-            let mut holes = ranges(sound.len(), |k| !sound[k]);
+            let mut holes = ranges(sound.len(), |k| !sound.is(k));
             holes.sort_by_key(Range::len);
             let mut filled = 0;
             for (number, samples) in holes.iter().enumerate() {
                 // Beside a long hole short ones, once filled, are as good as sound.
                 while filled < number && SHORT * holes[filled].len() <= samples.len() {
-                    sound[holes[filled].clone()].fill(true);
+                    sound.set(holes[filled].clone(), true);
                     filled += 1;
                 }
                 let hole = Hole::new(&sound, samples.clone(), longest);
                 let mut bridge = Bridge::new(samples.clone());
                 for &k in &of {
                     let (sensor, axis) = (sensor(k), body_axes[k]);
-                    let variance = hole.fill(&mut columns[k]);
+                    let rounding = rounding(&facts[k], samples.len());
+                    let variance = hole.fill(&mut columns[k], rounding);
                     let variance = variance.map(|variance| variance * units[k].powi(2));
                     let linear =
                         |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
@@ -213,7 +222,7 @@ impl Fault {
 /// Columns with the same holes.
 struct Holes {
     of: Vec<usize>,
-    sound: Vec<bool>,
+    sound: Sound,
 }
 
 /// Columns with holes, those with the same ones together: rows that are missing lack all of them.
@@ -224,9 +233,9 @@ fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) ->
         if !faults.iter().any(|fault| concerned(&fault)) {
             continue;
         }
-        let mut sound = vec![true; samples];
+        let mut sound = Sound::new(samples);
         for fault in faults.iter().filter(concerned) {
-            sound[fault.samples.clone()].fill(false);
+            sound.set(fault.samples.clone(), false);
         }
         match all.iter_mut().find(|holes| holes.sound == sound) {
             Some(holes) => holes.of.push(k),

@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 
 use super::super::plot::{Axis, Panel, Plot, Point, Series, thinned};
 use super::report::Report;
+use crate::attitude::matrix;
 use crate::imu::AXES;
 use crate::recording::{ImuSamples, TableLog};
 use crate::units::DEGREE;
@@ -54,7 +55,7 @@ pub(super) fn figure(report: &Report) -> Plot {
 /// Elevation of a body axis above the horizon in degrees.
 fn elevation(table: &TableLog, axis: usize) -> Vec<Point> {
     let line = table.time.iter().zip(&table.attitude);
-    line.map(|(&t, c)| (t, axis_elevation(c, axis) / DEGREE))
+    line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE))
         .collect()
 }
 
@@ -62,8 +63,9 @@ fn elevation(table: &TableLog, axis: usize) -> Vec<Point> {
 fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
     let gap = (f64::NAN, f64::NAN);
     let (mut last, mut line) = (f64::NAN, Vec::new());
-    for (&t, c) in table.time.iter().zip(&table.attitude) {
-        if axis_elevation(c, axis).abs() > STEEP {
+    for (&t, attitude) in table.time.iter().zip(&table.attitude) {
+        let c = matrix(attitude);
+        if axis_elevation(&c, axis).abs() > STEEP {
             last = f64::NAN;
             line.push(gap);
             continue;
@@ -101,11 +103,11 @@ fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attitude::from_pitch_roll_heading;
+    use crate::attitude::{from_pitch_roll_heading, quaternion};
 
     fn table(headings: impl Iterator<Item = f64>) -> TableLog {
         let attitude: Vec<_> = headings
-            .map(|heading| from_pitch_roll_heading(0.0, 0.0, heading * DEGREE))
+            .map(|heading| quaternion(&from_pitch_roll_heading(0.0, 0.0, heading * DEGREE)))
             .collect();
         TableLog {
             time: (0..attitude.len()).map(|k| k as f64).collect(),

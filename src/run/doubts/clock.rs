@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use crate::attitude::log;
 use crate::earth::ROTATION_RATE;
 use crate::recording::{TableLog, nanoseconds};
 use crate::run::Run;
@@ -189,7 +188,7 @@ fn of_samples(run: &Run, table: &TableLog, samples: Range<usize>) -> Option<Move
     let interval = intervals.fold((first - begin).max(end - last), f64::max);
     let steps = times.windows(2).zip(attitudes.windows(2));
     let by_table = steps.map(|(time, attitude)| {
-        let angle = log(&(attitude[1] * attitude[0].transpose())).norm();
+        let angle = attitude[1].angle_to(&attitude[0]);
         (time[0].midpoint(time[1]), time[1] - time[0], angle)
     });
     // Two readings of three components each, as where standstills are found.

@@ -31,7 +31,7 @@ impl Run {
                     before += 1;
                 }
                 let before = &table.attitude[before.max(first)];
-                log(&(table.attitude[next] * before.transpose())).norm() < limit
+                table.attitude[next].angle_to(before) < limit
             };
             if !stands {
                 dwells.extend(self.dwell(table, first..next));

@@ -177,7 +177,8 @@ fn axis_angles_multiply_from_the_outer_axis_in() {
         plain,
     );
     let table = run.recording.table.unwrap();
-    for (k, c_b_n) in table.attitude.iter().enumerate() {
+    for (k, read) in table.attitude.iter().enumerate() {
+        let c_b_n = attitude::matrix(read);
         // Heading is clockwise and the outer angle is not.
         let [outer, middle, inner] = [3.0 * k as f64, -20.0, 2.0 * k as f64].map(|a| a * DEGREE);
         let expected = attitude::from_pitch_roll_heading(middle, inner, -outer);

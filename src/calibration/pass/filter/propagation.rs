@@ -115,7 +115,7 @@ impl Filter {
 
     /// What navigation errors, and each state that drives them, make of the navigation errors.
     pub(super) fn driving_columns(&self, block: &Block) -> Vec<[f64; NAVIGATION]> {
-        let PerSensor { gyro, accel } = &block.parameters;
+        let PerSensor { gyro, accel } = &*block.parameters;
         let of_triad = |sensor: Sensor, parameter: usize| match sensor {
             Sensor::Gyro => gyro.column(parameter),
             Sensor::Accel => accel.column(parameter),

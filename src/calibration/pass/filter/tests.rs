@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::*;
@@ -69,11 +71,13 @@ fn block(seed: f64) -> Block {
     Block {
         state: State::at_rest(Matrix3::identity()),
         duration: 0.1,
-        navigation: BlockMatrix::identity() + BlockMatrix::from_fn(|r, c| 0.1 * wave(r, c)),
-        parameters: PerSensor {
+        navigation: Arc::new(
+            BlockMatrix::identity() + BlockMatrix::from_fn(|r, c| 0.1 * wave(r, c)),
+        ),
+        parameters: Arc::new(PerSensor {
             gyro: ParameterBlock::from_fn(wave),
             accel: ParameterBlock::from_fn(|r, c| wave(c, r)),
-        },
+        }),
         gravity: SVector::from_fn(|row, _| wave(row, 1)),
         thermal: None,
         terms: Vec::new(),
@@ -219,10 +223,9 @@ fn scalar_updates_equal_the_dense_one_with_the_full_gain() {
 fn turning(seed: f64) -> Block {
     let mut block = block(seed);
     let wave = block.navigation;
-    block.navigation = BlockMatrix::identity();
+    block.navigation = Arc::new(BlockMatrix::identity());
     for (row, column) in [(3, 0), (6, 3)] {
-        block
-            .navigation
+        Arc::make_mut(&mut block.navigation)
             .fixed_view_mut::<3, 3>(row, column)
             .copy_from(&wave.fixed_view::<3, 3>(row, column));
     }

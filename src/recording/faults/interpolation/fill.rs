@@ -1,0 +1,210 @@
+//! One way to fill a hole, and the error that it makes where there is no hole.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::recording::faults::sound::{Pattern, Sound};
+
+/// Intact stretches that are filled as the hole is, on either side at most …
+const TRIALS: usize = 16;
+/// … and on both together at least.
+const FEWEST_TRIALS: usize = 8;
+/// A change across the hole that is this many times the largest across intact stretches is not known
+/// from them.
+const UNTRIED: f64 = 2.0;
+
+/// A polynomial through neighbours by least squares.
+pub(super) struct Fill {
+    hole: Range<usize>,
+    /// Neighbours that follow one another, all those before the hole first.
+    runs: Vec<Range<usize>>,
+    /// How many of the runs are before the hole.
+    before: usize,
+    /// Of each neighbour in the sum over the hole.
+    weights: Vec<f64>,
+    /// By how many samples later or earlier intact stretches near by are.
+    shifts: Vec<isize>,
+    degree: usize,
+    inverse: Matrix4<f64>,
+    scale: f64,
+}
+
+impl Fill {
+    /// Of this degree through the nearest of the neighbours before and after a hole, each outwards.
+    pub fn new(
+        degree: usize,
+        sides: [&[usize]; 2],
+        hole: Range<usize>,
+        sound: &Sound,
+    ) -> Option<Self> {
+        let [before, after] = sides;
+        let runs_before = runs(before.iter().rev());
+        let number_before = runs_before.len();
+        let runs: Vec<_> = runs_before.into_iter().chain(runs(after.iter())).collect();
+        let first = hole.start.min(runs.first()?.start);
+        let last = hole.end.max(runs.last()?.end - 1);
+        let mut fill = Self {
+            hole,
+            runs,
+            before: number_before,
+            weights: Vec::new(),
+            shifts: Vec::new(),
+            degree,
+            inverse: Matrix4::zeros(),
+            scale: 2.0 / (last - first) as f64,
+        };
+        fill.shifts = fill.intact(sound);
+        if fill.shifts.len() < FEWEST_TRIALS {
+            return None;
+        }
+        let used = || fill.runs.iter().flat_map(Range::clone);
+        let powers = used().map(|k| fill.powers(k));
+        let mut normal: Matrix4<f64> = powers.map(|x| x * x.transpose()).sum();
+        // Powers beyond the degree stay out.
+        for k in degree + 1..4 {
+            normal[(k, k)] = 1.0;
+        }
+        let inverse = normal.cholesky()?.inverse();
+        let in_hole: Vector4<f64> = fill.hole.clone().map(|k| fill.powers(k)).sum();
+        let of_sum = inverse * in_hole;
+        let weights = used().map(|k| fill.powers(k).dot(&of_sum)).collect();
+        Some(Self {
+            inverse,
+            weights,
+            ..fill
+        })
+    }
+
+    fn powers(&self, k: usize) -> Vector4<f64> {
+        let middle = 0.5 * (self.hole.start + self.hole.end - 1) as f64;
+        let x = (k as f64 - middle) * self.scale;
+        match self.degree {
+            0 => Vector4::new(1.0, 0.0, 0.0, 0.0),
+            1 => Vector4::new(1.0, x, 0.0, 0.0),
+            _ => Vector4::new(1.0, x, x * x, x * x * x),
+        }
+    }
+
+    /// Fills the hole of an axis.
+    pub fn apply(&self, axis: &mut [f64]) {
+        let used = self.runs.iter().flat_map(Range::clone);
+        let moments: Vector4<f64> = used.map(|k| self.powers(k) * axis[k]).sum();
+        let polynomial = self.inverse * moments;
+        for k in self.hole.clone() {
+            axis[k] = polynomial.dot(&self.powers(k));
+        }
+    }
+
+    /// By how much later the same samples are all sound, for so many places on either side as are tried.
+    fn intact(&self, sound: &Sound) -> Vec<isize> {
+        let (before, after) = self.runs.split_at(self.before);
+        let hole = std::slice::from_ref(&self.hole);
+        let pattern = Pattern::new(&[before, hole, after].concat());
+        let length = self.hole.len();
+        let used: usize = self.runs.iter().map(Range::len).sum();
+        let stride = length.div_ceil(2);
+        let reach = (6 * (length + used) + super::MOST) as isize;
+        let of_side = |direction: isize| {
+            let shifts = (1..).map(move |k: isize| k * stride as isize);
+            let shifts = shifts.take_while(move |&shift| shift <= reach);
+            let shifts = shifts.map(move |shift| direction * shift);
+            let intact = shifts.filter(|&shift| pattern.is_sound(sound, shift));
+            intact.take(TRIALS)
+        };
+        of_side(-1).chain(of_side(1)).collect()
+    }
+
+    /// Mean square of the sum's error over intact stretches near by, every other and the rest; none if the
+    /// first is more than `most`.
+    pub fn measured(&self, axis: &[f64], most: f64) -> Option<[f64; 2]> {
+        let count = self.shifts.len();
+        let change = self.change(axis, 0).abs();
+        let mut is_tried = false;
+        let mut mean_square = |half: usize, most: f64| {
+            let of_half = ((count + 1 - half) / 2) as f64;
+            let mut squares = 0.0;
+            for &shift in self.shifts.iter().skip(half).step_by(2) {
+                let hole = self.hole.start.wrapping_add_signed(shift)
+                    ..self.hole.end.wrapping_add_signed(shift);
+                let error = self.sum_after(axis, shift) - axis[hole].iter().sum::<f64>();
+                squares += error * error;
+                if squares > most * of_half {
+                    return None;
+                }
+                is_tried = is_tried || change <= UNTRIED * self.change(axis, shift).abs();
+            }
+            Some(squares / of_half)
+        };
+        let halves = [mean_square(0, most)?, mean_square(1, f64::INFINITY)?];
+        // A larger change than any tried may have come at any moment.
+        let sudden = match is_tried {
+            true => 0.0,
+            false => (change * self.hole.len() as f64).powi(2) / 12.0,
+        };
+        Some(halves.map(|half| half.max(sudden)))
+    }
+
+    /// Sum over the hole as it is filled.
+    pub fn sum(&self, axis: &[f64]) -> f64 {
+        self.sum_after(axis, 0)
+    }
+
+    /// The same of a hole `shift` samples later.
+    fn sum_after(&self, axis: &[f64], shift: isize) -> f64 {
+        let (mut weights, mut sum) = (self.weights.as_slice(), 0.0);
+        for run in &self.runs {
+            let (of_run, rest) = weights.split_at(run.len());
+            weights = rest;
+            sum += product(of_run, &axis[later(run, shift)]);
+        }
+        sum
+    }
+
+    /// Mean of the neighbours after the hole less that of those before, `shift` samples later; zero where there
+    /// are none on a side.
+    fn change(&self, axis: &[f64], shift: isize) -> f64 {
+        let (before, after) = self.runs.split_at(self.before);
+        let mean = |runs: &[Range<usize>]| {
+            let count: usize = runs.iter().map(Range::len).sum();
+            let values = runs.iter().flat_map(|run| &axis[later(run, shift)]);
+            (count > 0).then(|| values.sum::<f64>() / count as f64)
+        };
+        let means = mean(before).zip(mean(after));
+        means.map_or(0.0, |(before, after)| after - before)
+    }
+}
+
+fn later(run: &Range<usize>, shift: isize) -> Range<usize> {
+    let start = run.start.wrapping_add_signed(shift);
+    start..start + run.len()
+}
+
+/// Runs of samples that follow one another, of increasing samples.
+fn runs<'a>(samples: impl Iterator<Item = &'a usize>) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for &k in samples {
+        match runs.last_mut() {
+            Some(run) if run.end == k => run.end += 1,
+            _ => runs.push(k..k + 1),
+        }
+    }
+    runs
+}
+
+/// Sums that are formed beside each other, so that none waits for another.
+const BESIDE: usize = 4;
+
+fn product(weights: &[f64], values: &[f64]) -> f64 {
+    let (weights, last_weights) = weights.as_chunks::<BESIDE>();
+    let (values, last_values) = values.as_chunks::<BESIDE>();
+    let mut sums = [0.0; BESIDE];
+    for (weights, values) in weights.iter().zip(values) {
+        for (sum, (weight, value)) in sums.iter_mut().zip(weights.iter().zip(values)) {
+            *sum += weight * value;
+        }
+    }
+    let last = last_weights.iter().zip(last_values);
+    let last: f64 = last.map(|(weight, value)| weight * value).sum();
+    sums.iter().sum::<f64>() + last
+}
