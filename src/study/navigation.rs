@@ -1,5 +1,5 @@
-//! What a calibration is worth: the navigation error that what is wrong with it causes, by full
-//! nonlinear navigation, and the σ of that error that its covariance predicts, by the linear model.
+//! What a calibration is worth: the navigation error that what is wrong with it causes, by the
+//! nonlinear equations of navigation, and the σ of that error that its covariance predicts, by the linear model.
 
 mod course;
 mod outlook;
@@ -219,7 +219,7 @@ impl Mission {
         Ok(moments)
     }
 
-    /// The errors alone, by nonlinear navigation: 7 ms for a body that stands for 40 h.
+    /// The errors alone, by their nonlinear equations: milliseconds for a body that stands for 40 h.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
