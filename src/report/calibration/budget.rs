@@ -149,7 +149,7 @@ pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
 pub(super) fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let claimed = estimate.sigma();
     let worst = |test: &ErrorTermTest| {
-        let left_off = test.left_off?;
+        let left_off = test.left_off.filter(|_| !test.significant())?;
         let of_group = |group: Group| {
             let indices = group.estimated(estimate);
             let [may, sigma] = [&left_off.shown, &claimed].map(|v| group.spread(v, &indices));
@@ -163,27 +163,21 @@ pub(super) fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     };
     let mut unseen: Vec<_> = report.effects.iter().filter_map(worst).collect();
     unseen.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let named = unseen
-        .iter()
-        .take(NAMED_TERMS)
-        .map(|&(term, group, times)| {
-            format!(
-                "{} {} by {} σ",
-                term.name(),
-                group.short(),
-                value(times, 1.0)
-            )
-        });
-    let named: Vec<String> = named.collect();
+    let named = unseen.iter().take(NAMED_TERMS);
+    let mut named: Vec<String> = named
+        .map(|(term, group, times)| {
+            let (name, group, times) = (term.name(), group.short(), three_digits(*times));
+            format!("{name} ({group} by {times} σ)")
+        })
+        .collect();
+    named.extend(match unseen.len() - named.len() {
+        0 => None,
+        more => Some(format!("{more} more")),
+    });
     (!named.is_empty()).then(|| {
         format!(
-            "σ are those of this model. Errors that are not estimated and that this record would not show may \
-             change more: {}{}.",
-            named.join(", "),
-            match unseen.len() - named.len() {
-                0 => String::new(),
-                more => format!(", {more} more"),
-            }
+            "σ are those of this model. What is not estimated and would not be seen in this record may change more: {}.",
+            named.join(", ")
         )
     })
 }

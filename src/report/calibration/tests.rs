@@ -8,8 +8,10 @@ use super::super::synthetic::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
 use crate::calibration::{Nis, Observation, from_vector, parameter_name, to_vector};
-use crate::calibration::{PARAMETERS, ParameterMatrix};
-use crate::imu::{GaussMarkov, InstallationForm};
+use crate::calibration::{
+    ErrorTerm, ErrorTermTest, LeftOff, PARAMETERS, ParameterMatrix, ParameterVector, Role, parameter,
+};
+use crate::imu::{GaussMarkov, InstallationForm, Sensor, Term};
 use crate::navigation::NearPole;
 use crate::study::navigation::NavigationStudyError;
 use crate::units::{DEG_PER_H, PPM};
@@ -330,4 +332,44 @@ fn the_position_error_at_the_end_stands_in_the_summary() {
     end.sigma.fixed_rows_mut::<3>(6).fill(1852.0);
     let summary = summary(&made_up.report());
     assert!(summary.contains("EKF 5.00 nmile (σ 1.41)"), "{summary}");
+}
+
+#[test]
+fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
+    let made_up = synthetic(InstallationForm::General);
+    let scale = parameter(Sensor::Gyro, 0);
+    let off = |times: f64| {
+        let sigma = made_up.outcome.estimate.sigma();
+        let group = Group::of(scale);
+        // The same for all three axes, so that the group has it, too.
+        ParameterVector::from_fn(|i, _| if Group::of(i) == group { times * sigma[i] } else { 0.0 })
+    };
+    let effect = |term: Term, times: f64, gain: f64| ErrorTermTest {
+        term: ErrorTerm::Instrument(term),
+        on: false,
+        sigma_factors: [None; 6],
+        gain,
+        limit: 10.0,
+        significance: gain,
+        role: Role::None,
+        without: 1.0,
+        with: 1.0,
+        left_off: Some(LeftOff {
+            usual: off(times),
+            shown: off(times),
+        }),
+    };
+    let effects = [
+        effect(Term::GyroSecondOrder, 0.9, 1.0),
+        effect(Term::GyroNonlinearity, 20.0, 1.0),
+        // This one is seen, and is a finding.
+        effect(Term::GyroAsymmetry, 50.0, 100.0),
+    ];
+    let report = Report {
+        effects: &effects,
+        ..made_up.report()
+    };
+    let said = summary(&report);
+    assert!(said.contains("may change more: gyro-nonlinearity (gyro K by 20.0 σ).\n"), "{said}");
+    assert!(!summary(&made_up.report()).contains("may change more"));
 }
