@@ -183,6 +183,7 @@ fn nonlinear(sensor: Sensor, sensed: &Vector3<f64>, times: &[f64]) -> Vec<[f64; 
 }
 
 #[test]
+#[ignore = "slow: studies of its own"]
 fn the_linear_courses_are_those_of_nonlinear_navigation_but_for_the_second_order() {
     let table = study(8, 11);
     for column in &table.columns {
@@ -231,6 +232,7 @@ fn command(arguments: &[&str]) -> assert_cmd::Command {
 }
 
 #[test]
+#[ignore = "slow: studies of its own"]
 fn the_table_is_the_same_on_one_thread_and_on_two_and_changes_with_the_seed() {
     let bytes = |threads: &str, seed: &str| {
         let mut command = command(&["--samples", "3", "--hours", "2", "--json", "--seed", seed]);

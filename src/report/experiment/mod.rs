@@ -92,6 +92,7 @@ mod tests {
     use crate::study::experiment::Method;
 
     #[test]
+    #[ignore = "slow: an experiment whole"]
     fn an_experiment_is_reported_whole_whether_its_filter_works_or_not() {
         let mut scenario = Scenario::load("experiment").unwrap();
         scenario.integrator.period = 0.1;
