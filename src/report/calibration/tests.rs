@@ -7,10 +7,11 @@ use super::super::group::Group;
 use super::super::synthetic::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
-use crate::calibration::{Nis, Observation, from_vector, parameter_name, to_vector};
 use crate::calibration::{
-    ErrorTerm, ErrorTermTest, LeftOff, PARAMETERS, ParameterMatrix, ParameterVector, Role, parameter,
+    ErrorTerm, ErrorTermTest, LeftOff, PARAMETERS, ParameterMatrix, ParameterVector, Role,
+    parameter,
 };
+use crate::calibration::{Nis, Observation, from_vector, parameter_name, to_vector};
 use crate::imu::{GaussMarkov, InstallationForm, Sensor, Term};
 use crate::navigation::NearPole;
 use crate::study::navigation::NavigationStudyError;
@@ -342,7 +343,13 @@ fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
         let sigma = made_up.outcome.estimate.sigma();
         let group = Group::of(scale);
         // The same for all three axes, so that the group has it, too.
-        ParameterVector::from_fn(|i, _| if Group::of(i) == group { times * sigma[i] } else { 0.0 })
+        ParameterVector::from_fn(|i, _| {
+            if Group::of(i) == group {
+                times * sigma[i]
+            } else {
+                0.0
+            }
+        })
     };
     let effect = |term: Term, times: f64, gain: f64| ErrorTermTest {
         term: ErrorTerm::Instrument(term),
@@ -370,6 +377,9 @@ fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
         ..made_up.report()
     };
     let said = summary(&report);
-    assert!(said.contains("may change more: gyro-nonlinearity (gyro K by 20.0 σ).\n"), "{said}");
+    assert!(
+        said.contains("may change more: gyro-nonlinearity (gyro K by 20.0 σ).\n"),
+        "{said}"
+    );
     assert!(!summary(&made_up.report()).contains("may change more"));
 }
