@@ -40,7 +40,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         attempt,
         problem,
         alone,
-        findings: of_temperature,
+        findings: of_recordings,
     } = match problem.varies() || problem.runs().nth(1).is_some() {
         true => Solved::of(together::solve(problem, progress)?),
         false => Solved {
@@ -68,8 +68,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let form_test = form_test(problem, &priors, &iterated.held)?;
     // Noise that makes up for angles that are missing is no noise, nor is what recordings differ by.
     let differ = |finding: &Finding| matches!(finding, Finding::RecordingsDiffer { .. });
-    let rejected =
-        form_test.as_ref().is_some_and(FormTest::rejects) || of_temperature.iter().any(differ);
+    let is_no_noise =
+        form_test.as_ref().is_some_and(FormTest::rejects) || of_recordings.iter().any(differ);
     let Learnt {
         model,
         iterated: Iterated {
@@ -77,7 +77,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             converged,
         },
         report,
-    } = match rejected {
+    } = match is_no_noise {
         true => Learnt::stated(problem, iterated),
         false => {
             let (stated, number) = (iterated.clone(), passes.len());
@@ -150,7 +150,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         findings: Vec::new(),
     };
     outcome.findings = findings(stated, &outcome);
-    outcome.findings.extend(of_temperature);
+    outcome.findings.extend(of_recordings);
     if let Some((scatter, growth)) = outcome.dwell_scatter.zip(growth) {
         outcome.findings.push(Finding::DwellsScatter {
             mean: scatter.mean,

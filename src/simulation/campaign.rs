@@ -15,7 +15,7 @@ use crate::imu::{ParameterKind, Sensor};
 use crate::models::{self, ModelError, NonNegative, Place, Room};
 use crate::recording::Temperature;
 use crate::turntable::TableError;
-use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+use crate::units::ARCSEC;
 
 /// Recordings of one instrument, to be simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -169,15 +169,17 @@ struct DayToDayFile {
 
 impl DayToDayFile {
     fn in_si(self) -> DayToDay {
-        let of = |group: Group| match (group.sensor(), group.kind()) {
-            (Sensor::Gyro, ParameterKind::Scale) => self.gyro_scale_ppm.0 * PPM,
-            (Sensor::Gyro, ParameterKind::Installation) => self.gyro_installation_arcsec.0 * ARCSEC,
-            (Sensor::Gyro, ParameterKind::Bias) => self.gyro_bias_deg_per_h.0 * DEG_PER_H,
-            (Sensor::Accel, ParameterKind::Scale) => self.accel_scale_ppm.0 * PPM,
-            (Sensor::Accel, ParameterKind::Installation) => {
-                self.accel_installation_arcsec.0 * ARCSEC
-            }
-            (Sensor::Accel, ParameterKind::Bias) => self.accel_bias_ug.0 * MICRO_G,
+        let of = |group: Group| {
+            let stated = match (group.sensor(), group.kind()) {
+                (Sensor::Gyro, ParameterKind::Scale) => self.gyro_scale_ppm,
+                (Sensor::Gyro, ParameterKind::Installation) => self.gyro_installation_arcsec,
+                (Sensor::Gyro, ParameterKind::Bias) => self.gyro_bias_deg_per_h,
+                (Sensor::Accel, ParameterKind::Scale) => self.accel_scale_ppm,
+                (Sensor::Accel, ParameterKind::Installation) => self.accel_installation_arcsec,
+                (Sensor::Accel, ParameterKind::Bias) => self.accel_bias_ug,
+            };
+            let (_, unit) = DayToDay::key(group);
+            stated.0 * unit
         };
         DayToDay {
             parameters: ParameterVector::from_fn(|i, _| of(Group::of(i))),

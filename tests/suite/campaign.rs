@@ -1,10 +1,10 @@
 //! Several recordings of one instrument as one calibration: temperature, days, order.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use turncal::calibration::{
-    AtRest, Calibration, Finding, Options, PARAMETERS, Problem, estimate, parameter,
+    AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, estimate, parameter,
 };
 use turncal::formats::Campaign;
 use turncal::imu::Sensor;
@@ -206,18 +206,28 @@ name = \"second\"
 name = \"third\"
 ";
 
+/// Simulates recordings of the short scenario as a campaign says; the path of its `campaign.toml`.
+fn made(here: &Path, name: &str, campaign: &str) -> PathBuf {
+    let file = format!("{name}.toml");
+    fs::write(here.join(&file), campaign).unwrap();
+    let made = turncal(here, &["simulate", &file, "-o", name]);
+    assert!(made.status.success(), "{}", words(&made));
+    here.join(name).join("campaign.toml")
+}
+
+fn estimated(campaign: &Path) -> Outcome {
+    let campaign = Campaign::read(campaign).unwrap();
+    let runs: Vec<&Run> = campaign.runs.iter().collect();
+    let problem = Problem::together(&runs, &Options::default(), &campaign.together).unwrap();
+    estimate(&problem, &|_| {}).unwrap()
+}
+
 #[test]
 fn an_instrument_that_is_mounted_anew_turns_as_a_whole() {
     let here = tempfile::tempdir().unwrap();
     let here = here.path();
     simulated(here);
-    fs::write(here.join("mountings.toml"), MOUNTINGS).unwrap();
-    let made = turncal(here, &["simulate", "mountings.toml", "-o", "mounted"]);
-    assert!(made.status.success(), "{}", words(&made));
-    let campaign = Campaign::read(&here.join("mounted/campaign.toml")).unwrap();
-    let runs: Vec<&Run> = campaign.runs.iter().collect();
-    let problem = Problem::together(&runs, &Options::default(), &campaign.together).unwrap();
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimated(&made(here, "mounted", MOUNTINGS));
     assert!(outcome.converged);
     let truth = Calibration::read(&here.join("mounted/truth.json")).unwrap();
 
@@ -259,19 +269,13 @@ fn recordings_that_differ_by_more_than_is_stated_are_found_to() {
     let here = tempfile::tempdir().unwrap();
     let here = here.path();
     simulated(here);
-    fs::write(here.join("days.toml"), DAYS).unwrap();
-    let made = turncal(here, &["simulate", "days.toml", "-o", "days"]);
-    assert!(made.status.success(), "{}", words(&made));
-    let path = here.join("days/campaign.toml");
-    let stated = Campaign::read(&path).unwrap();
+    let path = made(here, "days", DAYS);
+    let stated = estimated(&path);
     let text = fs::read_to_string(&path).unwrap();
     let without = text.split("# 1σ from one recording").next().unwrap();
     fs::write(&path, without).unwrap();
-    let silent = Campaign::read(&path).unwrap();
-    let sigma = |campaign: &Campaign| {
-        let runs: Vec<&Run> = campaign.runs.iter().collect();
-        let problem = Problem::together(&runs, &Options::default(), &campaign.together).unwrap();
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+    let silent = estimated(&path);
+    let sigma = |outcome: &Outcome| {
         let found = outcome.findings.iter().find_map(|finding| match finding {
             Finding::RecordingsDiffer { differences } => Some(differences.clone()),
             _ => None,
