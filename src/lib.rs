@@ -15,7 +15,7 @@
 //! // A simulated run; `Run::read("run.toml".as_ref())` reads a recorded one.
 //! let run = Scenario::load("single-axis")?.simulate(1, 0)?.run;
 //! let problem = Problem::new(&run, &Options::default());
-//! let solution = problem.solve(Method::Ekf, &|_| {})?;
+//! let mut solution = problem.solve(Method::Ekf, &|_| {})?;
 //! let assessment = solution.assess(&problem)?;
 //! let calibration = solution.calibration(&problem, &assessment);
 //! assert!(solution.converged());

@@ -1,6 +1,7 @@
-//! Order statistics, which a few wild values do not move, and what χ² stays below.
+//! Order statistics, which a few wild values do not move, and what χ² and Student's t stay below.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::function::beta::beta_reg;
 use statrs::statistics::{Data, OrderStatistics};
 
 /// σ of a normal distribution over the median of its absolute deviations.
@@ -12,7 +13,65 @@ pub(crate) fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - chance))
 }
 
+/// Degrees of freedom from which t is the normal distribution and its first correction, to 1e-7.
+const MANY: f64 = 1e4;
+
+/// What Student's t of so many degrees of freedom, one at least, stays below but for this chance of less than
+/// one half.
+///
+/// The tail is halved in, for Newton's method on it goes in circles for some degrees of freedom. Source:
+/// Abramowitz and Stegun, *Handbook of Mathematical Functions*, 26.7.1 and 26.7.5.
+pub(crate) fn student_limit(degrees: f64, chance: f64) -> f64 {
+    if degrees > MANY {
+        let z = -Normal::standard().inverse_cdf(chance);
+        return z + (z.powi(3) + z) / (4.0 * degrees);
+    }
+    let degrees = degrees.max(1.0);
+    let beyond = |t: f64| 0.5 * beta_reg(0.5 * degrees, 0.5, degrees / (degrees + t * t)) > chance;
+    let (mut low, mut high) = (0.0, 1.0);
+    while beyond(high) {
+        (low, high) = (high, 2.0 * high);
+    }
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return high;
+        }
+        match beyond(middle) {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+}
+
 /// The median of some numbers, which lose their order; none of none.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.2.
+    #[test]
+    fn students_t_is_that_of_the_tables() {
+        for (degrees, chance, t) in [
+            (1.0, 0.025, 12.706),
+            (5.0, 0.025, 2.571),
+            (30.0, 0.001, 3.385),
+            (100.0, 0.05, 1.660),
+        ] {
+            assert_relative_eq!(student_limit(degrees, chance), t, epsilon = 5e-4);
+        }
+    }
+
+    #[test]
+    fn of_any_degrees_of_freedom_students_t_is_found_and_falls_with_them() {
+        let degrees = (0..20_000).map(|i| 10f64.powf(8.0 * f64::from(i) / 20_000.0));
+        let limits: Vec<f64> = degrees.map(|of| student_limit(of, 0.022_75)).collect();
+        assert!(limits.windows(2).all(|two| two[1] < two[0] + 1e-6));
+        assert_relative_eq!(*limits.last().unwrap(), 2.0, epsilon = 1e-4);
+    }
 }

@@ -7,6 +7,7 @@
 mod evidence;
 mod joint;
 mod left_off;
+mod seen;
 
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,7 @@ use super::problem::Problem;
 use evidence::ln_survival;
 use joint::{Fit, Joint, once_more};
 pub use left_off::LeftOff;
+pub use seen::seen_and_left_off;
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,7 +81,8 @@ impl ErrorTermTest {
 
     /// Of error terms that are off and that the data show, the one that is the likeliest, with those that
     /// cannot be told from it and those that are significant beside it.
-    pub fn most_significant(tests: &[Self]) -> Option<Finding> {
+    /// `growth` is how many times larger σ are for what leaving them off does; none where σ are without.
+    pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
         let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
         let names = |role: Role| {
             let of_role = tests.iter().filter(|test| test.role == role);
@@ -93,6 +96,7 @@ impl ErrorTermTest {
             limit: likeliest.limit,
             nis_without: likeliest.without,
             nis_with: likeliest.with,
+            growth,
         })
     }
 }

@@ -114,6 +114,8 @@ pub enum Finding {
         nis_without: f64,
         /// … and with it.
         nis_with: f64,
+        /// By how much σ grow at most for what leaving them off does; none where σ are without.
+        growth: Option<f64>,
     },
     /// Parameters that the prior does not allow.
     FarFromPrior {
@@ -308,6 +310,7 @@ impl fmt::Display for Finding {
                 further,
                 nis_without,
                 nis_with,
+                growth,
                 ..
             } => {
                 write!(
@@ -326,7 +329,14 @@ impl fmt::Display for Finding {
                 if !further.is_empty() {
                     write!(f, " Significant beside it: {}.", further.join(", "))?;
                 }
-                Ok(())
+                match growth {
+                    Some(growth) => write!(
+                        f,
+                        " σ hold what leaving that off does to the parameters, and are up to {growth:.2} times \
+                         as large for it."
+                    ),
+                    None => Ok(()),
+                }
             }
             Self::FarFromPrior {
                 sigmas,

@@ -17,7 +17,7 @@ use super::linearisation::singular;
 use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::Outcome;
-use super::parameters::parameter_name;
+use super::parameters::{ParameterMatrix, parameter_name};
 use super::pass::{Gate, PassResult};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
@@ -119,6 +119,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         ),
         estimate,
         covariance_by_noise,
+        covariance_by_error_terms: ParameterMatrix::zeros(),
         prior_sigma: stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: priors,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::alone::Alone;
 use super::auxiliary::Auxiliary;
 use super::dwell_scatter::DwellScatter;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, largest_growth};
 use super::finding::Finding;
 use super::form::FormTest;
 use super::innovation::{Consistency, Innovation};
@@ -30,6 +30,9 @@ pub struct Outcome {
     /// Covariance of the parameters by noise and prior alone; that of the estimate is larger where dwells
     /// scatter more.
     pub covariance_by_noise: ParameterMatrix,
+    /// What error terms that the data show, and that are not estimated, add to the covariance of the
+    /// estimate; see [`crate::calibration::Solution::assess`].
+    pub covariance_by_error_terms: ParameterMatrix,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
@@ -111,6 +114,20 @@ impl Outcome {
             return problem.clone();
         }
         problem.with_model(problem.model.with_noise_of(&self.model))
+    }
+
+    /// Adds to the covariance of the estimate what error terms do that are left off.
+    pub(super) fn widen(&mut self, by_error_terms: ParameterMatrix) {
+        self.estimate.covariance += by_error_terms - self.covariance_by_error_terms;
+        self.covariance_by_error_terms = by_error_terms;
+    }
+
+    /// How many times larger the σ of a parameter are, at most, for what error terms do that are left off.
+    pub(super) fn growth_by_error_terms(&self) -> f64 {
+        let with = self.estimate.covariance;
+        let without = with - self.covariance_by_error_terms;
+        let variances = [without, with].map(|covariance| covariance.diagonal());
+        largest_growth(variances[0].as_slice(), variances[1].as_slice())
     }
 
     /// Indices of the parameters that the run did not observe.

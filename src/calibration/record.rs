@@ -47,7 +47,10 @@ impl Outcome {
         quality: &Quality,
     ) -> Calibration {
         let mut findings = self.findings.clone();
-        findings.extend(ErrorTermTest::most_significant(tests));
+        findings.extend(ErrorTermTest::most_significant(
+            tests,
+            Some(self.growth_by_error_terms()),
+        ));
         Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::Ekf),

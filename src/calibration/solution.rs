@@ -1,10 +1,10 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
 use super::attempt::Progress;
-use super::budget::Budget;
+use super::budget::{Budget, BudgetSource};
 use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
-use super::error_term_test::{ErrorTermTest, test_error_terms};
+use super::error_term_test::{ErrorTermTest, seen_and_left_off, test_error_terms};
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::gauss_newton::estimate;
@@ -130,26 +130,33 @@ impl Solution {
         self.outcome().is_none_or(Outcome::is_usable)
     }
 
-    /// Tests error terms and judges what is left of gravity and turns.
+    /// Tests error terms and judges what is left of gravity and turns. What error terms do that the data
+    /// show, and that are not estimated, goes into the covariance of the estimate.
     ///
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the solution.
-    pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
+    pub fn assess(&mut self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         match self {
             Self::Filter(outcome) => {
                 let (error_terms, (quality, budget)) = rayon::join(
                     || test_error_terms(problem, outcome),
                     || (outcome.quality(problem), Budget::new(problem, outcome)),
                 );
-                Ok(Assessment {
+                let error_terms = match error_terms {
                     // Where the iterations ended without convergence there may be nothing to test.
-                    error_terms: match error_terms {
-                        Err(_) if !outcome.converged => Vec::new(),
-                        tests => tests?,
-                    },
+                    Err(_) if !outcome.converged => Vec::new(),
+                    tests => tests?,
+                };
+                // A calibration is one without its budget, too.
+                let mut budget = budget.ok();
+                if let Some(left_off) = seen_and_left_off(problem, outcome, &error_terms)? {
+                    outcome.widen(left_off);
+                    budget = budget.map(|b| b.and(BudgetSource::ErrorTermsLeftOff, left_off));
+                }
+                Ok(Assessment {
+                    error_terms,
                     quality: quality?,
-                    // A calibration is one without its budget, too.
-                    budget: budget.ok(),
+                    budget,
                 })
             }
             Self::ClosedForm(closed_form) => Ok(Assessment {
@@ -166,7 +173,9 @@ impl Solution {
             Self::Filter(outcome) => outcome.findings.clone(),
             Self::ClosedForm(closed_form) => closed_form.findings.clone(),
         };
-        findings.extend(ErrorTermTest::most_significant(&assessment.error_terms));
+        let growth = self.outcome().map(Outcome::growth_by_error_terms);
+        let tests = &assessment.error_terms;
+        findings.extend(ErrorTermTest::most_significant(tests, growth));
         findings
     }
 

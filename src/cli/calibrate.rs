@@ -197,7 +197,7 @@ impl Calibrate {
             .transpose()?;
 
         // What was found in the files may be why.
-        let solution = solve(problem, self.estimation.method.into(), &activity)
+        let mut solution = solve(problem, self.estimation.method.into(), &activity)
             .inspect_err(|_| say(&run.recording.notes))?;
         let Calibrated {
             calibration,
@@ -205,7 +205,7 @@ impl Calibrate {
             converged,
         } = Calibrated::new(
             (problem, name),
-            &solution,
+            &mut solution,
             self.estimation.method,
             truth.as_ref(),
         )?

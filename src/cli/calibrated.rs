@@ -36,7 +36,7 @@ impl Calibrated {
     /// Judges a solution and says what it is worth.
     pub fn new(
         (problem, name): (&Problem, &str),
-        solution: &Solution,
+        solution: &mut Solution,
         method: Method,
         truth: Option<&Truth>,
     ) -> anyhow::Result<Self> {
@@ -46,11 +46,8 @@ impl Calibrated {
             Method::SixPosition => "closed form",
         };
         let triads = truth.map(|truth| &truth.triads);
-        let (assessment, navigation) = rayon::join(
-            || solution.assess(problem),
-            || navigate(run, &[(method, solution.estimate())], triads),
-        );
-        let assessment = assessment?;
+        let assessment = solution.assess(problem)?;
+        let navigation = navigate(run, &[(method, solution.estimate())], triads);
         let calibration = solution.calibration(problem, &assessment);
         let findings = solution.findings(&assessment);
         let note = solution.closed_form().map(note).unwrap_or_default();

@@ -55,7 +55,7 @@ impl Demo {
         let whole = calibration::six_position(&still)?;
         let run = &turning.run;
         let problem = Problem::new(run, &Options::default());
-        let solution = solve(&problem, calibration::Method::Ekf, &activity)?;
+        let mut solution = solve(&problem, calibration::Method::Ekf, &activity)?;
         if !solution.converged() {
             bail!("the demonstration did not converge; take another --seed");
         }
@@ -70,15 +70,12 @@ impl Demo {
         );
         let dwells = dwell_times(&problem);
         activity.next("navigating");
+        let assessment = solution.assess(&problem)?;
         let methods = [
             ("closed form", &closed_form.estimate),
             ("EKF", solution.estimate()),
         ];
-        let (assessment, navigation) = rayon::join(
-            || solution.assess(&problem),
-            || navigate(run, &methods, Some(&turning.truth)),
-        );
-        let assessment = assessment?;
+        let navigation = navigate(run, &methods, Some(&turning.truth));
         let estimates = [&closed_form.estimate, solution.estimate(), &whole.estimate];
         let missions = fly(run, &estimates, &turning.truth)?;
         let names = [

@@ -133,12 +133,12 @@ impl Request<'_> {
         let run = Run::read(path)?;
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
-        let solution = problem.solve(method.into(), &|_| {})?;
+        let mut solution = problem.solve(method.into(), &|_| {})?;
         let Calibrated {
             calibration,
             document,
             ..
-        } = Calibrated::new((&problem, &run.recording.name), &solution, method, None)?
+        } = Calibrated::new((&problem, &run.recording.name), &mut solution, method, None)?
             .of_files(path);
         // What cannot be written is no calibration.
         calibration.to_json(path)?;

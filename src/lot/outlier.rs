@@ -1,9 +1,7 @@
 //! Units apart from the others: the generalized extreme Studentized deviate test (Rosner, *Technometrics* 25,
 //! 1983, 165), which several outliers together do not deceive, at a stated rate of false alarms.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
-use crate::statistics::{SIGMA_OF_MEDIAN, median};
+use crate::statistics::{SIGMA_OF_MEDIAN, median, student_limit};
 
 /// Fewer values than this have no others to be apart from.
 const FEWEST: usize = 5;
@@ -71,10 +69,10 @@ fn extreme(values: &[(usize, f64)]) -> Option<(usize, f64)> {
 /// What the largest of so many deviates stays below but for this chance.
 fn limit(count: usize, chance: f64) -> f64 {
     let n = count as f64;
-    let Ok(student) = StudentsT::new(0.0, 1.0, n - 2.0) else {
+    if count < 3 {
         return f64::INFINITY;
-    };
-    let t = student.inverse_cdf(1.0 - chance / (2.0 * n));
+    }
+    let t = student_limit(n - 2.0, chance / (2.0 * n));
     (n - 1.0) * t / ((n - 2.0 + t * t) * n).sqrt()
 }
 

@@ -10,14 +10,13 @@ mod record;
 mod source;
 mod sums;
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::noise::Script;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix};
 use super::problem::Problem;
+use crate::statistics::student_limit;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
 pub use source::BudgetSource;
 
@@ -63,10 +62,12 @@ impl Budget {
         let by_source: Vec<_> = by_source.collect();
         let filter: ParameterMatrix = by_source.iter().map(|(_, covariance)| covariance).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
-        let scatter = outcome.estimate.covariance - outcome.covariance_by_noise;
+        let left_off = outcome.covariance_by_error_terms;
+        let scatter = outcome.estimate.covariance - outcome.covariance_by_noise - left_off;
         let parts = by_source.into_iter().chain([
             (BudgetSource::Curvature, bent),
             (BudgetSource::DwellScatter, scatter),
+            (BudgetSource::ErrorTermsLeftOff, left_off),
         ]);
         let variance = outcome.estimate.covariance.diagonal();
         let counts = |part: &ParameterMatrix| {
@@ -83,6 +84,16 @@ impl Budget {
                 })
                 .collect(),
         })
+    }
+
+    /// With one part more, of what is exactly known.
+    pub(super) fn and(mut self, source: BudgetSource, covariance: ParameterMatrix) -> Self {
+        self.parts.push(BudgetPart {
+            source,
+            covariance,
+            degrees_of_freedom: f64::INFINITY,
+        });
+        self
     }
 
     /// The sum of all parts.
@@ -111,9 +122,10 @@ impl Budget {
 
 /// Coverage factor for 95.45 % and so many degrees of freedom.
 fn coverage_factor(degrees_of_freedom: f64) -> f64 {
-    let finite = Some(degrees_of_freedom).filter(|freedom| freedom.is_finite());
-    let t = finite.and_then(|freedom| StudentsT::new(0.0, 1.0, freedom.max(1.0)).ok());
-    t.map_or(2.0, |t| t.inverse_cdf(0.5 + 0.5 * COVERAGE))
+    match degrees_of_freedom.is_finite() {
+        true => student_limit(degrees_of_freedom, 0.5 * (1.0 - COVERAGE)),
+        false => 2.0,
+    }
 }
 
 #[cfg(test)]

@@ -89,6 +89,8 @@ pub enum BudgetSource {
     Curvature,
     /// By how much dwells scatter more than all noise says.
     DwellScatter,
+    /// What error terms do that the data show and that are not estimated.
+    ErrorTermsLeftOff,
 }
 
 impl BudgetSource {
@@ -131,6 +133,7 @@ impl BudgetSource {
             Self::AccelCrossCoupling => "prior of accel-cross-coupling",
             Self::Curvature => "second order of unknown angles",
             Self::DwellScatter => "scatter of dwells",
+            Self::ErrorTermsLeftOff => "error terms that show and are left off",
         }
     }
 

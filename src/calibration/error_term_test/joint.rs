@@ -7,7 +7,7 @@ use super::super::error::CalibrationError;
 use super::super::error_term::ErrorTerm;
 use super::super::model::Model;
 use super::super::outcome::Outcome;
-use super::super::parameters::{PARAMETERS, ParameterVector};
+use super::super::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
 use super::super::pass::{Gate, Mode, PassResult, Tried, pass_trying};
 use super::super::problem::Problem;
 use super::evidence::Evidence;
@@ -108,24 +108,34 @@ impl Joint {
     pub fn left_off(&self, term: ErrorTerm) -> Option<LeftOff> {
         let tried = self.tried.as_ref()?;
         let numbers = self.numbers(&[term]);
-        let sigma = |i: usize| self.prior_sigma[numbers[i]];
-        let effect = DMatrix::from_fn(PARAMETERS, numbers.len(), |p, i| {
-            tried.of_parameters[(p, numbers[i])]
-        });
+        let effect = effect(tried, &numbers);
         let usual = ParameterVector::from_fn(|p, _| {
             let row = effect.row(p);
-            let of = row.iter().enumerate();
-            of.map(|(i, x)| (x * sigma(i)).powi(2)).sum::<f64>().sqrt()
+            let of = row.iter().zip(&numbers);
+            let each = of.map(|(x, &number)| (x * self.prior_sigma[number]).powi(2));
+            each.sum::<f64>().sqrt()
         });
+        let shown = self.effect(&[term])?.diagonal();
+        (!numbers.is_empty()).then(|| LeftOff {
+            usual,
+            shown: shown.map(|variance| variance.max(0.0).sqrt()),
+        })
+    }
+
+    /// Mean square of what these terms, each as the record shows it, change the parameters by; zero where
+    /// none of them is tried.
+    pub fn effect(&self, terms: &[ErrorTerm]) -> Option<ParameterMatrix> {
+        let numbers = self.numbers(terms);
+        let Some(tried) = self.tried.as_ref().filter(|_| !numbers.is_empty()) else {
+            return Some(ParameterMatrix::zeros());
+        };
+        let effect = effect(tried, &numbers);
         let (_, covariance) = self.estimate(tried, &numbers)?;
         let score = DVector::from_fn(numbers.len(), |i, _| tried.score[numbers[i]]);
-        let mean = &effect * (&covariance * score);
-        let shown = ParameterVector::from_fn(|p, _| {
-            let of = effect.row(p);
-            let variance = (of * &covariance * of.transpose())[(0, 0)];
-            variance.max(0.0).sqrt().hypot(mean[p])
-        });
-        (!numbers.is_empty()).then_some(LeftOff { usual, shown })
+        let mean = &covariance * score;
+        let mean_square = covariance + &mean * mean.transpose();
+        let of_parameters = &effect * mean_square * effect.transpose();
+        Some(ParameterMatrix::from_fn(|i, j| of_parameters[(i, j)]))
     }
 
     /// What a term explains where these others are on.
@@ -187,4 +197,11 @@ impl Joint {
         }
         Some((fit, Evidence::new(gain, &covariance, &sigma)))
     }
+}
+
+/// What one of each parameter that is tried changes the parameters of both triads by.
+fn effect(tried: &Tried, numbers: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(PARAMETERS, numbers.len(), |p, i| {
+        tried.of_parameters[(p, numbers[i])]
+    })
 }

@@ -45,7 +45,7 @@ pub(super) fn say(document: &mut Document, accuracy: &Accuracy) {
         ));
     }
     form(accuracy).into_iter().for_each(&mut say);
-    if let Some(advice) = ErrorTermTest::most_significant(&accuracy.effects) {
+    if let Some(advice) = ErrorTermTest::most_significant(&accuracy.effects, None) {
         say((false, format!("In the first run: {advice}")));
     }
     gain(accuracy).into_iter().for_each(&mut say);
