@@ -16,7 +16,8 @@ pub struct Alone {
     pub temperature: Option<PerSensor<[f64; 3]>>,
     /// The span of its temperatures, K.
     pub span: f64,
-    /// Calibration at that temperature, with stated noise; none where it gave none.
+    /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
+    /// that of its own; none where it gave none.
     pub estimate: Option<Estimate>,
     /// Where its temperature stands for all of it: the functions of temperature then.
     pub(super) state: Option<ThermalState>,

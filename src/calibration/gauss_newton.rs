@@ -66,10 +66,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         iterated = iterate(problem, &priors, from, gate, &mut passes, progress)?;
     }
     let form_test = form_test(problem, &priors, &iterated.held)?;
-    // Noise that makes up for angles that are missing is no noise, nor is what recordings differ by.
-    let differ = |finding: &Finding| matches!(finding, Finding::RecordingsDiffer { .. });
-    let is_no_noise =
-        form_test.as_ref().is_some_and(FormTest::rejects) || of_recordings.iter().any(differ);
+    // Noise that makes up for angles that are missing is no noise.
+    let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
     let Learnt {
         model,
         iterated: Iterated {

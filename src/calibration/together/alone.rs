@@ -10,7 +10,8 @@ use super::super::day_to_day::DayToDay;
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
 use super::super::model::Model;
-use super::super::parameters::{from_vector, parameter};
+use super::super::noise::learn;
+use super::super::parameters::{from_vector, parameter, to_vector};
 use super::super::problem::Problem;
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange};
 
@@ -80,19 +81,26 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
     let stands = span < PART_OF_RANGE * whole;
     let solved = stands.then(|| from_coarse_start(&plain, &|_| {}));
     Ok(match solved {
-        Some(Ok(solved)) => alone(
-            super::super::parameters::to_vector(&solved.iterated.held.estimate.triads),
-            solved.priors,
-            solved.iterated.held.estimate.initial_attitudes.clone(),
-            solved.iterated.converged.then_some(Estimate {
-                triads: solved.iterated.held.estimate.triads,
-                covariance: solved.iterated.held.covariance,
-            }),
-        ),
+        Some(Ok(solved)) => {
+            let (priors, iterated) = (solved.priors, solved.iterated);
+            // Noise that is more than stated is no difference between recordings.
+            let learnt = learn(&plain, &priors, iterated.clone(), &mut Vec::new(), &|_| {});
+            let iterated = learnt.map_or(iterated, |learnt| learnt.iterated);
+            let held = iterated.held;
+            alone(
+                to_vector(&held.estimate.triads),
+                priors,
+                held.estimate.initial_attitudes,
+                iterated.converged.then_some(Estimate {
+                    triads: held.estimate.triads,
+                    covariance: held.covariance,
+                }),
+            )
+        }
         _ => {
             let start = coarse_start(&plain)?;
             alone(
-                super::super::parameters::to_vector(&start.at.triads),
+                to_vector(&start.at.triads),
                 start.attitudes,
                 start.at.initial_attitudes,
                 None,
