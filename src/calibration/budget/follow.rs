@@ -2,10 +2,12 @@
 
 use super::super::error::CalibrationError;
 use super::super::innovation::Observation;
-use super::super::noise::{Event, Script};
+use super::super::linearisation::{AttitudePrior, Linearisation};
+use super::super::model::Model;
+use super::super::noise::{Event, Events};
 use super::super::pass::{
-    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, Seen, Taken, Told, Verdict,
-    begin,
+    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Seen, Taken,
+    Told, Verdict, begin,
 };
 use super::super::problem::{Problem, Stretch};
 use super::source::BudgetSource;
@@ -13,21 +15,42 @@ use super::sums::Sums;
 use crate::imu::Sensor;
 use crate::navigation::Block;
 
-/// A pass, and where it was before each part of it.
-pub(super) struct Passed {
+/// A pass with the linearisation held.
+#[derive(Clone, Copy)]
+pub(super) struct Held<'a> {
+    pub problem: &'a Problem<'a>,
+    /// What was known of the initial attitude of each stretch.
+    pub priors: &'a [AttitudePrior],
+    pub at: &'a Linearisation,
+    /// Which observations are let in, in their order.
+    pub accepted: &'a [bool],
+}
+
+/// A pass that was made, and where it was before each part of it.
+pub(super) struct Passed<'a> {
+    held: Held<'a>,
     filter: Filter,
     /// 1σ of every state before the first stretch.
     known: Vec<f64>,
-    /// Of each stretch, what was done when it began, and its parts.
-    stretches: Vec<(Vec<Operation>, Vec<Part>)>,
+    stretches: Vec<Whole<'a>>,
     /// What was done in the last part of all.
     last: Vec<Done>,
     /// Events of a part.
     at_once: usize,
 }
 
+/// A stretch.
+struct Whole<'a> {
+    stretch: &'a Stretch<'a>,
+    /// What was done when it began.
+    begun: Vec<Operation>,
+    parts: Vec<Part<'a>>,
+}
+
 /// Events that follow one another.
-struct Part {
+struct Part<'a> {
+    /// From the first of them on.
+    events: Events<'a>,
     /// The filter before them.
     filter: Filter,
     /// Observations of all events up to its begin.
@@ -36,94 +59,105 @@ struct Part {
 
 /// What was done in an event: before a part of a dwell was taken in, and then.
 struct Done {
+    event: Event,
     before: Vec<Operation>,
     then: Vec<Operation>,
     /// Observations of all events up to its begin.
     seen: usize,
 }
 
-/// Takes a filter through events, and counts observations on.
-fn through(
-    filter: &mut Filter,
-    (problem, stretch): (&Problem, &Stretch),
-    events: &[Event],
-    accepted: &[bool],
-    seen: &mut usize,
-) -> Result<Vec<Done>, CalibrationError> {
-    let of_event = |event: &Event| {
-        let at = *seen;
-        let before = match event {
-            Event::Move(block) => {
-                filter.propagate(block);
-                Vec::new()
-            }
-            Event::Rest(rest) => {
-                rest.begin(filter, &problem.model, stretch);
-                let before = filter.kept();
-                let mut decided = Decided::new((problem, stretch), accepted, at);
-                if filter.stand(&rest.segment, &mut decided) != Taken::Whole {
-                    let time = rest.segment.end();
-                    return Err(CalibrationError::Diverged { time });
+impl<'a> Held<'a> {
+    /// Makes the pass. What is done in so many events is had at once.
+    pub fn forward(self, at_once: usize) -> Result<Passed<'a>, CalibrationError> {
+        let (problem, at) = (self.problem, self.at);
+        let model = &problem.model;
+        let mut filter = Filter::new(model, &PriorErrors::at(model, at));
+        let states = 0..filter.layout.size();
+        let known = states.map(|state| filter.covariance(state, state).sqrt());
+        let known = known.collect();
+        filter.keep();
+        let (mut stretches, mut last) = (Vec::new(), Vec::new());
+        let (mut before, mut seen) = (None, 0);
+        let initial = self.priors.iter().zip(&at.initial_attitudes);
+        for (stretch, (prior, initial)) in problem.stretches().iter().zip(initial) {
+            let start = stretch.start(prior, initial);
+            begin(&mut filter, model, before, stretch, &start, at);
+            before = Some(stretch);
+            let begun = filter.kept();
+            let mut events = Events::new(problem, stretch, at, initial)?;
+            let mut parts = Vec::new();
+            loop {
+                let part = Part {
+                    events: events.clone(),
+                    filter: filter.clone(),
+                    seen,
+                };
+                let next = events.by_ref().take(at_once);
+                let done = self.through(&mut filter, stretch, next, &mut seen)?;
+                if done.is_empty() {
+                    break;
                 }
-                *seen = decided.next;
-                before
+                last = done;
+                parts.push(part);
             }
-        };
-        Ok(Done {
-            before,
-            then: filter.kept(),
-            seen: at,
-        })
-    };
-    events.iter().map(of_event).collect()
-}
-
-/// The pass of a script with the noise of a problem's model. What is done in so many events is had at once.
-pub(super) fn forward(
-    problem: &Problem,
-    script: &Script,
-    accepted: &[bool],
-    at_once: usize,
-) -> Result<Passed, CalibrationError> {
-    let model = &problem.model;
-    let mut filter = script.filter(model);
-    let states = 0..filter.layout.size();
-    let known = states.map(|state| filter.covariance(state, state).sqrt());
-    let known = known.collect();
-    filter.keep();
-    let (mut stretches, mut last) = (Vec::new(), Vec::new());
-    let (mut before, mut seen) = (None, 0);
-    for (stretch, start, events) in script.stretches(problem) {
-        begin(&mut filter, model, before, stretch, &start, script.at());
-        before = Some(stretch);
-        let begun = filter.kept();
-        let mut parts = Vec::new();
-        for events in events.chunks(at_once) {
-            parts.push(Part {
-                filter: filter.clone(),
-                seen,
+            stretches.push(Whole {
+                stretch,
+                begun,
+                parts,
             });
-            last = through(&mut filter, (problem, stretch), events, accepted, &mut seen)?;
         }
-        stretches.push((begun, parts));
+        Ok(Passed {
+            held: self,
+            filter,
+            known,
+            stretches,
+            last,
+            at_once,
+        })
     }
-    Ok(Passed {
-        filter,
-        known,
-        stretches,
-        last,
-        at_once,
-    })
+
+    /// Takes a filter through events, and counts observations on.
+    fn through(
+        &self,
+        filter: &mut Filter,
+        stretch: &Stretch,
+        events: impl Iterator<Item = Event>,
+        seen: &mut usize,
+    ) -> Result<Vec<Done>, CalibrationError> {
+        let model = &self.problem.model;
+        let of_event = |event: Event| {
+            let at = *seen;
+            let before = match &event {
+                Event::Move(block) => {
+                    filter.propagate(block);
+                    Vec::new()
+                }
+                Event::Rest(rest) => {
+                    rest.begin(filter, model, stretch);
+                    let before = filter.kept();
+                    let mut decided = Decided::new((model, stretch), self.accepted, at);
+                    if filter.stand(&rest.segment, &mut decided) != Taken::Whole {
+                        let time = rest.segment.end();
+                        return Err(CalibrationError::Diverged { time });
+                    }
+                    *seen = decided.next;
+                    before
+                }
+            };
+            Ok(Done {
+                event,
+                before,
+                then: filter.kept(),
+                seen: at,
+            })
+        };
+        events.map(of_event).collect()
+    }
 }
 
-impl Passed {
+impl Passed<'_> {
     /// Covariance of the estimate by source, followed back from its end.
-    pub fn back(
-        self,
-        problem: &Problem,
-        script: &Script,
-        accepted: &[bool],
-    ) -> Result<Sums, CalibrationError> {
+    pub fn back(self) -> Result<Sums, CalibrationError> {
         let filter = &self.filter;
         let drivers = Driver::ALL.into_iter();
         let drivers: Vec<(Driver, Filter)> = drivers
@@ -131,53 +165,29 @@ impl Passed {
             .collect();
         let mut back = Back {
             filter,
+            drivers: &drivers,
             followed: Followed::of(filter),
             sums: Sums::default(),
         };
+        let held = self.held;
         let mut last = Some(self.last).filter(|done| !done.is_empty());
-        let stretches: Vec<_> = script.stretches(problem).collect();
-        for ((stretch, _, events), (begun, parts)) in stretches.iter().zip(self.stretches).rev() {
-            let parts = events.chunks(self.at_once).zip(parts);
-            let mut done_in = |events, part: Part| match last.take() {
-                Some(done) => Ok(done),
-                None => {
-                    let Part {
-                        mut filter,
-                        mut seen,
-                    } = part;
-                    through(&mut filter, (problem, stretch), events, accepted, &mut seen)
-                }
-            };
-            for (events, part) in parts.rev() {
-                let done = done_in(events, part)?;
-                for (event, done) in events.iter().zip(&done).rev() {
-                    match event {
-                        Event::Move(block) => {
-                            back.through_move((problem, stretch), block, &drivers, &done.then)
-                        }
-                        Event::Rest(rest) => {
-                            let (at_end, of_measured) = back.through_operations(&done.then);
-                            let mut decided = Decided::new((problem, stretch), accepted, done.seen);
-                            let effects = [at_end.as_slice(), of_measured.as_slice()];
-                            let mut told = Within {
-                                of: (problem, stretch),
-                                sums: &mut back.sums,
-                            };
-                            let part = &rest.segment;
-                            let taken = filter.back_through(
-                                part,
-                                &mut decided,
-                                &drivers,
-                                effects,
-                                &mut told,
-                            );
-                            if taken != Taken::Whole {
-                                let time = part.end();
-                                return Err(CalibrationError::Diverged { time });
-                            }
-                        }
+        for Whole {
+            stretch,
+            begun,
+            parts,
+        } in self.stretches.into_iter().rev()
+        {
+            let of = (&held.problem.model, stretch);
+            for mut part in parts.into_iter().rev() {
+                let done = match last.take() {
+                    Some(done) => done,
+                    None => {
+                        let events = part.events.take(self.at_once);
+                        held.through(&mut part.filter, stretch, events, &mut part.seen)?
                     }
-                    back.through(&done.before);
+                };
+                for done in done.iter().rev() {
+                    back.through_event(of, done, held.accepted)?;
                 }
             }
             back.through(&begun);
@@ -194,6 +204,8 @@ impl Passed {
 /// The way back.
 struct Back<'a> {
     filter: &'a Filter,
+    /// The filter with each kind of noise alone.
+    drivers: &'a [(Driver, Filter)],
     followed: Followed,
     sums: Sums,
 }
@@ -219,13 +231,36 @@ impl Back<'_> {
         }
     }
 
-    fn through_move(
+    fn through_event(
         &mut self,
-        of: (&Problem, &Stretch),
-        block: &Block,
-        drivers: &[(Driver, Filter)],
-        operations: &[Operation],
-    ) {
+        of: (&Model, &Stretch),
+        done: &Done,
+        accepted: &[bool],
+    ) -> Result<(), CalibrationError> {
+        match &done.event {
+            Event::Move(block) => self.through_move(of, block, &done.then),
+            Event::Rest(rest) => {
+                let (at_end, of_measured) = self.through_operations(&done.then);
+                let effects = [at_end.as_slice(), of_measured.as_slice()];
+                let mut decided = Decided::new(of, accepted, done.seen);
+                let mut told = Within {
+                    of,
+                    sums: &mut self.sums,
+                };
+                let part = &rest.segment;
+                let taken =
+                    self.filter
+                        .back_through(part, &mut decided, self.drivers, effects, &mut told);
+                if taken != Taken::Whole {
+                    return Err(CalibrationError::Diverged { time: part.end() });
+                }
+            }
+        }
+        self.through(&done.before);
+        Ok(())
+    }
+
+    fn through_move(&mut self, of: (&Model, &Stretch), block: &Block, operations: &[Operation]) {
         for operation in operations.iter().rev() {
             if !matches!(operation, Operation::Carried { .. }) {
                 self.through(std::slice::from_ref(operation));
@@ -237,7 +272,7 @@ impl Back<'_> {
                 sums: &mut self.sums,
             };
             self.filter
-                .back_through_noise(block, drivers, &effects, &mut told);
+                .back_through_noise(block, self.drivers, &effects, &mut told);
         }
     }
 
@@ -259,14 +294,13 @@ impl Back<'_> {
 
 /// Adds what noise within a part of a dwell does.
 struct Within<'a> {
-    of: (&'a Problem<'a>, &'a Stretch<'a>),
+    of: (&'a Model, &'a Stretch<'a>),
     sums: &'a mut Sums,
 }
 
 impl Told for Within<'_> {
     fn observed(&mut self, seen: &Seen, effects: &[Effect; 3]) {
-        let (problem, stretch) = self.of;
-        let model = &problem.model;
+        let (model, stretch) = self.of;
         let (pulses, source, own) = match seen.kind {
             Observation::Velocity => {
                 let own = stretch.stillness(model, Sensor::Accel).powi(2);
@@ -298,21 +332,21 @@ impl Told for Within<'_> {
 
 /// Lets in what was decided before, from a first observation on.
 struct Decided<'a> {
-    of: (&'a Problem<'a>, &'a Stretch<'a>),
+    of: (&'a Model, &'a Stretch<'a>),
     accepted: &'a [bool],
     next: usize,
 }
 
 impl<'a> Decided<'a> {
-    fn new(of: (&'a Problem<'a>, &'a Stretch<'a>), accepted: &'a [bool], next: usize) -> Self {
+    fn new(of: (&'a Model, &'a Stretch<'a>), accepted: &'a [bool], next: usize) -> Self {
         Self { of, accepted, next }
     }
 }
 
 impl Observer for Decided<'_> {
     fn variance(&self, seen: &Seen) -> f64 {
-        let (problem, stretch) = self.of;
-        stretch.observation_variance(&problem.model, seen.kind, seen.readings)
+        let (model, stretch) = self.of;
+        stretch.observation_variance(model, seen.kind, seen.readings)
     }
 
     fn judge(&mut self, _: Innovations) -> Verdict {

@@ -12,11 +12,11 @@ mod sums;
 
 use super::curvature::curvature;
 use super::error::CalibrationError;
-use super::noise::Script;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix};
 use super::problem::Problem;
 use crate::statistics::student_limit;
+use follow::Held;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
 pub use source::BudgetSource;
 
@@ -43,8 +43,8 @@ pub struct BudgetPart {
     pub degrees_of_freedom: f64,
 }
 
-/// Events whose operations are had at once: those of a longer record are done again on the way back, part by
-/// part, for of a day they would take more memory than its samples.
+/// Events that are had at once, with what the filter did in them: of a longer record they are done again on the
+/// way back, part by part, for those of a day would take more memory than its samples.
 const AT_ONCE: usize = 256;
 
 impl Budget {
@@ -54,12 +54,14 @@ impl Budget {
     /// [`CalibrationError`] where the problem is not the one of the outcome.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &problem.with_model(outcome.model.clone());
-        let (priors, at) = (&outcome.prior_attitudes, &outcome.linearised_at);
-        let script = Script::new(problem, priors, at)?;
         let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
-        let passed = follow::forward(problem, &script, &accepted, AT_ONCE)?;
-        let by_source = passed.back(problem, &script, &accepted)?.covariances();
-        let by_source: Vec<_> = by_source.collect();
+        let held = Held {
+            problem,
+            priors: &outcome.prior_attitudes,
+            at: &outcome.linearised_at,
+            accepted: &accepted,
+        };
+        let by_source: Vec<_> = held.forward(AT_ONCE)?.back()?.covariances().collect();
         let filter: ParameterMatrix = by_source.iter().map(|(_, covariance)| covariance).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
         let left_off = outcome.covariance_by_error_terms;

@@ -53,11 +53,15 @@ fn what_is_done_again_on_the_way_back_is_what_was_done() {
     let problem = Problem::new(&run, &Options::default());
     let outcome = estimate(&problem, &|_| {}).unwrap();
     let problem = &problem.with_model(outcome.model.clone());
-    let script = Script::new(problem, &outcome.prior_attitudes, &outcome.linearised_at).unwrap();
     let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
+    let held = Held {
+        problem,
+        priors: &outcome.prior_attitudes,
+        at: &outcome.linearised_at,
+        accepted: &accepted,
+    };
     let parts = |at_once: usize| -> Vec<_> {
-        let passed = follow::forward(problem, &script, &accepted, at_once).unwrap();
-        let sums = passed.back(problem, &script, &accepted).unwrap();
+        let sums = held.forward(at_once).unwrap().back().unwrap();
         sums.covariances().collect()
     };
     assert_eq!(parts(7), parts(usize::MAX));

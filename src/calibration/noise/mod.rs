@@ -5,6 +5,7 @@
 //! (Patterson and Thompson 1971, Biometrika 58(3)): no degree of freedom is lost to them. What is learnt
 //! is in the [`super::Model`], so that every later pass has it.
 
+mod events;
 mod factors;
 mod fit;
 mod learn;
@@ -16,10 +17,10 @@ mod run_toml;
 mod selection;
 mod source;
 
+pub(super) use events::{Event, Events};
 pub(super) use fit::LOG_SIGMA;
 pub(super) use learn::{Learnt, learn};
 pub use policy::NoisePolicy;
-pub(super) use replay::{Event, Script};
 pub use report::{NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;
 

@@ -2,16 +2,14 @@
 //! is tried.
 
 use super::super::error::CalibrationError;
-use super::super::layout::Layout;
-use super::super::linearisation::{AttitudePrior, Linearisation, Start};
+use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::model::Model;
 use super::super::pass::{
-    Filter, Innovations, Measurement, Observer, PriorErrors, ScalarInnovation, Seen, Segment,
-    Taken, Verdict, begin, moves, navigator, segments,
+    Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict, begin,
 };
 use super::super::problem::{Problem, Stretch};
+use super::events::{Event, Events, Rest};
 use crate::imu::{PerSensor, Sensor};
-use crate::navigation::{Block, State};
 
 /// What a pass does at one point of linearisation, whatever the noise.
 pub(in crate::calibration) struct Script<'a> {
@@ -19,39 +17,6 @@ pub(in crate::calibration) struct Script<'a> {
     priors: &'a [AttitudePrior],
     /// Of each stretch.
     events: Vec<Vec<Event>>,
-}
-
-pub(in crate::calibration) enum Event {
-    Move(Box<Block>),
-    Rest(Box<Rest>),
-}
-
-/// A part of a dwell.
-pub(in crate::calibration) struct Rest {
-    /// Whether it is the dwell's first.
-    first: bool,
-    new_position: bool,
-    /// Computed state at its begin; where the pass linearises instead is the segment's.
-    from: State,
-    pub segment: Segment,
-}
-
-impl Rest {
-    /// What a filter of this model does before it takes in what is observed.
-    pub fn begin(&self, filter: &mut Filter, model: &Model, stretch: &Stretch) {
-        if self.first {
-            filter.come_to_rest(&self.from);
-        }
-        filter.refer(&self.from, &self.segment.begin);
-        if self.first {
-            filter.begin_to_hold();
-        }
-        if self.new_position {
-            filter.redraw_table(model.position_sigma);
-            let variance = stretch.variance.position;
-            filter.update(&Measurement::position(&self.segment.begin, variance));
-        }
-    }
 }
 
 /// What the noise of moves grows with, over all moves.
@@ -86,75 +51,14 @@ impl<'a> Script<'a> {
         priors: &'a [AttitudePrior],
         at: &'a Linearisation,
     ) -> Result<Self, CalibrationError> {
-        let layout = Layout::new(&problem.model);
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
-        let events = stretches.map(|(stretch, initial)| {
-            let mut navigator = navigator(stretch, at, initial, (&problem.model, &layout))?;
-            let mut held = *initial;
-            let mut events = Vec::new();
-            let mut next = 0;
-            while let Some(step) = stretch.steps.get(next) {
-                if step.at_rest.is_none() {
-                    let imu = &stretch.run.recording.imu;
-                    let blocks =
-                        moves(step, &layout, imu).map(|samples| navigator.advance(samples));
-                    events.extend(blocks.map(|block| Event::Move(Box::new(block))));
-                    next += 1;
-                    continue;
-                }
-                let mut first = true;
-                let begin = next;
-                for part in segments(&stretch.steps[begin..], true) {
-                    next += part.len();
-                    let of = (problem, stretch);
-                    let from = navigator.state;
-                    if let (Some((begin, at_rest)), Some((end, _))) = (part.first(), part.last()) {
-                        navigator.warm(&(begin.samples.start..end.samples.end));
-                        navigator.state = at_rest.tied(&from, &navigator.triads().accel);
-                    }
-                    if first {
-                        held = navigator.state.attitude;
-                    }
-                    events.push(Event::Rest(Box::new(Rest {
-                        first,
-                        new_position: first && begin > 0,
-                        from,
-                        segment: Segment::navigate(&mut navigator, of, &part, true, &held),
-                    })));
-                    first = false;
-                }
-            }
-            Ok(events)
-        });
+        let events = stretches
+            .map(|(stretch, initial)| Ok(Events::new(problem, stretch, at, initial)?.collect()));
         Ok(Self {
             at,
             priors,
             events: events.collect::<Result<_, CalibrationError>>()?,
         })
-    }
-
-    /// A filter of a model before the first stretch.
-    pub fn filter(&self, model: &Model) -> Filter {
-        Filter::new(model, &PriorErrors::at(model, self.at))
-    }
-
-    /// Where it linearises.
-    pub fn at(&self) -> &'a Linearisation {
-        self.at
-    }
-
-    /// Each stretch of the problem with what happens in it and how it starts.
-    pub fn stretches<'p>(
-        &'p self,
-        problem: &'p Problem<'a>,
-    ) -> impl Iterator<Item = (&'p Stretch<'a>, Start, &'p [Event])> {
-        let stretches = problem.stretches().iter().zip(self.priors);
-        let of_each = self.events.iter().zip(&self.at.initial_attitudes);
-        stretches
-            .zip(of_each)
-            .map(|((stretch, prior), (events, initial))| {
-                (stretch, stretch.start(prior, initial), events.as_slice())
-            })
     }
 
     /// What noise of moves grows with.
@@ -180,14 +84,17 @@ impl<'a> Script<'a> {
         let mut pass = Pass {
             model,
             accepted,
-            filter: self.filter(model),
+            filter: Filter::new(model, &PriorErrors::at(model, self.at)),
             replay: Replay {
                 scalars: Vec::new(),
                 distances: Vec::new(),
             },
         };
         let mut before = None;
-        for (stretch, start, events) in self.stretches(problem) {
+        let stretches = problem.stretches().iter().zip(self.priors);
+        let of_each = self.events.iter().zip(&self.at.initial_attitudes);
+        for ((stretch, prior), (events, initial)) in stretches.zip(of_each) {
+            let start = stretch.start(prior, initial);
             begin(&mut pass.filter, model, before, stretch, &start, self.at);
             before = Some(stretch);
             for event in events {

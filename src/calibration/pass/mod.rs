@@ -27,7 +27,7 @@ use posteriors::Posteriors;
 use result::Sums;
 pub use result::{Epoch, Own};
 pub(super) use result::{PassResult, Tried};
-pub(super) use segment::{Seen, Segment, moves, segments};
+pub(super) use segment::{Seen, Segment, Segments, moves, segments};
 use stretch::OneStretch;
 pub(super) use stretch::navigator;
 

@@ -1,7 +1,6 @@
 //! What navigation hands to the filter at once: blocks of moves, and parts of dwells with what is observed
 //! of them.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -60,42 +59,59 @@ const STEPS: usize = 50;
 /// what a dwell tells first changes them most.
 const GROWTH: usize = 4;
 
-/// The parts of a dwell, given the steps from its first on.
-pub(in crate::calibration) fn segments(
-    steps: &[Step],
-    linearisation_held: bool,
-) -> impl Iterator<Item = Vec<(&Step, &AtRest)>> {
-    let of_dwell = steps.iter().enumerate().map_while(|(number, step)| {
-        let at_rest = step.at_rest.as_ref()?;
-        (number == 0 || !at_rest.first).then_some((step, at_rest))
-    });
-    let mut rest: VecDeque<_> = of_dwell.collect();
-    let mut length = if linearisation_held { STEPS } else { 1 };
-    let longest = STEPS * steps.first().map_or(0, |step| step.samples.len());
-    std::iter::from_fn(move || {
-        let begin = rest.front().map_or(0, |(step, _)| step.samples.start);
-        let within = |(step, _): &(&Step, _)| step.samples.end <= begin + longest;
-        let few = rest.iter().take(length).take_while(|&step| within(step));
-        let few = few.count().max(1).min(rest.len());
-        let part = rest.drain(..few).collect::<Vec<_>>();
-        length = STEPS.min(GROWTH * length);
-        (!part.is_empty()).then_some(part)
-    })
+/// The parts of a dwell, one after the other.
+#[derive(Debug, Clone)]
+pub(in crate::calibration) struct Segments<'a> {
+    /// From the next part's first on.
+    steps: &'a [Step],
+    begun: bool,
+    /// Steps that a part has at most, and samples.
+    length: usize,
+    longest: usize,
 }
 
-/// The blocks of a move that a filter of this layout takes: all of it at once, unless biases vary
-/// meanwhile.
+/// The parts of a dwell, given the steps from its first on.
+pub(in crate::calibration) fn segments(steps: &[Step], linearisation_held: bool) -> Segments<'_> {
+    Segments {
+        steps,
+        begun: false,
+        length: if linearisation_held { STEPS } else { 1 },
+        longest: STEPS * steps.first().map_or(0, |step| step.samples.len()),
+    }
+}
+
+impl<'a> Iterator for Segments<'a> {
+    type Item = Vec<(&'a Step, &'a AtRest)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let end = self.steps.first()?.samples.start + self.longest;
+        let of_dwell = self.steps.iter().enumerate().map_while(|(number, step)| {
+            let at_rest = step.at_rest.as_ref()?;
+            let begins = number == 0 && !self.begun;
+            let within = number == 0 || step.samples.end <= end;
+            ((begins || !at_rest.first) && within).then_some((step, at_rest))
+        });
+        let part: Vec<_> = of_dwell.take(self.length).collect();
+        self.steps = &self.steps[part.len()..];
+        self.begun = true;
+        self.length = STEPS.min(GROWTH * self.length);
+        (!part.is_empty()).then_some(part)
+    }
+}
+
+/// The blocks that a filter of this layout takes of these samples of a move: all of them at once, unless
+/// biases vary meanwhile.
 pub(in crate::calibration) fn moves(
-    step: &Step,
+    samples: Range<usize>,
     layout: &Layout,
     imu: &ImuSamples,
 ) -> impl Iterator<Item = Range<usize>> + use<> {
     let vary = layout.varying_biases().next().is_some();
     let length = match vary {
         true => step_length(imu.period),
-        false => step.samples.len(),
+        false => samples.len(),
     };
-    cut(step.samples.clone(), length)
+    cut(samples, length)
 }
 
 impl Segment {

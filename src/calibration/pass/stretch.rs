@@ -106,7 +106,8 @@ impl<'a> OneStretch<'a> {
                 next += self.dwell(&steps[next..], next > 0)?;
                 continue;
             }
-            for samples in moves(step, &self.sums.filter.layout, imu) {
+            let samples = step.samples.clone();
+            for samples in moves(samples, &self.sums.filter.layout, imu) {
                 let block = self.navigator.advance(samples);
                 self.sums.filter.propagate(&block);
             }
