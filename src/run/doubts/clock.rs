@@ -30,7 +30,7 @@ struct Move {
     table: Way,
     /// By how much the ways of the same move may differ, rad.
     tolerance: f64,
-    /// The part of that which a bias makes, rad.
+    /// By how much a bias that dwells tell makes them differ, rad.
     zero: f64,
     /// The longest time between two readings, s.
     interval: f64,
@@ -210,8 +210,6 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let (first, last) = (covered(table.time.first()), covered(table.time.last()));
     let count = stands.len().saturating_sub(1);
     let (bias, off) = bias_at_rest(run, &stands);
-    // A bias from dwells has Earth rate in it, too.
-    let zero = off + 2.0 * ROTATION_RATE;
     let between = stands.windows(2).enumerate().filter_map(|(k, pair)| {
         let middle = |samples: &Range<usize>| samples.start.midpoint(samples.end);
         let begin = if k == 0 { first } else { middle(&pair[0]) };
@@ -222,7 +220,7 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
         let samples = begin..end;
         let is_whole = !samples.is_empty() && imu.unbroken(&samples) && !imu.is_lost(&samples);
         is_whole
-            .then(|| of_samples(run, table, samples, &bias, zero))
+            .then(|| of_samples(run, table, samples, (&bias, off)))
             .flatten()
     });
     between.collect()
@@ -233,8 +231,7 @@ fn of_samples(
     run: &Run,
     table: &TableLog,
     samples: Range<usize>,
-    bias: &Vector3<f64>,
-    zero: f64,
+    (bias, off): (&Vector3<f64>, f64),
 ) -> Option<Move> {
     let imu = &run.recording.imu;
     let prior = &run.instrument.prior.gyro;
@@ -265,7 +262,10 @@ fn of_samples(
         let time = imu.time(part.start) + 0.5 * duration;
         (time, duration, (sum - bias * duration).norm())
     });
-    let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt();
+    let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt()
+        + 3f64.sqrt() * imu.pulse.gyro;
+    // A bias from dwells has Earth rate in it, too.
+    let zero = SIGMAS * prior.bias_sigma.norm() + 2.0 * ROTATION_RATE;
     let by_gyros = Way::of(by_gyros, noise, zero);
     let is_resolved = by_gyros.fastest.max(by_table.fastest) * interval < SHORTER_WAY;
     let part = OTHER_ANGLE.max(SIGMAS * prior.scale_sigma.amax());
@@ -274,7 +274,7 @@ fn of_samples(
         gyros: by_gyros,
         table: by_table,
         tolerance: part * longest + zero * (end - begin),
-        zero: zero * (end - begin),
+        zero: (off + 2.0 * ROTATION_RATE) * (end - begin),
         interval,
     })
 }
