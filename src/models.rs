@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use crate::shown::excerpt;
+
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
@@ -176,13 +178,15 @@ pub enum ModelError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// A file that is not what it should be; the parser's message names line, column and field.
-    #[error("{file}: {source}")]
+    /// A file that is not what it should be.
+    #[error("{file}{place}: {message}")]
     Malformed {
         /// The file.
         file: String,
-        /// Where and why.
-        source: Box<toml::de::Error>,
+        /// Line and column, where they are known.
+        place: String,
+        /// What the parser says, and the line if it is short enough.
+        message: String,
     },
     /// Values that do not fit together.
     #[error("{file}: {message}")]
@@ -230,10 +234,25 @@ impl Text {
     }
 
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
-        toml::from_str(&self.text).map_err(|source| ModelError::Malformed {
+        toml::from_str(&self.text).map_err(|error| self.malformed(&error))
+    }
+
+    /// The parser's message without its picture of the line, which may be as long as the file.
+    fn malformed(&self, error: &toml::de::Error) -> ModelError {
+        let before = error.span().and_then(|span| self.text.get(..span.start));
+        let begun = before.map_or(0, |before| before.rfind('\n').map_or(0, |end| end + 1));
+        let place = before.map(|before| {
+            let line = 1 + before.matches('\n').count();
+            let column = 1 + before[begun..].chars().count();
+            format!(", line {line}, column {column}")
+        });
+        let line = self.text[begun..].lines().next().unwrap_or_default();
+        let line = before.map(|_| format!(", in `{}`", excerpt(line.trim())));
+        ModelError::Malformed {
             file: self.file.clone(),
-            source: Box::new(source),
-        })
+            place: place.unwrap_or_default(),
+            message: excerpt(error.message()) + &line.unwrap_or_default(),
+        }
     }
 
     pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
@@ -315,6 +334,13 @@ mod tests {
         let message = error.to_string();
         assert!(message.contains("mine.toml"), "{message}");
         message
+    }
+
+    #[test]
+    fn a_file_that_is_no_toml_is_named_by_line_and_column_however_long_the_line() {
+        let said = message(Room::Imu, &format!("a = 1\n{}\n", "x".repeat(100_000)));
+        assert!(said.contains(", line 2, column "), "{said}");
+        assert!(said.len() < 1000, "{}", said.len());
     }
 
     #[test]

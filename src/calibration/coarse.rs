@@ -11,13 +11,14 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Vector3;
 
+use super::drift::drift;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::linearisation::{AttitudePrior, Linearisation, singular};
 use super::problem::Problem;
 use crate::attitude::exp;
-use crate::imu::TermVector;
+use crate::imu::{ParameterKind, Sensor, TermVector};
 use turns::Turned;
 
 /// Where the filter begins.
@@ -103,8 +104,8 @@ fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ByGravity {
     pub estimate: Estimate,
-    /// Residuals beyond chance, by which the covariance was widened.
-    pub ringing: Option<Finding>,
+    /// Residuals beyond chance, by which the covariance was widened, and a drift that they follow.
+    pub ringing: Vec<Finding>,
 }
 
 /// The coarse start without a table, with its covariance.
@@ -122,15 +123,29 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
     let residuals = equations.residuals(&shared).ok_or_else(singular)?;
     let growth = residuals.growth();
     let covariance = equations.covariance_by(&shared, growth.unwrap_or(1.0));
+    let (groups, times) = turns::dwells_and_moves(problem);
+    let worst = residuals.worst(&groups);
+    let mut of_equation = vec![0.0; groups.iter().map(Vec::len).sum()];
+    for (group, [begin, end]) in groups.iter().zip(&times) {
+        for &equation in group {
+            of_equation[equation] = 0.5 * (begin + end);
+        }
+    }
+    let kinds = [ParameterKind::Scale, ParameterKind::Bias];
+    let changing = Sensor::ALL.map(|sensor| kinds.map(|kind| equations.changing(sensor, kind)));
+    let drift = drift(
+        &residuals,
+        changing.as_flattened(),
+        &of_equation,
+        worst.without,
+    );
     Ok(ByGravity {
         estimate: Estimate {
             triads,
             covariance: covariance.ok_or_else(singular)?,
         },
-        ringing: growth.map(|growth| {
-            let (groups, times) = turns::dwells_and_moves(problem);
-            let worst = residuals.worst(&groups);
-            Finding::ResidualsLarge {
+        ringing: growth
+            .map(|growth| Finding::ResidualsLarge {
                 of: "both triads",
                 chi_square: residuals.chi_square(),
                 degrees: residuals.degrees(),
@@ -138,8 +153,10 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
                 growth,
                 worst: worst.groups.iter().map(|&k| times[k]).collect(),
                 without: worst.without,
-            }
-        }),
+            })
+            .into_iter()
+            .chain(drift)
+            .collect(),
     })
 }
 

@@ -169,6 +169,23 @@ pub enum Finding {
         /// χ² without any one of these.
         without: f64,
     },
+    /// Parameters whose even change in time explains residuals of the closed form.
+    ChangesInTime {
+        /// `gyro` or `accel`.
+        of: &'static str,
+        /// `bias` or `scale factor`.
+        parameters: &'static str,
+        /// The unit of what follows.
+        unit: &'static str,
+        /// Axes with how far each has changed between the first and the last position.
+        changes: Vec<(char, f64)>,
+        /// These two, s.
+        times: [f64; 2],
+        /// By how much χ² falls with such a change …
+        fall: f64,
+        /// … and by how much at most in 999 runs of 1000 without, for both triads and both kinds at once.
+        limit: f64,
+    },
     /// Innovations that no noise figure explains.
     Unexplained {
         /// NIS of all observations …
@@ -379,6 +396,25 @@ impl fmt::Display for Finding {
                 let each: Vec<String> =
                     contradicted.iter().map(ContradictedLabel::to_string).collect();
                 write!(f, "Labels and record disagree. Section {}.", each.join("; section "))
+            }
+            Self::ChangesInTime {
+                of,
+                parameters,
+                unit,
+                changes,
+                times: [first, last],
+                fall,
+                limit,
+            } => {
+                let each = changes.iter().map(|(axis, by)| format!("{axis} by {by:+.4}"));
+                write!(
+                    f,
+                    "The {of} {parameters} drifts: residuals follow time as if from {first:.1} s to {last:.1} s it \
+                     changed along {} {unit}, by which χ² falls by {fall:.4e}, where without a drift it falls by less \
+                     than {limit:.1}. Look for a warm-up or a change of temperature, a step, or a bias instability \
+                     that [imu.noise] does not state; σ hold for parameters that stay.",
+                    each.collect::<Vec<_>>().join(", ")
+                )
             }
             Self::Unexplained { nis, limit, worst } => write!(
                 f,

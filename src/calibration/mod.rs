@@ -18,6 +18,7 @@ mod comparison;
 mod correction;
 mod curvature;
 mod day_to_day;
+mod drift;
 mod dwell_scatter;
 mod error;
 mod error_term;

@@ -20,6 +20,17 @@ pub(super) struct Residuals {
     whitening: DMatrix<f64>,
 }
 
+/// What more unknowns would explain.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Explained {
+    /// By how much χ² falls.
+    pub fall: f64,
+    /// How many of them it is for.
+    pub degrees: usize,
+    /// Their values.
+    pub coefficients: Vec<f64>,
+}
+
 /// Equations that fit the others least.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Worst {
@@ -104,7 +115,16 @@ impl Residuals {
 
     /// By how much χ² falls if these equations may be off by anything.
     fn falls_without(&self, equations: &[usize]) -> f64 {
-        let shifts = self.whitening.select_columns(equations);
+        self.fall(self.whitening.select_columns(equations)).fall
+    }
+
+    /// What unknowns with these columns would explain of the errors.
+    pub fn explained_by(&self, columns: &DMatrix<f64>) -> Explained {
+        self.fall(&self.whitening * columns)
+    }
+
+    /// The same of whitened columns.
+    fn fall(&self, shifts: DMatrix<f64>) -> Explained {
         let free = &shifts - &self.explained * self.explained.tr_mul(&shifts);
         let of_shifts = shifts.column_iter().map(|c| c.norm_squared());
         let least = ROUNDING * of_shifts.fold(0.0, f64::max);
@@ -113,11 +133,17 @@ impl Residuals {
             eigenvalues,
         } = free.tr_mul(&free).symmetric_eigen();
         let along = eigenvectors.tr_mul(&free.tr_mul(&self.whitened));
-        let pairs = along.iter().zip(&eigenvalues);
-        pairs
-            .filter(|(_, value)| **value > least)
-            .map(|(along, value)| along.powi(2) / value)
-            .sum()
+        let told: Vec<usize> = (0..eigenvalues.len())
+            .filter(|&k| eigenvalues[k] > least)
+            .collect();
+        let fall = |&k: &usize| along[k].powi(2) / eigenvalues[k];
+        let part = |&k: &usize| eigenvectors.column(k) * (along[k] / eigenvalues[k]);
+        let none = DVector::zeros(eigenvalues.len());
+        Explained {
+            fall: told.iter().map(fall).sum(),
+            degrees: told.len(),
+            coefficients: told.iter().map(part).fold(none, |a, b| a + b).data.into(),
+        }
     }
 }
 

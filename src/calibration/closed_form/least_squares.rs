@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
+use super::super::drift::{Changing, drift};
 use super::super::error::CalibrationError;
 use super::super::estimate::{Estimate, largest_growth};
 use super::super::finding::Finding;
@@ -13,7 +14,7 @@ use super::super::problem::Problem;
 use super::super::residuals::Residuals;
 use super::observed::{NOISELESS, Observed, Position};
 use crate::imu::{
-    InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
+    InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad, TriadVector,
 };
 use crate::run::Aiding;
 
@@ -56,6 +57,11 @@ pub(super) fn both_triads(
         let stated = observed.get(sensor);
         let fit = fitted(stated, &prior, sensor)?;
         let residuals = left_by(stated, &fit.triad);
+        findings.extend(
+            residuals
+                .as_ref()
+                .and_then(|residuals| changing_in_time(residuals, stated, sensor)),
+        );
         let rings = residuals
             .as_ref()
             .filter(|residuals| residuals.growth().is_some());
@@ -119,6 +125,26 @@ fn left_by(observed: &Observed, triad: &Triad) -> Option<Residuals> {
     let covariance = observed.covariance(&triad.sensitivity());
     let design = linear_design(&inputs, observed.size());
     Residuals::new(&design, &errors, &covariance)
+}
+
+/// A drift of biases or scale factors that residuals of positions follow.
+fn changing_in_time(residuals: &Residuals, observed: &Observed, sensor: Sensor) -> Option<Finding> {
+    let inputs: Vec<Vector3<f64>> = observed.positions.iter().map(|p| p.input).collect();
+    let design = linear_design(&inputs, 1.0);
+    let of = |kind, columns: [usize; 3]| Changing {
+        sensor,
+        kind,
+        columns: design.select_columns(&columns),
+        axes: vec![0, 1, 2],
+    };
+    let changing = [
+        of(ParameterKind::Scale, [0, 5, 10]),
+        of(ParameterKind::Bias, [3, 7, 11]),
+    ];
+    let times = observed.times.iter().flat_map(|t| [0.5 * (t[0] + t[1]); 3]);
+    let times: Vec<f64> = times.collect();
+    let worst = residuals.worst(&by_position(inputs.len()));
+    drift(residuals, &changing, &times, worst.without)
 }
 
 /// The variance that every axis of these positions must have more for χ² of the residuals to be what is

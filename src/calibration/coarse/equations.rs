@@ -4,14 +4,17 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::super::drift::Changing;
 use super::super::error::CalibrationError;
 use super::super::linearisation::singular;
 use super::super::model::Model;
 use super::super::parameters::{
-    ParameterMatrix, ParameterVector, from_vector, parameter, to_vector,
+    ParameterMatrix, ParameterVector, from_vector, parameter, sensor_and_parameter, to_vector,
 };
 use super::super::residuals::Residuals;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
+use crate::imu::{
+    AXES, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad, TriadVector,
+};
 use crate::navigation::Block;
 
 /// An instrument without noise is still not better than this, rad or m/s: an equation needs a σ.
@@ -147,6 +150,25 @@ impl Equations {
     pub(super) fn residuals(&self, shared: &DMatrix<f64>) -> Option<Residuals> {
         let (design, errors) = self.of_data();
         Residuals::new(&design, &errors, &self.errors(shared))
+    }
+
+    /// The columns of a triad's unknown parameters of one kind in the rows but the prior's.
+    pub(super) fn changing(&self, sensor: Sensor, kind: ParameterKind) -> Changing {
+        let (design, _) = self.of_data();
+        let (mut columns, mut axes) = (Vec::new(), Vec::new());
+        for (column, &index) in self.unknown.iter().enumerate() {
+            let (of, parameter) = sensor_and_parameter(index);
+            if of == sensor && Triad::kind(parameter) == kind {
+                columns.push(column);
+                axes.push(parameter % AXES.len());
+            }
+        }
+        Changing {
+            sensor,
+            kind,
+            columns: design.select_columns(&columns),
+            axes,
+        }
     }
 
     /// Covariance of the unknown parameters as these weights find them, by the covariance of what errors

@@ -2,9 +2,12 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector3;
+
 use crate::earth::ROTATION_RATE;
 use crate::recording::{TableLog, nanoseconds};
 use crate::run::Run;
+use crate::statistics::{SIGMA_OF_MEDIAN, median};
 use crate::units::{DEGREE, PPM};
 
 /// A move that differs by more than this part of it is another one …
@@ -27,6 +30,8 @@ struct Move {
     table: Way,
     /// By how much the ways of the same move may differ, rad.
     tolerance: f64,
+    /// By how much a bias that dwells tell makes them differ, rad.
+    zero: f64,
     /// The longest time between two readings, s.
     interval: f64,
 }
@@ -100,7 +105,7 @@ pub(super) fn clock(run: &Run, table: &TableLog) -> Option<String> {
     let interval = same.iter().map(|m| m.interval).fold(0.0, f64::max);
     let resolved = interval + run.recording.imu.period;
     if low.abs().max(high.abs()) <= resolved {
-        return None;
+        return scale(run, &same);
     }
     let by = |late: f64| match late > 0.0 {
         true => format!("{late:.2} s later"),
@@ -146,6 +151,49 @@ pub(super) fn clock(run: &Run, table: &TableLog) -> Option<String> {
     ))
 }
 
+/// A scale that all moves together contradict: what differs from the table in each of them alike. A method
+/// that does without turns would not tell.
+fn scale(run: &Run, moves: &[Move]) -> Option<String> {
+    // The first and the last may be cut by the end of a log.
+    let moves = moves.get(1..moves.len().saturating_sub(1))?;
+    let sum = |of: fn(&Move) -> f64| moves.iter().map(of).sum::<f64>();
+    let (gyros, table) = (sum(|m| m.gyros.angle), sum(|m| m.table.angle));
+    if table <= 0.0 {
+        return None;
+    }
+    let sigma = run.instrument.prior.gyro.scale_sigma.amax();
+    let off = gyros / table - 1.0;
+    (off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
+        format!(
+            "Over all {} moves the gyros turn {:.0} ppm {} than the table, where scale_sigma_ppm of \
+             [imu.prior.gyro] states {:.0} ppm: its scale or scale_sigma_ppm, or gyro_unit, does not fit the \
+             instrument.",
+            moves.len(),
+            off.abs() / PPM,
+            if off > 0.0 { "further" } else { "less far" },
+            sigma / PPM
+        )
+    })
+}
+
+/// Mean rates of the gyros while the table stands, the middle one of each axis: their biases, with a part of
+/// Earth rate, and how far off these may be, rad/s. The prior's may be wrong; stands are where the clocks are.
+fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
+    let prior = &run.instrument.prior.gyro;
+    let imu = &run.recording.imu;
+    let known = stands.iter().filter(|s| !s.is_empty() && !imu.is_lost(s));
+    let means: Vec<Vector3<f64>> = known
+        .map(|s| imu.gyro.sum(s.clone()) / (s.len() as f64 * imu.period))
+        .collect();
+    let bias = Vector3::from_fn(|axis, _| {
+        let mut of_axis: Vec<f64> = means.iter().map(|mean| mean[axis]).collect();
+        median(&mut of_axis).unwrap_or(prior.bias[axis])
+    });
+    let mut off: Vec<f64> = means.iter().map(|mean| (mean - bias).norm()).collect();
+    let sigma = median(&mut off).map_or(f64::INFINITY, |off| SIGMA_OF_MEDIAN * off);
+    (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
+}
+
 /// Moves that both logs resolve, from the middle of one standstill of the table to that of the next; the
 /// first and the last reach to the ends of what both logs cover.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
@@ -161,6 +209,7 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     };
     let (first, last) = (covered(table.time.first()), covered(table.time.last()));
     let count = stands.len().saturating_sub(1);
+    let (bias, off) = bias_at_rest(run, &stands);
     let between = stands.windows(2).enumerate().filter_map(|(k, pair)| {
         let middle = |samples: &Range<usize>| samples.start.midpoint(samples.end);
         let begin = if k == 0 { first } else { middle(&pair[0]) };
@@ -170,13 +219,20 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
         };
         let samples = begin..end;
         let is_whole = !samples.is_empty() && imu.unbroken(&samples) && !imu.is_lost(&samples);
-        is_whole.then(|| of_samples(run, table, samples)).flatten()
+        is_whole
+            .then(|| of_samples(run, table, samples, (&bias, off)))
+            .flatten()
     });
     between.collect()
 }
 
 /// What both logs say of these samples; none where readings are too far apart, or nothing turns.
-fn of_samples(run: &Run, table: &TableLog, samples: Range<usize>) -> Option<Move> {
+fn of_samples(
+    run: &Run,
+    table: &TableLog,
+    samples: Range<usize>,
+    (bias, off): (&Vector3<f64>, f64),
+) -> Option<Move> {
     let imu = &run.recording.imu;
     let prior = &run.instrument.prior.gyro;
     let (begin, end) = (imu.time(samples.start), imu.time(samples.end));
@@ -204,10 +260,12 @@ fn of_samples(run: &Run, table: &TableLog, samples: Range<usize>) -> Option<Move
         let duration = part.len() as f64 * imu.period;
         let sum = imu.gyro.sum(part.clone());
         let time = imu.time(part.start) + 0.5 * duration;
-        (time, duration, (sum - prior.bias * duration).norm())
+        (time, duration, (sum - bias * duration).norm())
     });
-    let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt();
-    let zero = SIGMAS * prior.bias_sigma.norm() + ROTATION_RATE;
+    let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt()
+        + 3f64.sqrt() * imu.pulse.gyro;
+    // A bias from dwells has Earth rate in it, too.
+    let zero = SIGMAS * prior.bias_sigma.norm() + 2.0 * ROTATION_RATE;
     let by_gyros = Way::of(by_gyros, noise, zero);
     let is_resolved = by_gyros.fastest.max(by_table.fastest) * interval < SHORTER_WAY;
     let part = OTHER_ANGLE.max(SIGMAS * prior.scale_sigma.amax());
@@ -216,6 +274,7 @@ fn of_samples(run: &Run, table: &TableLog, samples: Range<usize>) -> Option<Move
         gyros: by_gyros,
         table: by_table,
         tolerance: part * longest + zero * (end - begin),
+        zero: (off + 2.0 * ROTATION_RATE) * (end - begin),
         interval,
     })
 }
@@ -248,6 +307,23 @@ mod tests {
         let run = Scenario::load("demo-six-position").unwrap();
         let run = run.simulate(1, 0).unwrap().run;
         assert_eq!(clock(&run, run.recording.table.as_ref().unwrap()), None);
+    }
+
+    #[test]
+    fn a_prior_that_turns_contradict_is_named_and_no_rows_are() {
+        let sure = said(|run| {
+            let prior = &mut run.instrument.prior.gyro;
+            prior.scale_sigma *= 0.01;
+            prior.bias_sigma *= 0.01;
+        });
+        let sure = sure.unwrap();
+        assert!(sure.contains("states 50 ppm"), "{sure}");
+        let off = said(|run| {
+            let imu = &mut run.recording.imu;
+            imu.gyro.to_mut().iter_mut().for_each(|row| *row *= 1.05);
+        });
+        let off = off.unwrap();
+        assert!(off.contains("ppm further than the table"), "{off}");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::units::{DEGREE, MILLIGAL};
 /// Gravity where a laboratory stands departs from normal gravity by less, m/s²: this is more than ten
 /// [`crate::earth::ANOMALY_SIGMA`].
 const ANOMALY: f64 = 500.0 * MILLIGAL;
-/// Part of sound records for which another order of quaternions is named.
+/// Part of sound records for which another order of quaternions, or a dead axis, is named.
 const FALSE_ALARMS: f64 = 1e-6;
 
 /// The attitude that a reading means, from the one that it was taken for.
@@ -31,8 +31,10 @@ impl Run {
                 clock::clock(self, table),
             ]
         });
-        let all = [gravity(self), columns::columns(self)]
+        let of_columns = [columns::columns(self), columns::still(self)];
+        let all = [gravity(self)]
             .into_iter()
+            .chain(of_columns)
             .chain(of_table.into_iter().flatten());
         all.flatten().collect()
     }
