@@ -438,3 +438,43 @@ fn sigma_of_coefficients_are_true_and_orders_right() {
         assert!(right + 1 >= all, "{right} of {all}");
     }
 }
+
+#[test]
+#[ignore = "slow: a hand-turned record four times"]
+fn parts_of_a_record_whose_noise_is_stated_too_small_do_not_differ_for_that() {
+    let Some(whole) = shared("real-mems-lot-0") else {
+        return;
+    };
+    let log = fs::read_to_string(whole.join("imu.log")).unwrap();
+    let rows: Vec<&str> = log.lines().collect();
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    let mut campaign = "format = \"turncal-campaign/1\"\n".to_owned();
+    // The first minute is one dwell; each part has moves enough to show the accelerometers.
+    for (number, part) in [0..8500, 8500..12_200, 12_200..rows.len()]
+        .into_iter()
+        .enumerate()
+    {
+        let part_of = here.join(number.to_string());
+        fs::create_dir(&part_of).unwrap();
+        fs::copy(whole.join("run.toml"), part_of.join("run.toml")).unwrap();
+        fs::write(part_of.join("imu.log"), rows[part].join("\n") + "\n").unwrap();
+        campaign += &format!("[[recording]]\nrun = \"{number}/run.toml\"\n");
+    }
+    let path = here.join("campaign.toml");
+    fs::write(&path, campaign).unwrap();
+    let together = estimated(&path);
+    assert!(together.noise.learnt);
+    let run = read(&whole);
+    let alone = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
+    let change = (together.estimate.vector() - alone.estimate.vector())
+        .component_div(&alone.estimate.sigma());
+    // Both are of the same rows; with stated noise the accelerometers' K alone were 100 σ apart.
+    let accel: Vec<f64> = (0..PARAMETERS)
+        .filter(|&i| turncal::calibration::sensor_and_parameter(i).0 == Sensor::Accel)
+        .map(|i| change[i])
+        .filter(|change| change.is_finite())
+        .collect();
+    println!("{accel:.1?}");
+    assert!(accel.iter().all(|change| change.abs() < 3.0), "{accel:?}");
+}
