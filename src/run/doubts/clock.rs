@@ -194,8 +194,9 @@ fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
     (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
 }
 
-/// Moves that both logs resolve, from the middle of one standstill of the table to that of the next; the
-/// first and the last reach to the ends of what both logs cover.
+/// Moves that both logs resolve, from the middle of one standstill of the table to that of the next, and what there
+/// is before the first and behind the last of what both logs cover. Two moves in one would be wrong in time by what
+/// the scale factors of their axes differ.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands: Vec<Range<usize>> = run
@@ -203,21 +204,20 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
         .into_iter()
         .map(|standstill| standstill.samples)
         .collect();
+    // One alone does not tell how far off the bias is that it shows.
+    if stands.len() < 2 {
+        return Vec::new();
+    }
     let covered = |time: Option<&f64>| {
         let edge = imu.edge(time.copied().unwrap_or(0.0));
         edge.clamp(0.0, imu.len() as f64) as usize
     };
     let (first, last) = (covered(table.time.first()), covered(table.time.last()));
-    let count = stands.len().saturating_sub(1);
     let (bias, off) = bias_at_rest(run, &stands);
-    let between = stands.windows(2).enumerate().filter_map(|(k, pair)| {
-        let middle = |samples: &Range<usize>| samples.start.midpoint(samples.end);
-        let begin = if k == 0 { first } else { middle(&pair[0]) };
-        let end = match k + 1 == count {
-            true => last,
-            false => middle(&pair[1]),
-        };
-        let samples = begin..end;
+    let middles = stands.iter().map(|s| s.start.midpoint(s.end));
+    let edges: Vec<usize> = [first].into_iter().chain(middles).chain([last]).collect();
+    let between = edges.windows(2).filter_map(|edges| {
+        let samples = edges[0]..edges[1];
         let is_whole = !samples.is_empty() && imu.unbroken(&samples) && !imu.is_lost(&samples);
         is_whole
             .then(|| of_samples(run, table, samples, (&bias, off)))
@@ -253,6 +253,9 @@ fn of_samples(
         SIGMAS * run.table.reading_sigma * 6f64.sqrt(),
         0.0,
     );
+    // A move that the end of a log cuts is seen as far as both logs go.
+    let covered = |time: f64| (imu.edge(time).max(0.0) as usize).clamp(samples.start, samples.end);
+    let samples = covered(first)..covered(last);
     let length = ((STEP / imu.period).round() as usize).max(1);
     let starts = samples.clone().step_by(length);
     let by_gyros = starts.map(|start| {
@@ -273,7 +276,7 @@ fn of_samples(
     (is_resolved && longest > SMALLEST).then_some(Move {
         gyros: by_gyros,
         table: by_table,
-        tolerance: part * longest + zero * (end - begin),
+        tolerance: part * longest + zero * (end - begin) + by_table.fastest * imu.period,
         zero: (off + 2.0 * ROTATION_RATE) * (end - begin),
         interval,
     })
@@ -304,9 +307,12 @@ mod tests {
     #[test]
     fn both_logs_of_a_sound_run_agree() {
         assert_eq!(said(|_| {}), None);
-        let run = Scenario::load("demo-six-position").unwrap();
-        let run = run.simulate(1, 0).unwrap().run;
-        assert_eq!(clock(&run, run.recording.table.as_ref().unwrap()), None);
+        // It begins with a move; with these seeds the scale factors of the first two moves differ most.
+        let scenario = Scenario::load("demo-six-position").unwrap();
+        for seed in [1, 4, 10] {
+            let run = scenario.simulate(seed, 0).unwrap().run;
+            assert_eq!(clock(&run, run.recording.table.as_ref().unwrap()), None);
+        }
     }
 
     #[test]
