@@ -115,8 +115,8 @@ pub(super) struct Joint<'a> {
     pub findings: Vec<Finding>,
 }
 
-/// Solves a problem of several recordings, or one that varies, with stated noise; recordings differ by what is stated or, where the noise may be
-/// learnt, by what they show.
+/// Solves a problem of several recordings, or one that varies, with stated noise. Recordings differ by what is stated
+/// or, where the noise may be learnt, by what they show.
 pub(super) fn solve<'a>(
     problem: &Problem<'a>,
     progress: Progress,
