@@ -9,7 +9,7 @@ mod turns;
 
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::drift::drift;
 use super::error::CalibrationError;
@@ -75,11 +75,13 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     let Turned {
         at, heading_sigma, ..
     } = turns::triads_and_attitudes(problem, &gravity::accelerometers(problem)?)?;
-    let attitudes = at.initial_attitudes.iter().zip(&heading_sigma);
+    let gravity = problem.stretches().iter().map(|s| s.run.site.gravity);
+    let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(gravity);
+    let of_alignment = |((attitude, &sigma), gravity): ((&Matrix3<f64>, &f64), f64)| {
+        AttitudePrior::of_alignment(*attitude, sigma, &problem.model, gravity)
+    };
     Ok(CoarseStart {
-        attitudes: attitudes
-            .map(|(attitude, &sigma)| AttitudePrior::of_alignment(*attitude, sigma))
-            .collect(),
+        attitudes: attitudes.map(of_alignment).collect(),
         at,
         hidden: heading_sigma.into_iter().any(AttitudePrior::hides),
     })

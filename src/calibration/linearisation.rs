@@ -7,9 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::day_to_day::Difference;
 use super::error::CalibrationError;
 use super::model::Model;
-use super::parameters::{from_vector, to_vector};
+use super::parameters::{from_vector, parameter, to_vector};
 use crate::attitude::{exp, log};
-use crate::imu::{PerSensor, Sensor, TermVector, ThermalCoefficients, Triad};
+use crate::imu::{
+    PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, TermVector, ThermalCoefficients,
+    Triad,
+};
 use crate::run::Run;
 use crate::turntable::TableAccuracy;
 use crate::units::{ARCSEC, DEGREE};
@@ -123,9 +126,9 @@ pub struct AttitudePrior {
 
 /// 1σ of the initial attitude before anything is known of it but one reading, rad.
 const READ_ATTITUDE: f64 = 60.0 * ARCSEC;
-/// 1σ of the initial level without a table, rad. What gave it is in the observations, too, so this is
-/// far wider than it is wrong.
-const LEVEL: f64 = 0.2 * DEGREE;
+/// So many times what the prior of the accelerometers leaves of the initial level without a table: what gave it is in
+/// the observations, too, so that it has to be told by these.
+const LEVEL_SIGMAS: f64 = 10.0;
 /// 1σ of the initial heading without a table, rad, if Earth rate shows it well; else …
 const HEADING: f64 = 15.0 * DEGREE;
 /// … so many times what Earth rate leaves of it.
@@ -147,8 +150,15 @@ impl AttitudePrior {
         }
     }
 
-    /// From a coarse alignment that knows its heading to this 1σ.
-    pub(super) fn of_alignment(mean: Matrix3<f64>, heading_sigma: f64) -> Self {
+    /// From a coarse alignment that knows its heading to this 1σ, and its level to what accelerometers of this model
+    /// say.
+    pub(super) fn of_alignment(
+        mean: Matrix3<f64>,
+        heading_sigma: f64,
+        model: &Model,
+        gravity: f64,
+    ) -> Self {
+        let level = LEVEL_SIGMAS * known_level(model, gravity);
         let heading = (HEADING_SIGMAS * heading_sigma).max(HEADING);
         let heading = if heading > HIDDEN {
             IN_QUADRANT
@@ -157,7 +167,7 @@ impl AttitudePrior {
         };
         Self {
             mean,
-            sigma: Vector3::new(LEVEL, LEVEL, heading),
+            sigma: Vector3::new(level, level, heading),
         }
     }
 
@@ -165,6 +175,23 @@ impl AttitudePrior {
     pub(super) fn hides(heading_sigma: f64) -> bool {
         HEADING_SIGMAS * heading_sigma > HIDDEN
     }
+}
+
+/// 1σ of a level that one attitude of the accelerometers gives before they are calibrated, rad: of the axis of which
+/// least is known.
+fn known_level(model: &Model, gravity: f64) -> f64 {
+    let mut variances = Vector3::<f64>::zeros();
+    for of_triad in 0..PER_TRIAD {
+        let per_g = match Triad::kind(of_triad) {
+            ParameterKind::Bias => gravity,
+            ParameterKind::Scale | ParameterKind::Installation => 1.0,
+        };
+        let sigma = model.prior_sigma[parameter(Sensor::Accel, of_triad)] / per_g;
+        if let Some(axis) = Triad::axis(model.form, of_triad) {
+            variances[axis] += sigma.powi(2);
+        }
+    }
+    variances.max().sqrt()
 }
 
 /// Uncertainty at the first sample of a stretch, 1σ, and the mean of its attitude error.

@@ -88,18 +88,22 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// One of its recordings alone, told by number.
-    pub(super) fn recording(&self, number: usize) -> Self {
-        let of = |stretch: &&Stretch<'a>| stretch.recording == number;
-        let alone = |stretch: &Stretch<'a>| Stretch {
-            recording: 0,
+    /// Some of its recordings, at least one, told by number.
+    pub(super) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
+        let mut runs = self.runs().enumerate().filter(|&(number, _)| which(number));
+        let first = runs.next();
+        let others = runs.map(|(_, run)| run).collect();
+        let stretches = self.stretches.iter().filter(|of| which(of.recording));
+        let renumbered = stretches.map(|stretch| Stretch {
+            recording: (0..stretch.recording)
+                .filter(|&before| which(before))
+                .count(),
             ..stretch.clone()
-        };
-        let stretches = self.stretches.iter().filter(of).map(alone);
+        });
         Self {
-            run: self.runs().nth(number).unwrap_or(self.run),
-            others: Vec::new(),
-            stretches: stretches.collect(),
+            run: first.map_or(self.run, |(_, run)| run),
+            others,
+            stretches: renumbered.collect(),
             ..self.clone()
         }
     }

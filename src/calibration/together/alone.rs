@@ -1,19 +1,22 @@
 //! Each recording of a problem calibrated alone.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
 use super::super::alone::Alone;
 use super::super::attempt::from_coarse_start;
 use super::super::coarse::coarse_start;
-use super::super::day_to_day::DayToDay;
+use super::super::day_to_day::{DayToDay, Difference};
 use super::super::error::CalibrationError;
 use super::super::estimate::Estimate;
+use super::super::iterations::{Iterated, iterate};
+use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::model::Model;
 use super::super::noise::learn;
 use super::super::parameters::{from_vector, parameter, to_vector};
+use super::super::pass::Gate;
 use super::super::problem::Problem;
-use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalRange};
+use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
 /// more.
@@ -22,21 +25,75 @@ const BEYOND_NOISE: f64 = 10.0;
 /// A recording within this part of the range is at one temperature.
 const PART_OF_RANGE: f64 = 0.1;
 
-/// Each recording alone, on as many threads as there are.
+/// Each recording alone, on as many threads as there are, with the noise that is stated or, where it may be learnt
+/// and has to be, with that of what each shows.
 pub(super) fn each(problem: &Problem) -> Result<Vec<Alone>, CalibrationError> {
     let runs = problem.runs().count();
-    (0..runs)
-        .into_par_iter()
-        .map(|number| of(&problem.recording(number)))
-        .collect()
+    let plain = |number: usize| plain(&problem.recordings(|of| of == number), &problem.model);
+    let all = (0..runs).into_par_iter();
+    let all = all.map(|number| of(&plain(number), problem.model.thermal.as_deref()));
+    let (mut all, contradicted): (Vec<Alone>, Vec<bool>) =
+        all.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    if contradicted.contains(&true)
+        && let Some(model) = noise_of_all(problem, &all)
+    {
+        all.par_iter_mut().enumerate().for_each(|(number, alone)| {
+            if let Some(estimate) = with_noise(alone, &plain(number).with_model(model.clone())) {
+                alone.estimate = Some(estimate);
+            }
+        });
+    }
+    Ok(all)
 }
 
-fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
-    let run = problem.run();
-    let mut model = problem.model.clone();
-    let thermal = model.thermal.take();
+/// The problem of a recording without what differs between recordings and temperatures.
+fn plain<'a>(recording: &Problem<'a>, model: &Model) -> Problem<'a> {
+    let mut model = model.clone();
+    model.thermal = None;
     model.day_to_day = DayToDay::default();
-    let plain = problem.with_model(model);
+    recording.with_model(model)
+}
+
+/// A model with the noise that recordings show which have no parameter in common: a short one does not show its own,
+/// and what they differ by is no noise.
+fn noise_of_all(problem: &Problem, alone: &[Alone]) -> Option<Model> {
+    let known = |number: usize| alone[number].estimate.is_some();
+    let problem = problem.recordings(known);
+    let mut model = plain(&problem, &problem.model).model;
+    model.day_to_day.parameters = model.prior_sigma;
+    let problem = problem.with_model(model);
+    let known: Vec<&Alone> = alone
+        .iter()
+        .filter(|alone| alone.estimate.is_some())
+        .collect();
+    let priors: Vec<AttitudePrior> = known.iter().flat_map(|a| a.priors.clone()).collect();
+    let attitudes = known.iter().flat_map(|a| a.initial_attitudes.clone());
+    let model = &problem.model;
+    let mut at = Linearisation::new(
+        from_vector(model.form, &model.prior_mean),
+        SVector::zeros(),
+        attitudes.collect(),
+    );
+    at.own = known
+        .iter()
+        .map(|alone| Difference {
+            parameters: alone.start - model.prior_mean,
+            ..Difference::default()
+        })
+        .collect();
+    let passes = &mut Vec::new();
+    let gate = Gate::Innovations;
+    let iterated = iterate(&problem, &priors, at, gate, passes, &|_| {}).ok()?;
+    let learnt = learn(&problem, &priors, iterated, passes, &|_| {}).ok()?;
+    learnt
+        .report
+        .learnt
+        .then(|| plain(&problem, &learnt.model).model)
+}
+
+/// A recording alone with the noise that is stated or that it shows, and whether it shows other than is stated.
+fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), CalibrationError> {
+    let run = plain.run();
     let temperature = run.recording.imu.temperature.as_ref();
     let span = temperature.map_or(0.0, |temperature| {
         Sensor::ALL
@@ -60,7 +117,7 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
             })
         })
     });
-    let state = thermal.as_ref().zip(middle.as_ref());
+    let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
     let alone = |start, priors, initial_attitudes, estimate| Alone {
         name: run.recording.name.clone(),
@@ -73,39 +130,56 @@ fn of(problem: &Problem) -> Result<Alone, CalibrationError> {
         initial_attitudes,
     };
     // What changes within a recording has no calibration without its change.
-    let range = thermal.as_ref().map(|thermal| thermal.range);
+    let range = thermal.map(|thermal| thermal.range);
     let whole = range.map_or(f64::INFINITY, |range| {
         let span = |range: &ThermalRange| range.highest - range.lowest;
         span(&range.gyro).max(span(&range.accel))
     });
     let stands = span < PART_OF_RANGE * whole;
-    let solved = stands.then(|| from_coarse_start(&plain, &|_| {}));
+    let solved = stands.then(|| from_coarse_start(plain, &|_| {}));
     Ok(match solved {
         Some(Ok(solved)) => {
-            let (priors, iterated) = (solved.priors, solved.iterated);
-            // Noise that is more than stated is no difference between recordings.
-            let learnt = learn(&plain, &priors, iterated.clone(), &mut Vec::new(), &|_| {});
-            let iterated = learnt.map_or(iterated, |learnt| learnt.iterated);
-            let held = iterated.held;
-            alone(
-                to_vector(&held.estimate.triads),
+            let (priors, stated) = (solved.priors, solved.iterated);
+            let learnt = learn(plain, &priors, stated.clone(), &mut Vec::new(), &|_| {}).ok();
+            let contradicted = learnt.as_ref().is_some_and(|learnt| learnt.report.learnt);
+            let iterated = learnt.map_or(stated, |learnt| learnt.iterated);
+            let at = &iterated.held.estimate;
+            let alone = alone(
+                to_vector(&at.triads),
                 priors,
-                held.estimate.initial_attitudes,
-                iterated.converged.then_some(Estimate {
-                    triads: held.estimate.triads,
-                    covariance: held.covariance,
-                }),
-            )
+                at.initial_attitudes.clone(),
+                estimate(iterated),
+            );
+            (alone, contradicted)
         }
         _ => {
-            let start = coarse_start(&plain)?;
-            alone(
+            let start = coarse_start(plain)?;
+            let alone = alone(
                 to_vector(&start.at.triads),
                 start.attitudes,
                 start.at.initial_attitudes,
                 None,
-            )
+            );
+            (alone, false)
         }
+    })
+}
+
+/// What a recording alone says with other noise.
+fn with_noise(alone: &Alone, recording: &Problem) -> Option<Estimate> {
+    let at = Linearisation::new(
+        alone.estimate.as_ref()?.triads,
+        SVector::zeros(),
+        alone.initial_attitudes.clone(),
+    );
+    let (gate, passes) = (Gate::Innovations, &mut Vec::new());
+    estimate(iterate(recording, &alone.priors, at, gate, passes, &|_| {}).ok()?)
+}
+
+fn estimate(iterated: Iterated) -> Option<Estimate> {
+    iterated.converged.then_some(Estimate {
+        triads: iterated.held.estimate.triads,
+        covariance: iterated.held.covariance,
     })
 }
 
