@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use approx::assert_relative_eq;
 use nalgebra::{DMatrix, Vector3};
 use turncal::calibration::{
     Estimate, Finding, Options, Outcome, PARAMETERS, ParameterVector, Problem, bound, estimate,
@@ -135,6 +136,27 @@ fn one_dwell_shows_the_bias_of_the_gyro_about_the_vertical_and_no_scale() {
     for hidden in [0, 1, 2, 12, 13] {
         assert!(sigma[hidden] > 0.5 * prior[hidden], "{hidden}");
     }
+}
+
+#[test]
+fn one_dwell_does_not_show_the_level_biases_of_accelerometers() {
+    let run = Scenario::load("mems")
+        .unwrap()
+        .simulate(SEED, 0)
+        .unwrap()
+        .run;
+    let dwell = part(&run, run.dwells(run.aiding())[0].samples.clone());
+    let problem = Problem::new(&dwell, &Options::default().aiding(Aiding::Velocity));
+    let outcome = solved(&problem);
+    let (sigma, prior) = (outcome.estimate.sigma(), outcome.prior_sigma);
+    // A tilt makes up for any of them; the one along the plumb line is seen to what the scale factor leaves.
+    let [_, _, scale, .., bias_x, bias_y, bias_z] =
+        std::array::from_fn::<_, PER_TRIAD, _>(|k| PER_TRIAD + k);
+    let left = |index: usize| sigma[index] / prior[index];
+    assert!(left(bias_x) > 0.99 && left(bias_y) > 0.99);
+    let by_scale = (prior[scale] * run.site.gravity).powi(-2);
+    let expected = (by_scale + prior[bias_z].powi(-2)).sqrt().recip();
+    assert_relative_eq!(sigma[bias_z], expected, max_relative = 0.02);
 }
 
 #[test]
