@@ -59,7 +59,7 @@ pub(super) fn six_position_by(
         Reference::Labels => labels::by_labels(problem),
         Reference::Gravity => gravity::by_gravity(problem),
     }?;
-    let notes = problem.notes().cloned();
+    let notes = problem.notes().into_iter();
     let notes = notes.map(|note| Finding::Recording { note });
     closed_form.findings.splice(0..0, notes);
     closed_form.findings.extend(scatter_at_rest(problem));

@@ -195,7 +195,7 @@ impl<'a> Solved<'a> {
 }
 
 fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
-    let notes = problem.notes().cloned();
+    let notes = problem.notes().into_iter();
     let mut findings: Vec<Finding> = notes.map(|note| Finding::Recording { note }).collect();
     if !outcome.converged {
         let last = outcome.passes.last();

@@ -31,6 +31,8 @@ pub struct Problem<'a> {
     run: &'a Run,
     others: Vec<&'a Run>,
     stretches: Arc<[Stretch<'a>]>,
+    /// Names of recordings that have no dwell.
+    left_out: Vec<String>,
 }
 
 /// Part of a recording without a break, from its first dwell to its last.
@@ -68,6 +70,7 @@ impl<'a> Problem<'a> {
             stretches: stretches(run, 0, &model).into(),
             model,
             options: options.clone(),
+            left_out: Vec::new(),
         }
     }
 
@@ -105,6 +108,25 @@ impl<'a> Problem<'a> {
             others,
             stretches: renumbered.collect(),
             ..self.clone()
+        }
+    }
+
+    /// Without the recordings that have no dwell, of which it says so; as it is where none has.
+    pub(super) fn of_dwells(self) -> Self {
+        let has = |number: usize| {
+            let mut of = self.stretches.iter().filter(|of| of.recording == number);
+            of.any(|stretch| !stretch.dwells.is_empty())
+        };
+        let runs = self.runs().enumerate();
+        let (with, without): (Vec<_>, Vec<_>) = runs.partition(|&(number, _)| has(number));
+        if with.is_empty() {
+            return self;
+        }
+        let without = without.into_iter();
+        let left_out = without.map(|(_, run)| run.recording.name.clone()).collect();
+        Self {
+            left_out,
+            ..self.recordings(has)
         }
     }
 
@@ -178,9 +200,33 @@ impl<'a> Problem<'a> {
         std::iter::once(self.run).chain(self.others.iter().copied())
     }
 
-    /// What the readers of the runs' files found.
-    pub(super) fn notes(&self) -> impl Iterator<Item = &String> {
-        self.runs().flat_map(|run| &run.recording.notes)
+    /// What the readers of the runs' files found, once, with the name of the run where it is not of all; and which
+    /// recordings are left out.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
+        for run in self.runs() {
+            let name = run.recording.name.as_str();
+            for note in &run.recording.notes {
+                match found.iter_mut().find(|(other, _)| *other == note) {
+                    Some((_, names)) => names.push(name),
+                    None => found.push((note, vec![name])),
+                }
+            }
+        }
+        let of_all = self.runs().count();
+        let found = found
+            .into_iter()
+            .map(|(note, names)| match names.len() == of_all {
+                true => note.clone(),
+                false => format!("{}: {note}", names.join(", ")),
+            });
+        let left_out = self.left_out.iter().map(|name| {
+            format!(
+                "{name}: left out, since no dwell was found in it; the instrument must stand for a second or more \
+                 between turns."
+            )
+        });
+        found.chain(left_out).collect()
     }
 
     /// What is observed at the end of a step, in order.

@@ -5,8 +5,8 @@ use std::ops::Range;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, Vector3};
 use turncal::calibration::{
-    Estimate, Finding, Options, Outcome, PARAMETERS, ParameterVector, Problem, bound, estimate,
-    mean_square_interval, nees, to_vector,
+    Estimate, Finding, Options, Outcome, PARAMETERS, ParameterVector, Problem, Together, bound,
+    estimate, mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
 use turncal::recording::{Bridge, Recording, SampleError, Series, Stretch, TableLog};
@@ -220,6 +220,41 @@ fn parts_of_a_record_are_runs_of_one_instrument() {
     let joint = solved(&Problem::new(&before, &exactly()).and(&after));
     let (shift, change) = apart(&broken.estimate, &joint.estimate);
     assert!(shift < 1e-6 && change < 1e-6);
+}
+
+#[test]
+fn a_recording_without_a_dwell_is_left_out_of_a_campaign_and_named() {
+    let run = Scenario::load("demo")
+        .unwrap()
+        .simulate(SEED, 0)
+        .unwrap()
+        .run;
+    let moving = in_the_longest_move(&run);
+    let before = part(&run, 0..moving.start);
+    let after = part(&run, moving.end..run.recording.imu.len());
+    let mut turn = part(&run, moving);
+    turn.recording.name = "turn".to_owned();
+    let together = |runs: &[&Run]| {
+        let together = Together {
+            temperature: None,
+            ..Together::default()
+        };
+        solved(&Problem::together(runs, &exactly(), &together).unwrap())
+    };
+    let (with, without) = (
+        together(&[&before, &turn, &after]),
+        together(&[&before, &after]),
+    );
+    assert_eq!(with.estimate, without.estimate);
+    let says = |outcome: &Outcome| {
+        let named = |finding: &Finding| finding.to_string().starts_with("turn: left out");
+        outcome
+            .findings
+            .iter()
+            .filter(|finding| named(finding))
+            .count()
+    };
+    assert_eq!((says(&with), says(&without)), (1, 0));
 }
 
 /// Two runs of one instrument along different paths.

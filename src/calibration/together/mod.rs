@@ -52,7 +52,7 @@ impl Default for Together {
 
 impl<'a> Problem<'a> {
     /// The problem that recordings of one instrument pose together. The first one's instrument and table stand for
-    /// all.
+    /// all; one without a dwell is left out, and a finding says so.
     ///
     /// # Errors
     /// [`CalibrationError`] if there is none, or one has no temperature where parameters follow it.
@@ -66,6 +66,7 @@ impl<'a> Problem<'a> {
         for run in others {
             problem = problem.and(run);
         }
+        let problem = problem.of_dwells();
         let mut model = problem.model.clone();
         model.day_to_day = together.day_to_day;
         if model.aiding == Aiding::Velocity {
