@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 
 use super::estimate::Estimate;
 use super::linearisation::AttitudePrior;
-use super::parameters::ParameterVector;
+use super::parameters::{ParameterMatrix, ParameterVector};
 use crate::imu::{PerSensor, ThermalState};
 
 /// What a recording alone says.
@@ -19,6 +19,8 @@ pub struct Alone {
     /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
     /// that of its own; none where it gave none.
     pub estimate: Option<Estimate>,
+    /// What headings that it does not tell apart add to that.
+    pub(super) by_headings: ParameterMatrix,
     /// Where its temperature stands for all of it: the functions of temperature then.
     pub(super) state: Option<ThermalState>,
     pub(super) start: ParameterVector,

@@ -1,13 +1,22 @@
 //! A calibration from one start, with stated noise: with a table a pass with feedback, and Gauss–Newton iterations.
 
+use std::ops::Range;
+
 use super::coarse::{CoarseStart, coarse_start};
 use super::error::CalibrationError;
+use super::group::Group;
 use super::iterations::{Iterated, iterate, summary};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::outcome::Pass;
+use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
 use super::pass::{Epoch, Gate, Mode, pass};
 use super::problem::Problem;
+use crate::attitude::log;
+use crate::imu::{ParameterKind, Sensor};
 use crate::run::Aiding;
+
+/// Of the variance that Earth rate would have along an unknown heading, so much of that of a bias is too little to tell.
+const ENOUGH_TO_MATTER: f64 = 10.0;
 
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
@@ -19,20 +28,119 @@ pub(super) struct Attempt {
     /// Of the pass with feedback, where there was one.
     pub feedback_history: Vec<Epoch>,
     pub iterated: Iterated,
+    /// Mean square by which the parameters differ from those of the other headings, each as likely as its data.
+    pub by_headings: ParameterMatrix,
 }
 
-/// From the coarse start, and where the heading is hidden from all four quadrants.
+/// From the coarse start; where Earth rate does not tell the headings, from all four quadrants, first of all stretches
+/// together, then, where the biases are known well enough for it to matter, of each alone.
 pub(super) fn from_coarse_start(
     problem: &Problem,
     progress: Progress,
 ) -> Result<Attempt, CalibrationError> {
     let start = coarse_start(problem)?;
-    let others = start.other_headings();
-    let of_start = attempt(problem, start, progress);
-    let others = others
-        .into_iter()
-        .map(|start| attempt(problem, start, progress));
-    others.fold(of_start, better)
+    let tried = Tried::new(problem, start.clone(), progress);
+    if !start.hidden {
+        return tried.attempt;
+    }
+    let stretches = start.attitudes.len();
+    let (mut best, mut by_headings) = tried.among_headings(problem, 0..stretches, progress);
+    let of_best = best.attempt.as_ref();
+    if stretches > 1 && of_best.is_ok_and(|attempt| matters(problem, attempt)) {
+        for stretch in 0..stretches {
+            let of_stretch;
+            (best, of_stretch) = best.among_headings(problem, stretch..stretch + 1, progress);
+            by_headings += of_stretch;
+        }
+    }
+    let mut attempt = best.attempt?;
+    attempt.by_headings = by_headings;
+    Ok(attempt)
+}
+
+/// Whether Earth rate along an unknown heading adds to what the biases of the gyros are known to.
+fn matters(problem: &Problem, attempt: &Attempt) -> bool {
+    let covariance = &attempt.iterated.held.covariance;
+    let level = problem.run().site.earth_rate_n().y.powi(2);
+    let biases =
+        Group::all().filter(|of| of.sensor() == Sensor::Gyro && of.kind() == ParameterKind::Bias);
+    let mut biases = biases.flat_map(|of| of.parameters(problem.model.form));
+    biases.any(|index| ENOUGH_TO_MATTER * level > covariance[(index, index)])
+}
+
+/// A start and what came of it.
+struct Tried {
+    start: CoarseStart,
+    attempt: Result<Attempt, CalibrationError>,
+}
+
+impl Tried {
+    fn new(problem: &Problem, start: CoarseStart, progress: Progress) -> Self {
+        Self {
+            attempt: attempt(problem, start.clone(), progress),
+            start,
+        }
+    }
+
+    /// The best of the four quadrants in which the headings of these stretches may be, and the mean square of the
+    /// parameters from it.
+    fn among_headings(
+        self,
+        problem: &Problem,
+        stretches: Range<usize>,
+        progress: Progress,
+    ) -> (Self, ParameterMatrix) {
+        let heading = |tried: &Self| Heading::of(tried.attempt.as_ref().ok()?);
+        let mut headings: Vec<Heading> = heading(&self).into_iter().collect();
+        let others = self.start.other_headings(stretches);
+        let best = others.into_iter().fold(self, |best, start| {
+            let other = Self::new(problem, start, progress);
+            headings.extend(heading(&other));
+            better(best, other)
+        });
+        let chosen = heading(&best);
+        let apart = chosen.map_or_else(ParameterMatrix::zeros, |chosen| {
+            chosen.mean_square_to(&headings)
+        });
+        (best, apart)
+    }
+}
+
+/// What came of one heading.
+struct Heading {
+    /// −2 ln of its likelihood, but for a constant.
+    deviance: f64,
+    parameters: ParameterVector,
+}
+
+impl Heading {
+    /// `None` where it did not converge.
+    fn of(attempt: &Attempt) -> Option<Self> {
+        let held = &attempt.iterated.held;
+        // Within its quadrant one heading is as likely as another.
+        let attitudes = held.estimate.initial_attitudes.iter();
+        let off = attitudes.zip(&attempt.priors).map(|(attitude, prior)| {
+            let off = log(&(attitude * prior.mean.transpose()));
+            (off.z / prior.sigma.z).powi(2)
+        });
+        attempt.iterated.converged.then(|| Self {
+            deviance: held.cost + held.log_determinant - off.sum::<f64>(),
+            parameters: to_vector(&held.estimate.triads),
+        })
+    }
+
+    /// Source: Hoeting, Madigan, Raftery and Volinsky 1999, "Bayesian model averaging: a tutorial", Statistical
+    /// Science 14(4), for the weights.
+    fn mean_square_to(&self, all: &[Self]) -> ParameterMatrix {
+        let weight = |of: &Self| (0.5 * (self.deviance - of.deviance)).min(0.0).exp();
+        let sum: f64 = all.iter().map(weight).sum();
+        all.iter()
+            .map(|of| {
+                let apart = of.parameters - self.parameters;
+                apart * apart.transpose() * (weight(of) / sum)
+            })
+            .sum()
+    }
 }
 
 fn attempt(
@@ -81,18 +189,16 @@ fn attempt(
         passes,
         feedback_history,
         iterated,
+        by_headings: ParameterMatrix::zeros(),
     })
 }
 
-/// The attempt that converged, and if both did, that of the lower cost.
-fn better(
-    one: Result<Attempt, CalibrationError>,
-    other: Result<Attempt, CalibrationError>,
-) -> Result<Attempt, CalibrationError> {
+/// The one that converged, and if both did, that of the lower cost.
+fn better(one: Tried, other: Tried) -> Tried {
     let rank = |attempt: &Attempt| (!attempt.iterated.converged, attempt.iterated.held.cost);
-    match (one, other) {
-        (Ok(one), Ok(other)) if rank(&other) < rank(&one) => Ok(other),
-        (Err(_), Ok(other)) => Ok(other),
-        (one, _) => one,
+    match (&one.attempt, &other.attempt) {
+        (Ok(first), Ok(second)) if rank(second) < rank(first) => other,
+        (Err(_), Ok(_)) => other,
+        _ => one,
     }
 }

@@ -8,6 +8,7 @@ mod table;
 mod turns;
 
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -33,21 +34,19 @@ pub struct CoarseStart {
 }
 
 impl CoarseStart {
-    /// The same in the other three quadrants where the heading is hidden.
-    pub(super) fn other_headings(&self) -> Vec<Self> {
-        let quadrants = if self.hidden { 1..4 } else { 0..0 };
-        let turned = quadrants.map(|quadrant| {
+    /// The same with the headings of these stretches in the other three quadrants.
+    pub(super) fn other_headings(&self, of: Range<usize>) -> [Self; 3] {
+        [1, 2, 3].map(|quadrant| {
             let turn = exp(Vector3::z() * (FRAC_PI_2 * f64::from(quadrant)));
             let mut turned = self.clone();
-            for attitude in &mut turned.at.initial_attitudes {
+            for attitude in &mut turned.at.initial_attitudes[of.clone()] {
                 *attitude = turn * *attitude;
             }
-            for attitude in &mut turned.attitudes {
+            for attitude in &mut turned.attitudes[of.clone()] {
                 attitude.mean = turn * attitude.mean;
             }
             turned
-        });
-        turned.collect()
+        })
     }
 }
 

@@ -55,6 +55,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         mut passes,
         feedback_history,
         mut iterated,
+        by_headings,
     } = attempt;
     let stated = &problem;
     let problem = &problem;
@@ -93,11 +94,12 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
     let by_scatter = scores.as_ref().and_then(DwellScores::widened);
-    let covariance_by_noise = estimated(&held).covariance;
+    let covariance_by_noise = estimated(&held).covariance + by_headings;
     if let Some(widened) = &by_scatter {
         held.widen(&Layout::new(&problem.model), widened);
     }
-    let estimate = estimated(&held);
+    let mut estimate = estimated(&held);
+    estimate.covariance += by_headings;
     let growth = by_scatter.map(|_| {
         let variances = [&covariance_by_noise, &estimate.covariance].map(|c| c.diagonal());
         largest_growth(variances[0].as_slice(), variances[1].as_slice())
@@ -117,6 +119,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         ),
         estimate,
         covariance_by_noise,
+        covariance_by_headings: by_headings,
         covariance_by_error_terms: ParameterMatrix::zeros(),
         prior_sigma: stated.model.prior_sigma,
         prior_mean: model.prior_mean,
@@ -186,6 +189,7 @@ impl<'a> Solved<'a> {
                 passes: joint.passes,
                 feedback_history: Vec::new(),
                 iterated: joint.iterated,
+                by_headings: ParameterMatrix::zeros(),
             },
             problem: joint.problem,
             alone: joint.alone,

@@ -27,9 +27,11 @@ const HEADING_SEEN: f64 = 6.0;
 pub struct Outcome {
     /// The estimate after the last pass.
     pub estimate: Estimate,
-    /// Covariance of the parameters by noise and prior alone; that of the estimate is larger where dwells
+    /// Covariance of the parameters by noise, prior and headings alone; that of the estimate is larger where dwells
     /// scatter more.
     pub covariance_by_noise: ParameterMatrix,
+    /// What of that comes from headings that the data do not tell apart; zero where Earth rate or a table does.
+    pub covariance_by_headings: ParameterMatrix,
     /// What error terms that the data show, and that are not estimated, add to the covariance of the
     /// estimate; see [`crate::calibration::Solution::assess`].
     pub covariance_by_error_terms: ParameterMatrix,

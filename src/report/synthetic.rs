@@ -159,6 +159,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         form_test: None,
         dwell_scatter: None,
         covariance_by_noise: ParameterMatrix::zeros(),
+        covariance_by_headings: ParameterMatrix::zeros(),
         covariance_by_error_terms: ParameterMatrix::zeros(),
         model: Model::new(&run, &Options::default().installation(form)),
         noise: NoiseReport {

@@ -78,20 +78,33 @@ impl Run {
     }
 
     /// In a recording of sections laid end to end those labelled as positions, for of what lies between
-    /// sections nothing is known.
+    /// sections nothing is known; of a section whose label says nothing, wherever it stands.
     fn labelled_dwells(&self) -> Vec<Dwell> {
-        let stands = |motion| matches!(motion, Some(LabelledMotion::Stands { .. }));
-        let positions = self.recording.segments.iter().filter(|s| stands(s.motion));
         let standstills = self.standstills_of_imu();
-        let inside = positions.map(|segment| {
+        let within = |segment: &Segment| {
             // A row at the edge of a section may be of the one beside it.
             let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
-            Dwell {
-                samples: self.standing_in(&samples, &standstills).unwrap_or(samples),
-                position: None,
+            match segment.motion {
+                Some(LabelledMotion::Stands { .. }) => {
+                    vec![self.standing_in(&samples, &standstills).unwrap_or(samples)]
+                }
+                Some(LabelledMotion::Turns { .. }) => Vec::new(),
+                None => standstills
+                    .iter()
+                    .map(|standstill| {
+                        let Range { start, end } = standstill.samples;
+                        start.max(samples.start)..end.min(samples.end)
+                    })
+                    .filter(|common| common.len() as f64 * self.recording.imu.period >= SHORTEST)
+                    .collect(),
             }
+        };
+        let inside = self.recording.segments.iter().flat_map(within);
+        let dwells = inside.map(|samples| Dwell {
+            samples,
+            position: None,
         });
-        inside.filter(|dwell| !dwell.samples.is_empty()).collect()
+        dwells.filter(|dwell| !dwell.samples.is_empty()).collect()
     }
 
     /// The longest of these standstills within some samples, where it turns in the others by more than a

@@ -68,6 +68,7 @@ impl Budget {
         let scatter = outcome.estimate.covariance - outcome.covariance_by_noise - left_off;
         let parts = by_source.into_iter().chain([
             (BudgetSource::Curvature, bent),
+            (BudgetSource::Headings, outcome.covariance_by_headings),
             (BudgetSource::DwellScatter, scatter),
             (BudgetSource::ErrorTermsLeftOff, left_off),
         ]);

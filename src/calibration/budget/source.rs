@@ -87,6 +87,8 @@ pub enum BudgetSource {
     AccelCrossCoupling,
     /// Second order of the installation form in angles that are hardly known.
     Curvature,
+    /// Headings that the data do not tell apart.
+    Headings,
     /// By how much dwells scatter more than all noise says.
     DwellScatter,
     /// What error terms do that the data show and that are not estimated.
@@ -132,6 +134,7 @@ impl BudgetSource {
             Self::AccelThirdOrder => "prior of accel-third-order",
             Self::AccelCrossCoupling => "prior of accel-cross-coupling",
             Self::Curvature => "second order of unknown angles",
+            Self::Headings => "headings that cannot be told apart",
             Self::DwellScatter => "scatter of dwells",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",
         }

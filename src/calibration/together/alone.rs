@@ -13,7 +13,7 @@ use super::super::iterations::{Iterated, iterate};
 use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::model::Model;
 use super::super::noise::learn;
-use super::super::parameters::{from_vector, parameter, to_vector};
+use super::super::parameters::{ParameterMatrix, from_vector, parameter, to_vector};
 use super::super::pass::Gate;
 use super::super::problem::Problem;
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
@@ -119,11 +119,12 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     });
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
-    let alone = |start, priors, initial_attitudes, estimate| Alone {
+    let alone = |(start, by_headings), priors, initial_attitudes, estimate| Alone {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
         estimate,
+        by_headings,
         state,
         start,
         priors,
@@ -139,23 +140,24 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     let solved = stands.then(|| from_coarse_start(plain, &|_| {}));
     Ok(match solved {
         Some(Ok(solved)) => {
-            let (priors, stated) = (solved.priors, solved.iterated);
+            let (priors, stated, by_headings) =
+                (solved.priors, solved.iterated, solved.by_headings);
             let learnt = learn(plain, &priors, stated.clone(), &mut Vec::new(), &|_| {}).ok();
             let contradicted = learnt.as_ref().is_some_and(|learnt| learnt.report.learnt);
             let iterated = learnt.map_or(stated, |learnt| learnt.iterated);
             let at = &iterated.held.estimate;
             let alone = alone(
-                to_vector(&at.triads),
+                (to_vector(&at.triads), by_headings),
                 priors,
                 at.initial_attitudes.clone(),
-                estimate(iterated),
+                estimate(iterated, by_headings),
             );
             (alone, contradicted)
         }
         _ => {
             let start = coarse_start(plain)?;
             let alone = alone(
-                to_vector(&start.at.triads),
+                (to_vector(&start.at.triads), ParameterMatrix::zeros()),
                 start.attitudes,
                 start.at.initial_attitudes,
                 None,
@@ -173,13 +175,14 @@ fn with_noise(alone: &Alone, recording: &Problem) -> Option<Estimate> {
         alone.initial_attitudes.clone(),
     );
     let (gate, passes) = (Gate::Innovations, &mut Vec::new());
-    estimate(iterate(recording, &alone.priors, at, gate, passes, &|_| {}).ok()?)
+    let iterated = iterate(recording, &alone.priors, at, gate, passes, &|_| {}).ok()?;
+    estimate(iterated, alone.by_headings)
 }
 
-fn estimate(iterated: Iterated) -> Option<Estimate> {
+fn estimate(iterated: Iterated, by_headings: ParameterMatrix) -> Option<Estimate> {
     iterated.converged.then_some(Estimate {
         triads: iterated.held.estimate.triads,
-        covariance: iterated.held.covariance,
+        covariance: iterated.held.covariance + by_headings,
     })
 }
 
