@@ -160,6 +160,29 @@ fn one_dwell_does_not_show_the_level_biases_of_accelerometers() {
 }
 
 #[test]
+fn one_dwell_leaves_the_bias_of_a_gyro_to_where_north_is() {
+    let run = Scenario::load("demo")
+        .unwrap()
+        .simulate(SEED, 0)
+        .unwrap()
+        .run;
+    let mut dwell = part(&run, run.dwells(run.aiding())[0].samples.clone());
+    dwell.recording.table = None;
+    let level = run.site.earth_rate_n().y;
+    // Earth rate is within what the bias may be, so it tells no heading.
+    dwell.instrument.prior.gyro.bias_sigma.fill(100.0 * level);
+    let problem = Problem::new(&dwell, &Options::default().aiding(Aiding::Velocity));
+    let outcome = solved(&problem);
+    let sigma = outcome.estimate.sigma();
+    let [_, _, _, _, _, _, _, _, _, bias_x, bias_y, _] =
+        std::array::from_fn::<_, PER_TRIAD, _>(|k| k);
+    // Between two points of a circle the mean square is twice that of its radius, in both axes together.
+    let apart = sigma[bias_x].hypot(sigma[bias_y]) / level;
+    assert!((1.2..1.6).contains(&apart), "{apart}");
+    assert!(outcome.covariance_by_headings[(bias_x, bias_x)] > 0.0);
+}
+
+#[test]
 fn a_break_of_ten_seconds_in_a_move_costs_no_more_than_what_is_lost() {
     let Simulated {
         run, truth, terms, ..
