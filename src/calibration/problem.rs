@@ -16,7 +16,7 @@ use crate::recording::TableLog;
 use crate::run::{Aiding, Dwell, Run};
 use crate::statistics::chi_square_limit;
 
-/// 1σ of the initial velocity: a body at rest, m/s.
+/// 1σ of the initial velocity of a body at rest, m/s, beside that with which it sways.
 const INITIAL_VELOCITY: f64 = 1e-3;
 
 /// Runs of one instrument with what is to be estimated of them.
@@ -318,7 +318,7 @@ impl<'a> Stretch<'a> {
         Start {
             attitude: to_tilt_and_heading(&(prior.mean * at.transpose())),
             attitude_sigma: prior.sigma,
-            velocity_sigma: INITIAL_VELOCITY,
+            velocity_sigma: INITIAL_VELOCITY.hypot(self.stillness.accel),
             position_sigma: self.run.standstill.position_sigma,
         }
     }
