@@ -228,7 +228,7 @@ impl<'a> OneStretch<'a> {
             log_determinant: &mut sums.log_determinant,
         };
         let time = segment.end();
-        match sums.filter.stand(&segment, &mut judge) {
+        match sums.dwells.take_in(&mut sums.filter, &segment, &mut judge) {
             Taken::Whole => {}
             Taken::Abandoned => return Ok(false),
             Taken::Diverged => return Err(CalibrationError::Diverged { time }),

@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::super::local::{Given, Local, Look, Observed, Outcome, StepModel};
+use super::super::courses::{Courses, StepModel};
+use super::super::given::Given;
+use super::super::local::{Local, Observed, Outcome};
 use super::super::measurement::ScalarInnovation;
 use super::super::segment::{Seen, Segment, Standing};
 use super::Filter;
@@ -11,8 +13,8 @@ use crate::calibration::innovation::Observation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::navigation::Block;
 
-/// Rates, specific forces and angles of the table that are constant in a dwell.
-const CONSTANTS: usize = 9;
+/// Rates and specific forces that are constant in a dwell.
+const CONSTANTS: usize = 6;
 
 /// What is done with an innovation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,27 +49,25 @@ pub(in crate::calibration) enum Taken {
     Diverged,
 }
 
-/// How the states make `g`: rows of it by state, and by parameter that is tried.
-struct Map {
+/// Rows of something linear in the errors: by state, and by parameter that is tried.
+struct Rows {
     states: DMatrix<f64>,
     tried: DMatrix<f64>,
 }
 
+/// How the errors make what a filter of a part of a dwell is about.
+struct Map {
+    given: Rows,
+    /// By how much the attitude of the table is off, East, North and Up.
+    table: Rows,
+}
+
 impl Filter {
     /// Takes in a part of a dwell.
-    pub fn stand(&mut self, segment: &Segment, observer: &mut impl Observer) -> Taken {
-        let turn = self.layout.turn_at_rest().map_or(0, |_| 3);
-        match turn + self.varying.len() {
-            0 => self.stand_with::<9, 15>(segment, observer),
-            3 => self.stand_with::<12, 18>(segment, observer),
-            6 => self.stand_with::<15, 21>(segment, observer),
-            _ => self.stand_with::<18, 24>(segment, observer),
-        }
-    }
-
-    fn stand_with<const M: usize, const G: usize>(
+    pub(super) fn stand<const M: usize, const G: usize>(
         &mut self,
         segment: &Segment,
+        courses: &mut Courses<M, G>,
         observer: &mut impl Observer,
     ) -> Taken {
         let Some(first) = segment.models.first() else {
@@ -75,29 +75,38 @@ impl Filter {
         };
         let moving = self.moving();
         let map = self.map(segment, first, &moving, G);
-        let mut local = Local::<M, G>::new(self.given(&map), begins(&moving));
-        match self.through(&mut local, segment, observer, &mut |_| {}) {
+        courses.tidy();
+        let models = self.models(segment, courses);
+        let mut local = Local::new(self.given(&map.given), courses);
+        match self.through(&mut local, (segment, &models), observer, &mut |_| {}) {
             Taken::Whole => {}
             other => return other,
         }
-        self.take_in::<M>(&local.outcome(), &map, &moving);
+        self.take_in(&local.outcome(), &map, &moving);
         Taken::Whole
     }
 
-    /// A filter of a part alone through all of it; `done` is told of each thing that it does.
-    pub(super) fn through<const M: usize, const G: usize>(
+    /// Numbers of a segment's models.
+    pub(super) fn models<const M: usize, const G: usize>(
+        &self,
+        segment: &Segment,
+        courses: &mut Courses<M, G>,
+    ) -> Vec<usize> {
+        let moving = self.moving();
+        let models = segment.models.iter();
+        let numbers = models.map(|block| courses.number(self.step_model(block, &moving)));
+        numbers.collect()
+    }
+
+    /// A filter of a part alone through all of it, given the numbers of its models; `done` is told of each thing
+    /// that it does.
+    pub(super) fn through<'a, const M: usize, const G: usize>(
         &self,
         local: &mut Local<M, G>,
-        segment: &Segment,
+        (segment, models): (&'a Segment, &[usize]),
         observer: &mut impl Observer,
-        done: &mut impl FnMut(Done<M, G>),
+        done: &mut impl FnMut(Done<'a>),
     ) -> Taken {
-        let moving = self.moving();
-        let models: Vec<StepModel<M>> = segment
-            .models
-            .iter()
-            .map(|block| self.step_model(block, &moving))
-            .collect();
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
         for step in &segment.steps {
             let Standing {
@@ -113,17 +122,16 @@ impl Filter {
                     local.refer(first + axis, by[axis]);
                 }
             }
-            local.propagate(&models[*model]);
+            local.propagate(models[*model]);
             done(Done::Step(*model));
             for seen in seen {
-                let (state, minus) = match seen.kind {
-                    Observation::Velocity => (VELOCITY, None),
-                    Observation::Table => (ATTITUDE, Some(G - 3)),
-                    Observation::Attitude => (turn.unwrap_or(ATTITUDE), None),
+                let state = match seen.kind {
+                    Observation::Velocity => VELOCITY,
+                    Observation::Table => ATTITUDE,
+                    Observation::Attitude => turn.unwrap_or(ATTITUDE),
                 };
                 let observed = Observed {
                     state,
-                    minus,
                     residual: seen.residual,
                     variance: observer.variance(seen),
                 };
@@ -133,7 +141,7 @@ impl Filter {
                 let innovations = Innovations {
                     time: *time,
                     kind: seen.kind,
-                    scalars: look.scalars(),
+                    scalars: look.scalars,
                 };
                 match observer.judge(innovations) {
                     Verdict::Accepted => {
@@ -141,7 +149,7 @@ impl Filter {
                         done(Done::Observed {
                             state,
                             seen,
-                            look: &look,
+                            point: look.to,
                         });
                     }
                     Verdict::Rejected => {}
@@ -161,15 +169,16 @@ impl Filter {
     }
 
     /// `g`: what moves when it begins but for the position, which nothing in a dwell depends on; rates
-    /// and specific forces by which constants drive the errors of attitude and velocity; what the table's
-    /// attitude is less by.
+    /// and specific forces by which constants drive the errors of attitude and velocity.
+    ///
+    /// Attitude errors are those from the attitude of the table, `φ − τ`, which its readings show: what the
+    /// Earth's rate and gravity make of τ is constant, too.
     fn map(&self, segment: &Segment, block: &Block, moving: &[usize], size: usize) -> Map {
-        let mut map = Map {
-            states: DMatrix::zeros(size, self.x.len()),
-            tried: DMatrix::zeros(size, self.layout.tried()),
-        };
+        let (n, tried) = (self.x.len(), self.layout.tried());
+        let mut given = Rows::zeros(size, n, tried);
+        let table = self.table_map(segment);
         for (component, &state) in given_at_begin(moving).enumerate() {
-            map.states[(component, state)] = 1.0;
+            given.states[(component, state)] = 1.0;
         }
         let first = size - CONSTANTS;
         let phi = self.driving_columns(block);
@@ -182,7 +191,7 @@ impl Filter {
             if !varying.contains(&state) {
                 let rates = rates(block, column);
                 for (k, rate) in rates.into_iter().enumerate() {
-                    map.states[(first + k, state)] = rate;
+                    given.states[(first + k, state)] = rate;
                 }
             }
         }
@@ -190,37 +199,52 @@ impl Filter {
         for ((k, _), term) in self.layout.tried_terms().zip(&block.terms[on..]) {
             let column = std::array::from_fn(|row| term.column[row]);
             for (row, rate) in rates(block, &column).into_iter().enumerate() {
-                map.tried[(first + row, k)] = rate;
+                given.tried[(first + row, k)] = rate;
             }
         }
-        let table = size - 3;
+        for axis in 0..3 {
+            let itself = |row| f64::from(row == ATTITUDE + axis);
+            let change = |row| block.navigation[(row, ATTITUDE + axis)] - itself(row);
+            let rates = rates(block, &std::array::from_fn(change));
+            let constants = rates.into_iter().enumerate();
+            let constants = constants.map(|(k, rate)| (first + k, rate));
+            for (component, by) in constants.chain([(ATTITUDE + axis, -1.0)]) {
+                given.add_row(component, by, &table, axis);
+            }
+        }
+        Map { given, table }
+    }
+
+    /// By how much the attitude of the table is off.
+    fn table_map(&self, segment: &Segment) -> Rows {
+        let mut table = Rows::zeros(3, self.x.len(), self.layout.tried());
         let errors = self.layout.table_position().into_iter();
         for error in errors.chain(self.layout.table_base()) {
             for axis in 0..3 {
-                map.states[(table + axis, error + axis)] = 1.0;
+                table.states[(axis, error + axis)] = 1.0;
             }
         }
         let response = segment.axes.as_deref();
         for axis in 0..3 {
             if let Some(response) = response {
                 for (state, k) in self.layout.table_axes() {
-                    map.states[(table + axis, state)] = response[(axis, k)];
+                    table.states[(axis, state)] = response[(axis, k)];
                 }
             }
             for (number, index) in self.layout.tried_of_table() {
-                map.tried[(table + axis, number)] = match index.checked_sub(3) {
+                table.tried[(axis, number)] = match index.checked_sub(3) {
                     None => f64::from(index == axis),
                     Some(k) => response.map_or(0.0, |response| response[(axis, k)]),
                 };
             }
         }
-        map
+        table
     }
 
     /// What is known of `g` before.
-    fn given<const G: usize>(&self, map: &Map) -> Given<G> {
-        let mean = &map.states * &self.x;
-        let covariance = &map.states * &self.p * map.states.transpose();
+    fn given<const G: usize>(&self, rows: &Rows) -> Given<G> {
+        let mean = &rows.states * &self.x;
+        let covariance = &rows.states * &self.p * rows.states.transpose();
         Given::new(
             std::array::from_fn(|i| mean[i]),
             std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
@@ -232,7 +256,7 @@ impl Filter {
         block: &Block,
         moving: &[usize],
     ) -> StepModel<M> {
-        let given = moving.len() - 3;
+        let constants = moving.len() - 3;
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
         let biases = M - self.varying.len();
         let mut transition = Vec::new();
@@ -252,8 +276,8 @@ impl Filter {
                     1 => (0.5 * t * tilting, t * here),
                     _ => (t * t / 6.0 * tilting, 0.5 * t * t * here),
                 };
-                driven.push((row, given + axis, rate));
-                driven.push((row, given + 3 + axis, force));
+                driven.push((row, constants + axis, rate));
+                driven.push((row, constants + 3 + axis, force));
             }
         }
         for (k, (_, sensor, constant)) in self.layout.varying_biases().enumerate() {
@@ -280,7 +304,11 @@ impl Filter {
                 transition.extend(of_attitude);
                 transition.push((turn + axis, turn + axis, 1.0));
                 for column in 0..3 {
-                    driven.push((turn + axis, given + column, t * f64::from(axis == column)));
+                    driven.push((
+                        turn + axis,
+                        constants + column,
+                        t * f64::from(axis == column),
+                    ));
                 }
             }
         }
@@ -308,45 +336,81 @@ impl Filter {
         }
     }
 
-    fn take_in<const M: usize>(&mut self, outcome: &Outcome, map: &Map, moving: &[usize]) {
+    fn take_in<const M: usize, const G: usize>(
+        &mut self,
+        outcome: &Outcome<M, G>,
+        Map { given, table }: &Map,
+        moving: &[usize],
+    ) {
         for (row, value) in &outcome.measured {
-            let [states, tried] = [&map.states, &map.tried].map(|map| combined(row, map));
+            let [states, tried] = given.combined(row);
             self.take_scalar([&states, &tried], *value, 1.0);
         }
         self.mirror();
-        let n = self.x.len();
-        let mut phi = vec![[0.0; M]; n];
-        let mut added = vec![[0.0; M]; map.tried.ncols()];
+        let mut phi = vec![[0.0; M]; self.x.len()];
+        let mut added = vec![[0.0; M]; self.layout.tried()];
         for (place, row) in outcome.of_given.iter().enumerate() {
-            for (phi, weight) in phi.iter_mut().zip(combined(row, &map.states)) {
+            let [states, tried] = given.combined(row);
+            for (phi, weight) in phi.iter_mut().zip(states) {
                 phi[place] = weight;
             }
-            for (added, weight) in added.iter_mut().zip(combined(row, &map.tried)) {
+            for (added, weight) in added.iter_mut().zip(tried) {
                 added[place] = weight;
             }
         }
         for axis in 0..3 {
             phi[POSITION + axis][POSITION + axis] += 1.0;
+            for (phi, by) in phi.iter_mut().zip(table.states.row(axis).iter()) {
+                phi[ATTITUDE + axis] += by;
+            }
+            for (added, by) in added.iter_mut().zip(table.tried.row(axis).iter()) {
+                added[ATTITUDE + axis] += by;
+            }
         }
-        let noise = std::array::from_fn(|row| {
-            std::array::from_fn(|column| outcome.covariance[row][column])
-        });
-        self.carry::<M>(&phi, moving, &noise, added.into_iter().enumerate());
-        for (&state, offset) in moving.iter().zip(&outcome.offset) {
+        let added = added.into_iter().enumerate();
+        self.carry(&phi, moving, &outcome.covariance, added);
+        for (&state, offset) in moving.iter().zip(outcome.offset) {
             self.x[state] += offset;
         }
     }
 }
 
+impl Rows {
+    fn zeros(rows: usize, states: usize, tried: usize) -> Self {
+        Self {
+            states: DMatrix::zeros(rows, states),
+            tried: DMatrix::zeros(rows, tried),
+        }
+    }
+
+    /// A row becomes more by one of others.
+    fn add_row(&mut self, row: usize, weight: f64, others: &Self, other: usize) {
+        let states = others.states.row(other) * weight;
+        let tried = others.tried.row(other) * weight;
+        let mut sum = self.states.row_mut(row);
+        sum += states;
+        let mut sum = self.tried.row_mut(row);
+        sum += tried;
+    }
+
+    /// The sum of all rows with these weights.
+    fn combined(&self, weights: &[f64]) -> [Vec<f64>; 2] {
+        [&self.states, &self.tried].map(|rows| {
+            let columns = rows.as_slice().chunks_exact(weights.len());
+            columns.map(|column| times(weights, column)).collect()
+        })
+    }
+}
+
 /// What a filter of a part alone has done.
-pub(super) enum Done<'a, const M: usize, const G: usize> {
+pub(super) enum Done<'a> {
     /// It went on over a step, by this of the segment's models.
     Step(usize),
-    /// It took in what is observed of three errors from a state on.
+    /// It took in what is observed of three errors from a state on, and came to this point of its course.
     Observed {
         state: usize,
         seen: &'a Seen,
-        look: &'a Look<M, G>,
+        point: usize,
     },
 }
 
@@ -365,12 +429,6 @@ pub(super) fn begins<const M: usize>(moving: &[usize]) -> [Option<usize>; M] {
 fn given_at_begin(moving: &[usize]) -> impl Iterator<Item = &usize> {
     let position = POSITION..POSITION + 3;
     moving.iter().filter(move |state| !position.contains(state))
-}
-
-/// A row of `g` by state or parameter.
-fn combined(row: &[f64], map: &DMatrix<f64>) -> Vec<f64> {
-    let columns = map.as_slice().chunks_exact(row.len());
-    columns.map(|column| times(row, column)).collect()
 }
 
 /// Rate in rad/s and specific force in m/s² that make this of a block at rest.

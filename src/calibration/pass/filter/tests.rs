@@ -366,7 +366,9 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
             scalars: Vec::new(),
         };
         let mut other = filter.clone();
-        assert_eq!(filter.stand(&segment, &mut open), Taken::Whole);
+        let mut dwells = Dwells::of(&filter);
+        let taken = dwells.take_in(&mut filter, &segment, &mut open);
+        assert_eq!(taken, Taken::Whole);
         let scalars = other.step_by_step(&segment, &open);
         assert_eq!(scalars.len(), open.scalars.len());
         for (one, other) in open.scalars.iter().zip(&scalars) {
