@@ -291,10 +291,9 @@ impl Back<'_> {
             let effects = self.followed.back(operation);
             match operation {
                 Operation::Carried { .. } => at_end = effects,
-                _ => of_measured.extend(effects),
+                _ => of_measured = effects,
             }
         }
-        of_measured.reverse();
         (at_end, of_measured)
     }
 }

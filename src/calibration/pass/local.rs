@@ -8,7 +8,7 @@
 //! of all states with its steps in another order (Friedland 1969, "Treatment of bias in recursive
 //! filtering", IEEE Trans. Automatic Control 14(4)).
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::courses::{Courses, Gain};
 use super::given::{Given, Unexpected};
@@ -48,13 +48,15 @@ pub(super) struct Look<const G: usize> {
 }
 
 /// What a part of a dwell comes to.
-pub(super) struct Outcome<const M: usize, const G: usize> {
-    /// Rows of `g`, each with what it measures, of σ 1.
-    pub measured: Vec<([f64; G], f64)>,
+pub(super) struct Outcome {
+    /// Rows of `g` …
+    pub measured: DMatrix<f64>,
+    /// … and what each measures, of σ 1.
+    pub values: DVector<f64>,
     /// Navigation errors at the end: rows of `g`, offset, covariance.
-    pub of_given: [[f64; G]; M],
-    pub offset: [f64; M],
-    pub covariance: [[f64; M]; M],
+    pub of_given: DMatrix<f64>,
+    pub offset: DVector<f64>,
+    pub covariance: DMatrix<f64>,
 }
 
 impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
@@ -125,14 +127,20 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         rows.map(|(pivot, row, _)| (pivot, row)).collect()
     }
 
-    pub fn outcome(self) -> Outcome<M, G> {
+    pub fn outcome(self) -> Outcome {
         let known = &self.courses.point(self.at).known;
         let rows = factor(known.information, self.vector);
+        let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         Outcome {
-            measured: rows.map(|(_, row, value)| (row, value)).collect(),
-            of_given: known.of_given,
-            offset: self.mean,
-            covariance: known.covariance,
+            measured: matrix(&rows),
+            values: values.into(),
+            of_given: matrix(&known.of_given),
+            offset: DVector::from_column_slice(&self.mean),
+            covariance: matrix(&known.covariance),
         }
     }
+}
+
+fn matrix<const N: usize>(rows: &[[f64; N]]) -> DMatrix<f64> {
+    DMatrix::from_row_slice(rows.len(), N, rows.as_flattened())
 }

@@ -42,7 +42,7 @@ impl Followed {
     }
 
     /// Follows back one operation; returns what its noise, of unit variance each, does: one effect for
-    /// what is drawn or taken, the effects of the moving states for what is carried.
+    /// what is drawn, one of each scalar that is taken, the effects of the moving states for what is carried.
     pub fn back(&mut self, operation: &Operation) -> Vec<Effect> {
         match operation {
             Operation::Drawn { states, sigma } => {
@@ -73,20 +73,28 @@ impl Followed {
                 vec![effect]
             }
             Operation::Taken {
-                row,
+                rows,
                 gain,
                 variance,
             } => {
-                let mut of_noise = [0.0; PARAMETERS];
-                for (of_state, gain) in self.of_states.iter().zip(gain) {
-                    add(&mut of_noise, -gain, of_state);
-                }
-                for (of_state, weight) in self.of_states.iter_mut().zip(row) {
-                    if *weight != 0.0 {
-                        add(of_state, *weight, &of_noise);
+                let of_scalars = gain.column_iter().map(|gain| {
+                    let mut of_noise = [0.0; PARAMETERS];
+                    for (of_state, gain) in self.of_states.iter().zip(gain.iter()) {
+                        add(&mut of_noise, -gain, of_state);
+                    }
+                    of_noise
+                });
+                let of_scalars: Vec<Effect> = of_scalars.collect();
+                for (of_noise, row) in of_scalars.iter().zip(rows.row_iter()) {
+                    for (of_state, weight) in self.of_states.iter_mut().zip(row.iter()) {
+                        if *weight != 0.0 {
+                            add(of_state, *weight, of_noise);
+                        }
                     }
                 }
-                vec![of_noise.map(|x| x * variance.sqrt())]
+                let sigma = variance.sqrt();
+                let effects = of_scalars.iter().map(|effect| effect.map(|x| x * sigma));
+                effects.collect()
             }
             Operation::Carried { moving, transition } => {
                 let out = self.taken_out(moving);

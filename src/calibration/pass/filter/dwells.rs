@@ -8,7 +8,10 @@ use super::operation::Driver;
 use super::standing::{Observer, Taken, begins};
 
 /// Takes parts of dwells into filters of one kind: what moves in them is always the same.
-pub(in crate::calibration) enum Dwells {
+pub(in crate::calibration) struct Dwells(Moving);
+
+/// What moves.
+enum Moving {
     /// Navigation errors alone.
     Navigation(Courses<9, 12>),
     /// And the turn at rest, or the biases of a triad.
@@ -23,12 +26,12 @@ impl Dwells {
     /// Of filters like this.
     pub fn of(filter: &Filter) -> Self {
         let moving = filter.moving();
-        match moving.len() {
-            9 => Self::Navigation(Courses::new(begins(&moving))),
-            12 => Self::Three(Courses::new(begins(&moving))),
-            15 => Self::Six(Courses::new(begins(&moving))),
-            _ => Self::Nine(Courses::new(begins(&moving))),
-        }
+        Self(match moving.len() {
+            9 => Moving::Navigation(Courses::new(begins(&moving))),
+            12 => Moving::Three(Courses::new(begins(&moving))),
+            15 => Moving::Six(Courses::new(begins(&moving))),
+            _ => Moving::Nine(Courses::new(begins(&moving))),
+        })
     }
 
     /// Takes in a part of a dwell.
@@ -38,11 +41,11 @@ impl Dwells {
         segment: &Segment,
         observer: &mut impl Observer,
     ) -> Taken {
-        match self {
-            Self::Navigation(courses) => filter.stand(segment, courses, observer),
-            Self::Three(courses) => filter.stand(segment, courses, observer),
-            Self::Six(courses) => filter.stand(segment, courses, observer),
-            Self::Nine(courses) => filter.stand(segment, courses, observer),
+        match &mut self.0 {
+            Moving::Navigation(courses) => filter.stand(segment, courses, observer),
+            Moving::Three(courses) => filter.stand(segment, courses, observer),
+            Moving::Six(courses) => filter.stand(segment, courses, observer),
+            Moving::Nine(courses) => filter.stand(segment, courses, observer),
         }
     }
 
@@ -56,17 +59,17 @@ impl Dwells {
         effects: [&[Effect]; 2],
         told: &mut impl Told,
     ) -> Taken {
-        match self {
-            Self::Navigation(courses) => {
+        match &mut self.0 {
+            Moving::Navigation(courses) => {
                 filter.back_through(segment, courses, observer, drivers, effects, told)
             }
-            Self::Three(courses) => {
+            Moving::Three(courses) => {
                 filter.back_through(segment, courses, observer, drivers, effects, told)
             }
-            Self::Six(courses) => {
+            Moving::Six(courses) => {
                 filter.back_through(segment, courses, observer, drivers, effects, told)
             }
-            Self::Nine(courses) => {
+            Moving::Nine(courses) => {
                 filter.back_through(segment, courses, observer, drivers, effects, told)
             }
         }

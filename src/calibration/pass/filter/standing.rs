@@ -1,14 +1,12 @@
 //! A part of a dwell at once.
 
-use nalgebra::DMatrix;
-
 use super::super::courses::{Courses, StepModel};
 use super::super::given::Given;
 use super::super::local::{Local, Observed, Outcome};
 use super::super::measurement::ScalarInnovation;
 use super::super::segment::{Seen, Segment, Standing};
 use super::Filter;
-use super::update::times;
+use super::update::Linear;
 use crate::calibration::innovation::Observation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::navigation::Block;
@@ -49,17 +47,11 @@ pub(in crate::calibration) enum Taken {
     Diverged,
 }
 
-/// Rows of something linear in the errors: by state, and by parameter that is tried.
-struct Rows {
-    states: DMatrix<f64>,
-    tried: DMatrix<f64>,
-}
-
 /// How the errors make what a filter of a part of a dwell is about.
 struct Map {
-    given: Rows,
+    given: Linear,
     /// By how much the attitude of the table is off, East, North and Up.
-    table: Rows,
+    table: Linear,
 }
 
 impl Filter {
@@ -174,8 +166,7 @@ impl Filter {
     /// Attitude errors are those from the attitude of the table, `φ − τ`, which its readings show: what the
     /// Earth's rate and gravity make of τ is constant, too.
     fn map(&self, segment: &Segment, block: &Block, moving: &[usize], size: usize) -> Map {
-        let (n, tried) = (self.x.len(), self.layout.tried());
-        let mut given = Rows::zeros(size, n, tried);
+        let mut given = Linear::zeros(size, self);
         let table = self.table_map(segment);
         for (component, &state) in given_at_begin(moving).enumerate() {
             given.states[(component, state)] = 1.0;
@@ -216,8 +207,8 @@ impl Filter {
     }
 
     /// By how much the attitude of the table is off.
-    fn table_map(&self, segment: &Segment) -> Rows {
-        let mut table = Rows::zeros(3, self.x.len(), self.layout.tried());
+    fn table_map(&self, segment: &Segment) -> Linear {
+        let mut table = Linear::zeros(3, self);
         let errors = self.layout.table_position().into_iter();
         for error in errors.chain(self.layout.table_base()) {
             for axis in 0..3 {
@@ -242,7 +233,7 @@ impl Filter {
     }
 
     /// What is known of `g` before.
-    fn given<const G: usize>(&self, rows: &Rows) -> Given<G> {
+    fn given<const G: usize>(&self, rows: &Linear) -> Given<G> {
         let mean = &rows.states * &self.x;
         let covariance = &rows.states * &self.p * rows.states.transpose();
         Given::new(
@@ -336,69 +327,21 @@ impl Filter {
         }
     }
 
-    fn take_in<const M: usize, const G: usize>(
-        &mut self,
-        outcome: &Outcome<M, G>,
-        Map { given, table }: &Map,
-        moving: &[usize],
-    ) {
-        for (row, value) in &outcome.measured {
-            let [states, tried] = given.combined(row);
-            self.take_scalar([&states, &tried], *value, 1.0);
+    fn take_in(&mut self, outcome: &Outcome, Map { given, table }: &Map, moving: &[usize]) {
+        if !outcome.values.is_empty() {
+            let measured = given.combined(&outcome.measured);
+            self.take(&measured, &outcome.values, 1.0);
         }
-        self.mirror();
-        let mut phi = vec![[0.0; M]; self.x.len()];
-        let mut added = vec![[0.0; M]; self.layout.tried()];
-        for (place, row) in outcome.of_given.iter().enumerate() {
-            let [states, tried] = given.combined(row);
-            for (phi, weight) in phi.iter_mut().zip(states) {
-                phi[place] = weight;
-            }
-            for (added, weight) in added.iter_mut().zip(tried) {
-                added[place] = weight;
-            }
-        }
+        let mut end = given.combined(&outcome.of_given);
         for axis in 0..3 {
-            phi[POSITION + axis][POSITION + axis] += 1.0;
-            for (phi, by) in phi.iter_mut().zip(table.states.row(axis).iter()) {
-                phi[ATTITUDE + axis] += by;
-            }
-            for (added, by) in added.iter_mut().zip(table.tried.row(axis).iter()) {
-                added[ATTITUDE + axis] += by;
-            }
+            end.add_row(ATTITUDE + axis, 1.0, table, axis);
+            end.states[(POSITION + axis, POSITION + axis)] += 1.0;
         }
-        let added = added.into_iter().enumerate();
-        self.carry(&phi, moving, &outcome.covariance, added);
-        for (&state, offset) in moving.iter().zip(outcome.offset) {
+        let added = end.tried.transpose();
+        self.carry(moving, end.states, &outcome.covariance, &added);
+        for (&state, offset) in moving.iter().zip(outcome.offset.iter()) {
             self.x[state] += offset;
         }
-    }
-}
-
-impl Rows {
-    fn zeros(rows: usize, states: usize, tried: usize) -> Self {
-        Self {
-            states: DMatrix::zeros(rows, states),
-            tried: DMatrix::zeros(rows, tried),
-        }
-    }
-
-    /// A row becomes more by one of others.
-    fn add_row(&mut self, row: usize, weight: f64, others: &Self, other: usize) {
-        let states = others.states.row(other) * weight;
-        let tried = others.tried.row(other) * weight;
-        let mut sum = self.states.row_mut(row);
-        sum += states;
-        let mut sum = self.tried.row_mut(row);
-        sum += tried;
-    }
-
-    /// The sum of all rows with these weights.
-    fn combined(&self, weights: &[f64]) -> [Vec<f64>; 2] {
-        [&self.states, &self.tried].map(|rows| {
-            let columns = rows.as_slice().chunks_exact(weights.len());
-            columns.map(|column| times(weights, column)).collect()
-        })
     }
 }
 

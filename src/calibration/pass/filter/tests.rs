@@ -298,16 +298,20 @@ impl Filter {
                         let errors = errors.chain(self.layout.table_base());
                         row.extend(errors.map(|first| (first + axis, -1.0)));
                     }
-                    let mut h = vec![0.0; self.x.len()];
+                    let mut h = DVector::zeros(self.x.len());
                     row.iter().for_each(|&(state, weight)| h[state] = weight);
-                    let ph = &self.p * DVector::from_column_slice(&h);
+                    let ph = &self.p * &h;
                     let z = seen.residual[axis];
                     scalars.push(ScalarInnovation {
-                        innovation: z - update::times(&h, self.x.as_slice()),
-                        variance: update::times(&h, ph.as_slice()) + open.variance(seen),
+                        innovation: z - h.dot(&self.x),
+                        variance: h.dot(&ph) + open.variance(seen),
                     });
-                    self.take_scalar([&h, &[]], z, open.variance(seen));
-                    self.mirror();
+                    let row = Linear {
+                        states: DMatrix::from_row_slice(1, h.len(), h.as_slice()),
+                        tried: DMatrix::zeros(1, 0),
+                    };
+                    let value = DVector::from_element(1, z);
+                    self.take(&row, &value, open.variance(seen));
                 }
             }
         }
