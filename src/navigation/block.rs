@@ -74,8 +74,9 @@ impl CorrectedResponse {
         Self(triad.response().map(|w| correction * w))
     }
 
-    /// Of each parameter the weights of the columns of `C_b_n b_k`, one `b_k` after the other.
+    /// Of each parameter the weights of `C_b_n b_k`, for each column of `C_b_n` one `b_k` after the other.
     pub(super) fn columns(&self) -> [SVector<f64, 12>; PER_TRIAD] {
-        self.0.map(|w| SVector::from_column_slice(w.as_slice()))
+        self.0
+            .map(|w| SVector::from_column_slice(w.transpose().as_slice()))
     }
 }

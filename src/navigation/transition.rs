@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, Vector3};
 
-use super::block::NAVIGATION;
+use super::block::{BlockMatrix, NAVIGATION};
 use super::vectors::Vectors;
 
 /// Attitude, velocity and position errors, a column of each cause.
@@ -61,5 +61,31 @@ impl<const N: usize> Errors<N> {
                 .copy_from(&of_kind.times(weights));
         }
         sum
+    }
+}
+
+impl Errors<NAVIGATION> {
+    /// `self += matrix`
+    pub fn add(&mut self, matrix: &BlockMatrix) {
+        let kinds = [&mut self.attitude, &mut self.velocity, &mut self.position];
+        for (kind, of_kind) in kinds.into_iter().enumerate() {
+            for (axis, row) in of_kind.0.iter_mut().enumerate() {
+                for (column, sum) in row.iter_mut().enumerate() {
+                    *sum += matrix[(3 * kind + axis, column)];
+                }
+            }
+        }
+    }
+
+    pub fn transposed(&self) -> Self {
+        let from = [&self.attitude, &self.velocity, &self.position];
+        let of = |kind: usize| {
+            Vectors::from_fn(|row, column| from[column / 3].0[column % 3][3 * kind + row])
+        };
+        Self {
+            attitude: of(0),
+            velocity: of(1),
+            position: of(2),
+        }
     }
 }

@@ -73,11 +73,14 @@ impl<const G: usize> Given<G> {
         let (mut gaining, mut shrinking) = (*by_root, *by_root);
         whiten(root, &mut gaining);
         whiten(&(root + Matrix3::identity()), &mut shrinking);
+        let mut gain = [0.0; 3];
         for (mean, of_component) in self.mean.iter_mut().zip(&mut self.root) {
-            let gain = gaining.each_ref().map(|row| dot(row, of_component));
-            for k in 0..3 {
-                *mean += gain[k] * whitened[k];
-                add(of_component, -gain[k], &shrinking[k]);
+            for (row, gaining) in gaining.iter().enumerate() {
+                gain[row] = dot(gaining, of_component);
+                *mean += gain[row] * whitened[row];
+            }
+            for (gain, shrinking) in gain.iter().zip(&shrinking) {
+                add(of_component, -gain, shrinking);
             }
         }
     }

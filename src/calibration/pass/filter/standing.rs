@@ -1,5 +1,7 @@
 //! A part of a dwell at once.
 
+use nalgebra::DMatrix;
+
 use super::super::courses::{Courses, StepModel};
 use super::super::given::Given;
 use super::super::local::{Local, Observed, Outcome};
@@ -69,12 +71,19 @@ impl Filter {
         let map = self.map(segment, first, &moving, G);
         courses.tidy();
         let models = self.models(segment, courses);
-        let mut local = Local::new(self.given(&map.given), courses);
+        let across = &map.given.states * &self.p;
+        let mut local = Local::new(self.given(&map.given, &across), courses);
         match self.through(&mut local, (segment, &models), observer, &mut |_| {}) {
             Taken::Whole => {}
             other => return other,
         }
-        self.take_in(&local.outcome(), &map, &moving);
+        let outcome = local.outcome();
+        if !outcome.values.is_empty() {
+            let measured = map.given.combined(&outcome.measured);
+            let across = &outcome.measured * across;
+            self.take((&measured, across), &outcome.values, 1.0);
+        }
+        self.end(&outcome, &map, &moving);
         Taken::Whole
     }
 
@@ -232,10 +241,10 @@ impl Filter {
         table
     }
 
-    /// What is known of `g` before.
-    fn given<const G: usize>(&self, rows: &Linear) -> Given<G> {
+    /// What is known of `g` before, given its covariance with all states.
+    fn given<const G: usize>(&self, rows: &Linear, across: &DMatrix<f64>) -> Given<G> {
         let mean = &rows.states * &self.x;
-        let covariance = &rows.states * &self.p * rows.states.transpose();
+        let covariance = across * rows.states.transpose();
         Given::new(
             std::array::from_fn(|i| mean[i]),
             std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
@@ -327,11 +336,8 @@ impl Filter {
         }
     }
 
-    fn take_in(&mut self, outcome: &Outcome, Map { given, table }: &Map, moving: &[usize]) {
-        if !outcome.values.is_empty() {
-            let measured = given.combined(&outcome.measured);
-            self.take(&measured, &outcome.values, 1.0);
-        }
+    /// The states that move become what they are at the end of a part.
+    fn end(&mut self, outcome: &Outcome, Map { given, table }: &Map, moving: &[usize]) {
         let mut end = given.combined(&outcome.of_given);
         for axis in 0..3 {
             end.add_row(ATTITUDE + axis, 1.0, table, axis);

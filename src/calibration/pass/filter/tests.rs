@@ -311,7 +311,8 @@ impl Filter {
                         tried: DMatrix::zeros(1, 0),
                     };
                     let value = DVector::from_element(1, z);
-                    self.take(&row, &value, open.variance(seen));
+                    let across = &row.states * &self.p;
+                    self.take((&row, across), &value, open.variance(seen));
                 }
             }
         }

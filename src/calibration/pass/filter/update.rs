@@ -50,14 +50,19 @@ impl Filter {
             }
         }
         let z = DVector::from_column_slice(measurement.residual.as_slice());
-        self.take(&h, &z, measurement.variance);
+        let across = &h.states * &self.p;
+        self.take((&h, across), &z, measurement.variance);
     }
 
-    /// Takes in measurements `z = H x + v`, v white of variance R each, in Joseph's form, which
+    /// Takes in measurements `z = H x + v`, v white of variance R each, given H and H P, in Joseph's form, which
     /// keeps the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
     /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
-    pub(super) fn take(&mut self, h: &Linear, z: &DVector<f64>, variance: f64) {
-        let across = &h.states * &self.p;
+    pub(super) fn take(
+        &mut self,
+        (h, across): (&Linear, DMatrix<f64>),
+        z: &DVector<f64>,
+        variance: f64,
+    ) {
         let mut innovation = &across * h.states.transpose();
         (0..z.len()).for_each(|k| innovation[(k, k)] += variance);
         let Some(root) = innovation.cholesky() else {
