@@ -26,18 +26,24 @@ pub(super) struct Transition {
 impl Transition {
     /// Takes errors over the samples: the Earth turns them, force acts on tilt, velocity moves position.
     pub fn carry<const N: usize>(&self, errors: &mut Errors<N>) {
-        let before = *errors;
-        let mut by_force = Vectors::default();
-        by_force.add_cross(&self.force, &before.attitude);
-        errors
-            .attitude
-            .add_cross(&-self.earth_turn, &before.attitude);
-        errors.velocity.add(1.0, &by_force);
-        errors
-            .velocity
-            .add_cross(&(self.earth_turn * -2.0), &before.velocity);
-        errors.position.add(0.5 * self.duration, &by_force);
-        errors.position.add(self.duration, &before.velocity);
+        let Errors {
+            attitude: Vectors(attitude),
+            velocity: Vectors(velocity),
+            position: Vectors(position),
+        } = errors;
+        for column in 0..N {
+            let of = |kind: &[[f64; N]; 3]| Vector3::from_fn(|row, _| kind[row][column]);
+            let (tilt, drift) = (of(attitude), of(velocity));
+            let by_force = self.force.cross(&tilt);
+            let turned = self.earth_turn.cross(&tilt);
+            let more = by_force - self.earth_turn.cross(&drift) * 2.0;
+            let moved = (by_force * 0.5 + drift) * self.duration;
+            for row in 0..3 {
+                attitude[row][column] -= turned[row];
+                velocity[row][column] += more[row];
+                position[row][column] += moved[row];
+            }
+        }
     }
 }
 

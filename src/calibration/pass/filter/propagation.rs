@@ -106,7 +106,7 @@ impl Filter {
             Some(turned) => of_turned(turned.by_parameters.column(index).as_slice(), row),
             None => of_parameter(index)[row],
         };
-        let mut columns: Vec<[f64; NAVIGATION]> = Vec::new();
+        let mut columns: Vec<[f64; NAVIGATION]> = Vec::with_capacity(self.x.len());
         let mut add = |column: &dyn Fn(usize) -> f64| columns.push(std::array::from_fn(column));
         for column in block.navigation.column_iter() {
             add(&|row| column[row]);

@@ -202,16 +202,18 @@ impl Filter {
                 given.tried[(first + row, k)] = rate;
             }
         }
+        // What the table's attitude does to `g`.
+        let mut shift = DMatrix::zeros(size, 3);
         for axis in 0..3 {
             let itself = |row| f64::from(row == ATTITUDE + axis);
             let change = |row| block.navigation[(row, ATTITUDE + axis)] - itself(row);
             let rates = rates(block, &std::array::from_fn(change));
-            let constants = rates.into_iter().enumerate();
-            let constants = constants.map(|(k, rate)| (first + k, rate));
-            for (component, by) in constants.chain([(ATTITUDE + axis, -1.0)]) {
-                given.add_row(component, by, &table, axis);
+            for (k, rate) in rates.into_iter().enumerate() {
+                shift[(first + k, axis)] = rate;
             }
+            shift[(ATTITUDE + axis, axis)] = -1.0;
         }
+        given.add(0, &table.combined(&shift));
         Map { given, table }
     }
 
@@ -339,8 +341,8 @@ impl Filter {
     /// The states that move become what they are at the end of a part.
     fn end(&mut self, outcome: &Outcome, Map { given, table }: &Map, moving: &[usize]) {
         let mut end = given.combined(&outcome.of_given);
+        end.add(ATTITUDE, table);
         for axis in 0..3 {
-            end.add_row(ATTITUDE + axis, 1.0, table, axis);
             end.states[(POSITION + axis, POSITION + axis)] += 1.0;
         }
         let added = end.tried.transpose();

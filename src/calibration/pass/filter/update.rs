@@ -29,14 +29,13 @@ impl Linear {
         }
     }
 
-    /// A row becomes more by one of others.
-    pub fn add_row(&mut self, row: usize, weight: f64, others: &Self, other: usize) {
-        let states = others.states.row(other) * weight;
-        let tried = others.tried.row(other) * weight;
-        let mut sum = self.states.row_mut(row);
-        sum += states;
-        let mut sum = self.tried.row_mut(row);
-        sum += tried;
+    /// The rows from a first on become more by others.
+    pub fn add(&mut self, first: usize, others: &Self) {
+        let count = others.states.nrows();
+        let mut rows = self.states.rows_mut(first, count);
+        rows += &others.states;
+        let mut rows = self.tried.rows_mut(first, count);
+        rows += &others.tried;
     }
 }
 
