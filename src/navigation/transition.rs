@@ -32,7 +32,7 @@ impl Transition {
             position: Vectors(position),
         } = errors;
         for column in 0..N {
-            let of = |kind: &[[f64; N]; 3]| Vector3::from_fn(|row, _| kind[row][column]);
+            let of = |[x, y, z]: &[[f64; N]; 3]| Vector3::new(x[column], y[column], z[column]);
             let (tilt, drift) = (of(attitude), of(velocity));
             let by_force = self.force.cross(&tilt);
             let turned = self.earth_turn.cross(&tilt);

@@ -57,20 +57,18 @@ impl Sensitivity {
         self.of_states.column_mut(state).copy_from(&sum);
     }
 
-    /// Measurements H are taken in by a gain: the root of their innovations' covariance, lower triangular, and the
-    /// innovations whitened by it.
+    /// Measurements H are taken in by a gain: what whitens their innovations, and the whitened innovations.
     pub(super) fn update(
         &mut self,
         h: &Linear,
         gain: &DMatrix<f64>,
-        (root, whitened): (&DMatrix<f64>, &DVector<f64>),
+        (whiten, whitened): (&DMatrix<f64>, &DVector<f64>),
     ) {
-        let mut sensed = &h.states * self.of_states.transpose() + &h.tried;
+        let sensed = &h.states * self.of_states.transpose() + &h.tried;
         self.of_states
             .gemm(-1.0, &sensed.transpose(), &gain.transpose(), 1.0);
-        root.solve_lower_triangular_mut(&mut sensed);
         let last = sensed.ncols();
-        let mut rows = sensed.insert_column(last, 0.0);
+        let mut rows = (whiten * sensed).insert_column(last, 0.0);
         rows.set_column(last, whitened);
         self.sum.gemm(1.0, &rows.transpose(), &rows, 1.0);
     }

@@ -69,16 +69,12 @@ impl Filter {
             self.x.fill(f64::NAN);
             return;
         };
-        // P Hᵀ L⁻ᵀ, and K = P Hᵀ L⁻ᵀ L⁻¹.
-        let root = root.unpack();
-        let mut whitened = z - &h.states * &self.x;
-        let mut by_whitened = across;
-        let solvable = root.solve_lower_triangular_mut(&mut whitened)
-            && root.solve_lower_triangular_mut(&mut by_whitened);
-        debug_assert!(solvable, "a root of what is positive definite");
-        let mut gain = by_whitened.clone();
-        root.tr_solve_lower_triangular_mut(&mut gain);
-        let [by_whitened, gain] = [by_whitened, gain].map(|m| m.transpose());
+        // L⁻¹ of the innovations' covariance L Lᵀ, P Hᵀ L⁻ᵀ, and K = P Hᵀ L⁻ᵀ L⁻¹.
+        let mut whiten = DMatrix::identity(z.len(), z.len());
+        root.l_dirty().solve_lower_triangular_mut(&mut whiten);
+        let whitened = &whiten * (z - &h.states * &self.x);
+        let by_whitened = across.transpose() * whiten.transpose();
+        let gain = &by_whitened * &whiten;
         self.x.gemv(1.0, &by_whitened, &whitened, 1.0);
         // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ.
         self.p
@@ -88,7 +84,7 @@ impl Filter {
         self.p.gemm(1.0, &rest, &gain.transpose(), 1.0);
         self.p.fill_lower_triangle_with_upper_triangle();
         if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.update(h, &gain, (&root, &whitened));
+            sensitivity.update(h, &gain, (&whiten, &whitened));
         }
         if let Some(tape) = &mut self.tape {
             tape.push(Operation::Taken {
