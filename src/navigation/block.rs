@@ -67,7 +67,7 @@ pub struct TermColumn {
 
 /// `(K̂Ĉ)⁻¹ W_p` for every parameter: the error of the computed input is this times `[u; 1]`.
 #[derive(Debug, Clone)]
-pub(super) struct CorrectedResponse([SMatrix<f64, 3, 4>; PER_TRIAD]);
+pub(super) struct CorrectedResponse(pub [SMatrix<f64, 3, 4>; PER_TRIAD]);
 
 impl CorrectedResponse {
     pub(super) fn new(triad: &Triad, correction: &Matrix3<f64>) -> Self {

@@ -65,8 +65,8 @@ pub(super) struct Known<const M: usize, const G: usize> {
     pub information: [[f64; G]; G],
 }
 
-/// So many points are kept at most: some ten courses.
-const MOST: usize = 1024;
+/// So many points are kept before a part begins: those of a few courses, some megabytes.
+const MOST: usize = 512;
 
 impl<const M: usize, const G: usize> Courses<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.

@@ -1,5 +1,6 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
+mod at_rest;
 mod back;
 mod dwells;
 mod operation;

@@ -3,9 +3,10 @@
 use super::super::courses::Courses;
 use super::super::segment::Segment;
 use super::Filter;
+use super::at_rest::begins;
 use super::back::{Effect, Told};
 use super::operation::Driver;
-use super::standing::{Observer, Taken, begins};
+use super::standing::{Observer, Taken};
 
 /// Takes parts of dwells into filters of one kind: what moves in them is always the same.
 pub(in crate::calibration) struct Dwells(Moving);
