@@ -67,15 +67,16 @@ pub struct TermColumn {
 
 /// `(K̂Ĉ)⁻¹ W_p` for every parameter: the error of the computed input is this times `[u; 1]`.
 #[derive(Debug, Clone)]
-pub(super) struct CorrectedResponse([SMatrix<f64, 3, 4>; PER_TRIAD]);
+pub(super) struct CorrectedResponse(pub [SMatrix<f64, 3, 4>; PER_TRIAD]);
 
 impl CorrectedResponse {
     pub(super) fn new(triad: &Triad, correction: &Matrix3<f64>) -> Self {
         Self(triad.response().map(|w| correction * w))
     }
 
-    /// Of each parameter the weights of the columns of `C_b_n b_k`, one `b_k` after the other.
+    /// Of each parameter the weights of `C_b_n b_k`, for each column of `C_b_n` one `b_k` after the other.
     pub(super) fn columns(&self) -> [SVector<f64, 12>; PER_TRIAD] {
-        self.0.map(|w| SVector::from_column_slice(w.as_slice()))
+        self.0
+            .map(|w| SVector::from_column_slice(w.transpose().as_slice()))
     }
 }

@@ -4,19 +4,20 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::increments::Increments;
 use super::vectors::Vectors;
+use crate::attitude::skew;
 use crate::imu::{PerSensor, Sensor, Term, TermResponse};
 
 /// Integrals over a short stretch of samples from which its error model follows.
 ///
 /// The output of a triad is linear in `b = [u; 1]` (see [`crate::imu::Triad::response`]), so the integrals
-/// of `C_b_n b_k`, columns of `C_b_n` one `b_k` after the other, hold the derivative with respect to every
+/// of `C_b_n b_k`, for each column of `C_b_n` one `b_k` after the other, hold the derivative with respect to every
 /// parameter of any installation form.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Moments {
     /// ∫C_b_n b_k dt with the gyros' input in b.
     pub gyro: Vectors<12>,
-    /// ∫[f_n×] (∫C_b_n b_k dt) dt: what tilts from the gyros make of specific force.
-    pub tilt: Vectors<12>,
+    /// ∫[(∫f_n dt)×] C_b_n b_k dt with the gyros' input in b.
+    forced: Vectors<12>,
     /// ∫C_b_n b_k dt with the accelerometers' input in b.
     pub accel: Vectors<12>,
     /// ∫f_n dt.
@@ -68,14 +69,13 @@ impl Moments {
         period: f64,
     ) {
         let Increments { angle, velocity } = increments;
-        let step = Vectors::outer(attitude, [angle.x, angle.y, angle.z, period]);
+        let input = [angle.x, angle.y, angle.z, period];
+        self.gyro.add_outer(attitude, &input);
         // The tilt at the middle of the sample acts on the force of the whole sample.
-        let mut middle = self.gyro;
-        middle.add(0.5, &step);
-        self.tilt.add_cross(force, &middle);
-        self.gyro.add(1.0, &step);
-        let step = Vectors::outer(attitude, [velocity.x, velocity.y, velocity.z, period]);
-        self.accel.add(1.0, &step);
+        let so_far = skew(self.force + force * 0.5);
+        self.forced.add_outer(&(so_far * attitude), &input);
+        let input = [velocity.x, velocity.y, velocity.z, period];
+        self.accel.add_outer(attitude, &input);
         self.force += force;
         self.duration += period;
     }
@@ -89,20 +89,30 @@ impl Moments {
     ) -> Self {
         let integrals = |in_n: &Vector3<f64>| {
             let u = attitude.tr_mul(in_n) * duration;
-            Vectors::outer(attitude, [u.x, u.y, u.z, duration])
+            let mut integrals = Vectors::default();
+            integrals.add_outer(attitude, &[u.x, u.y, u.z, duration]);
+            integrals
         };
         let gyro = integrals(rate);
-        let mut tilt = Vectors::default();
+        let mut forced = Vectors::default();
         // A tilt that grows evenly acts on the force for half the time.
-        tilt.add_cross(&(force * (0.5 * duration)), &gyro);
+        forced.add_cross(&(force * (0.5 * duration)), &gyro);
         Self {
-            tilt,
+            forced,
             gyro,
             accel: integrals(force),
             force: force * duration,
             duration,
             ..Self::default()
         }
+    }
+
+    /// ∫[f_n×] (∫C_b_n b_k dt) dt: what tilts from the gyros make of specific force, by parts.
+    pub fn tilt(&self) -> Vectors<12> {
+        let mut tilt = Vectors::default();
+        tilt.add_cross(&self.force, &self.gyro);
+        tilt.add(-1.0, &self.forced);
+        tilt
     }
 
     /// Adds the motion of a sample of a move: the turn over that of the Earth, rad, and the change of

@@ -60,9 +60,10 @@ impl Passage {
         let PerSensor { gyro, accel } = &mut self.inputs;
         over.carry(gyro);
         gyro.attitude.add(-1.0, &moments.gyro);
-        gyro.velocity.add(-1.0, &moments.tilt);
+        let tilt = moments.tilt();
+        gyro.velocity.add(-1.0, &tilt);
         // A tilt that grows with time moves velocity with t² and position with t³.
-        gyro.position.add(-t / 3.0, &moments.tilt);
+        gyro.position.add(-t / 3.0, &tilt);
         over.carry(accel);
         accel.velocity.add(1.0, &moments.accel);
         accel.position.add(0.5 * t, &moments.accel);

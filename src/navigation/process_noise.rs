@@ -2,9 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::block::{BlockMatrix, NAVIGATION};
+use super::block::BlockMatrix;
 use super::transition::{Errors, Transition};
-use super::vectors::Vectors;
 use crate::attitude::skew;
 use crate::imu::PerSensor;
 
@@ -65,17 +64,17 @@ impl NoiseInputs {
     /// Covariance that noise of these densities adds to the navigation errors at the end. Linear in the
     /// squares of the densities.
     pub fn covariance(&self, noise: &PerSensor<ProcessNoise>) -> BlockMatrix {
-        let mut parts = self.parts.iter();
-        let first = parts.next().map(|part| part.covariance(noise));
-        let mut covariance = first.unwrap_or_default();
-        for part in parts {
-            // Φ (Φ Pᵀ)ᵀ with a symmetric P.
-            for _ in 0..2 {
-                covariance = part.carried(&self.earth_rate, &covariance.transpose());
+        let mut sum = Errors::default();
+        for (number, part) in self.parts.iter().enumerate() {
+            let over = part.transition(&self.earth_rate);
+            // Φ (Φ Pᵀ)ᵀ with a symmetric P, none before the first part.
+            for _ in 0..if number > 0 { 2 } else { 0 } {
+                over.carry(&mut sum);
+                sum = sum.transposed();
             }
-            covariance += part.covariance(noise);
+            sum.add(&part.covariance(noise));
         }
-        covariance
+        BlockMatrix::from_fn(|row, column| sum.component(row, column))
     }
 }
 
@@ -108,21 +107,13 @@ impl NoiseInput {
         }
     }
 
-    /// Φ of the navigation errors over this part, times a matrix.
-    fn carried(&self, earth_rate: &Vector3<f64>, matrix: &BlockMatrix) -> BlockMatrix {
-        let over = Transition {
+    /// How navigation errors go on over this part.
+    fn transition(&self, earth_rate: &Vector3<f64>) -> Transition {
+        Transition {
             earth_turn: earth_rate * self.duration,
             force: self.force * self.duration,
             duration: self.duration,
-        };
-        let rows = |first: usize| Vectors::from_fn(|row, column| matrix[(first + row, column)]);
-        let mut errors = Errors::<NAVIGATION> {
-            attitude: rows(0),
-            velocity: rows(3),
-            position: rows(6),
-        };
-        over.carry(&mut errors);
-        BlockMatrix::from_fn(|row, column| errors.component(row, column))
+        }
     }
 
     /// Covariance that noise of these densities adds to the navigation errors. Linear in the squares of

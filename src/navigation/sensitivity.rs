@@ -24,8 +24,8 @@ impl SensedErrors {
         let of = |sensor: Sensor| {
             let triad = triads.get(sensor);
             let correction = triad.correction().ok_or(sensor)?;
-            let columns = CorrectedResponse::new(triad, &correction).columns();
-            let by = |row: usize, input: usize| columns.map(|of| of[3 * input + row]);
+            let response = CorrectedResponse::new(triad, &correction);
+            let by = |row: usize, input: usize| response.0.each_ref().map(|w| w[(row, input)]);
             Ok([0, 1, 2].map(|row| [0, 1, 2, 3].map(|input| by(row, input))))
         };
         Ok(Self(PerSensor {

@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, Vector3};
 
-use super::block::NAVIGATION;
+use super::block::{BlockMatrix, NAVIGATION};
 use super::vectors::Vectors;
 
 /// Attitude, velocity and position errors, a column of each cause.
@@ -26,18 +26,24 @@ pub(super) struct Transition {
 impl Transition {
     /// Takes errors over the samples: the Earth turns them, force acts on tilt, velocity moves position.
     pub fn carry<const N: usize>(&self, errors: &mut Errors<N>) {
-        let before = *errors;
-        let mut by_force = Vectors::default();
-        by_force.add_cross(&self.force, &before.attitude);
-        errors
-            .attitude
-            .add_cross(&-self.earth_turn, &before.attitude);
-        errors.velocity.add(1.0, &by_force);
-        errors
-            .velocity
-            .add_cross(&(self.earth_turn * -2.0), &before.velocity);
-        errors.position.add(0.5 * self.duration, &by_force);
-        errors.position.add(self.duration, &before.velocity);
+        let Errors {
+            attitude: Vectors(attitude),
+            velocity: Vectors(velocity),
+            position: Vectors(position),
+        } = errors;
+        for column in 0..N {
+            let of = |[x, y, z]: &[[f64; N]; 3]| Vector3::new(x[column], y[column], z[column]);
+            let (tilt, drift) = (of(attitude), of(velocity));
+            let by_force = self.force.cross(&tilt);
+            let turned = self.earth_turn.cross(&tilt);
+            let more = by_force - self.earth_turn.cross(&drift) * 2.0;
+            let moved = (by_force * 0.5 + drift) * self.duration;
+            for row in 0..3 {
+                attitude[row][column] -= turned[row];
+                velocity[row][column] += more[row];
+                position[row][column] += moved[row];
+            }
+        }
     }
 }
 
@@ -61,5 +67,31 @@ impl<const N: usize> Errors<N> {
                 .copy_from(&of_kind.times(weights));
         }
         sum
+    }
+}
+
+impl Errors<NAVIGATION> {
+    /// `self += matrix`
+    pub fn add(&mut self, matrix: &BlockMatrix) {
+        let kinds = [&mut self.attitude, &mut self.velocity, &mut self.position];
+        for (kind, of_kind) in kinds.into_iter().enumerate() {
+            for (axis, row) in of_kind.0.iter_mut().enumerate() {
+                for (column, sum) in row.iter_mut().enumerate() {
+                    *sum += matrix[(3 * kind + axis, column)];
+                }
+            }
+        }
+    }
+
+    pub fn transposed(&self) -> Self {
+        let from = [&self.attitude, &self.velocity, &self.position];
+        let of = |kind: usize| {
+            Vectors::from_fn(|row, column| from[column / 3].0[column % 3][3 * kind + row])
+        };
+        Self {
+            attitude: of(0),
+            velocity: of(1),
+            position: of(2),
+        }
     }
 }

@@ -51,17 +51,16 @@ impl<const N: usize> Vectors<N> {
 }
 
 impl Vectors<12> {
-    /// The columns of a matrix, times each of four weights.
+    /// Adds the columns of a matrix, one after the other times each of four weights.
     #[inline]
-    pub fn outer(matrix: &Matrix3<f64>, weights: [f64; 4]) -> Self {
-        let mut all = Self::default();
-        for (row, of_row) in all.0.iter_mut().enumerate() {
-            for (k, weight) in weights.into_iter().enumerate() {
-                for column in 0..3 {
-                    of_row[3 * k + column] = matrix[(row, column)] * weight;
+    pub fn add_outer(&mut self, matrix: &Matrix3<f64>, weights: &[f64; 4]) {
+        for (row, sums) in self.0.iter_mut().enumerate() {
+            for (column, sums) in sums.chunks_exact_mut(4).enumerate() {
+                let of_column = matrix[(row, column)];
+                for (sum, weight) in sums.iter_mut().zip(weights) {
+                    *sum += of_column * weight;
                 }
             }
         }
-        all
     }
 }

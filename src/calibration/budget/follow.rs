@@ -6,8 +6,8 @@ use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::model::Model;
 use super::super::noise::{Event, Events};
 use super::super::pass::{
-    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Seen, Taken,
-    Told, Verdict, begin,
+    Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Seen,
+    Taken, Told, Verdict, begin,
 };
 use super::super::problem::{Problem, Stretch};
 use super::source::BudgetSource;
@@ -30,6 +30,7 @@ pub(super) struct Held<'a> {
 pub(super) struct Passed<'a> {
     held: Held<'a>,
     filter: Filter,
+    dwells: Dwells,
     /// 1σ of every state before the first stretch.
     known: Vec<f64>,
     stretches: Vec<Whole<'a>>,
@@ -76,6 +77,7 @@ impl<'a> Held<'a> {
         let known = states.map(|state| filter.covariance(state, state).sqrt());
         let known = known.collect();
         filter.keep();
+        let mut dwells = Dwells::of(&filter);
         let (mut stretches, mut last) = (Vec::new(), Vec::new());
         let (mut before, mut seen) = (None, 0);
         let initial = self.priors.iter().zip(&at.initial_attitudes);
@@ -93,7 +95,7 @@ impl<'a> Held<'a> {
                     seen,
                 };
                 let next = events.by_ref().take(at_once);
-                let done = self.through(&mut filter, stretch, next, &mut seen)?;
+                let done = self.through((&mut filter, &mut dwells), stretch, next, &mut seen)?;
                 if done.is_empty() {
                     break;
                 }
@@ -109,6 +111,7 @@ impl<'a> Held<'a> {
         Ok(Passed {
             held: self,
             filter,
+            dwells,
             known,
             stretches,
             last,
@@ -119,7 +122,7 @@ impl<'a> Held<'a> {
     /// Takes a filter through events, and counts observations on.
     fn through(
         &self,
-        filter: &mut Filter,
+        (filter, dwells): (&mut Filter, &mut Dwells),
         stretch: &Stretch,
         events: impl Iterator<Item = Event>,
         seen: &mut usize,
@@ -136,7 +139,8 @@ impl<'a> Held<'a> {
                     rest.begin(filter, model, stretch);
                     let before = filter.kept();
                     let mut decided = Decided::new((model, stretch), self.accepted, at);
-                    if filter.stand(&rest.segment, &mut decided) != Taken::Whole {
+                    let taken = dwells.take_in(filter, &rest.segment, &mut decided);
+                    if taken != Taken::Whole {
                         let time = rest.segment.end();
                         return Err(CalibrationError::Diverged { time });
                     }
@@ -165,6 +169,7 @@ impl Passed<'_> {
             .collect();
         let mut back = Back {
             filter,
+            dwells: self.dwells,
             drivers: &drivers,
             followed: Followed::of(filter),
             sums: Sums::default(),
@@ -183,7 +188,8 @@ impl Passed<'_> {
                     Some(done) => done,
                     None => {
                         let events = part.events.take(self.at_once);
-                        held.through(&mut part.filter, stretch, events, &mut part.seen)?
+                        let filter = (&mut part.filter, &mut back.dwells);
+                        held.through(filter, stretch, events, &mut part.seen)?
                     }
                 };
                 for done in done.iter().rev() {
@@ -204,6 +210,7 @@ impl Passed<'_> {
 /// The way back.
 struct Back<'a> {
     filter: &'a Filter,
+    dwells: Dwells,
     /// The filter with each kind of noise alone.
     drivers: &'a [(Driver, Filter)],
     followed: Followed,
@@ -248,9 +255,9 @@ impl Back<'_> {
                     sums: &mut self.sums,
                 };
                 let part = &rest.segment;
-                let taken =
-                    self.filter
-                        .back_through(part, &mut decided, self.drivers, effects, &mut told);
+                let with = (self.filter, self.drivers);
+                let dwells = &mut self.dwells;
+                let taken = dwells.back_through(with, part, &mut decided, effects, &mut told);
                 if taken != Taken::Whole {
                     return Err(CalibrationError::Diverged { time: part.end() });
                 }
@@ -284,10 +291,9 @@ impl Back<'_> {
             let effects = self.followed.back(operation);
             match operation {
                 Operation::Carried { .. } => at_end = effects,
-                _ => of_measured.extend(effects),
+                _ => of_measured = effects,
             }
         }
-        of_measured.reverse();
         (at_end, of_measured)
     }
 }

@@ -5,7 +5,8 @@ use super::super::error::CalibrationError;
 use super::super::linearisation::{AttitudePrior, Linearisation};
 use super::super::model::Model;
 use super::super::pass::{
-    Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict, begin,
+    Dwells, Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict,
+    begin,
 };
 use super::super::problem::{Problem, Stretch};
 use super::events::{Event, Events, Rest};
@@ -81,10 +82,12 @@ impl<'a> Script<'a> {
     /// three components whether it is let in; those beyond its end are.
     pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
         let model = &problem.model;
+        let filter = Filter::new(model, &PriorErrors::at(model, self.at));
         let mut pass = Pass {
             model,
             accepted,
-            filter: Filter::new(model, &PriorErrors::at(model, self.at)),
+            dwells: Dwells::of(&filter),
+            filter,
             replay: Replay {
                 scalars: Vec::new(),
                 distances: Vec::new(),
@@ -113,6 +116,7 @@ struct Pass<'a> {
     model: &'a Model,
     accepted: &'a [bool],
     filter: Filter,
+    dwells: Dwells,
     replay: Replay,
 }
 
@@ -126,7 +130,7 @@ impl Pass<'_> {
             accepted: self.accepted,
             replay: &mut self.replay,
         };
-        let taken = filter.stand(segment, &mut decided);
+        let taken = self.dwells.take_in(filter, segment, &mut decided);
         let last = self.replay.distances.last();
         match taken {
             Taken::Whole if last.is_none_or(|distance| distance.is_finite()) => Ok(()),

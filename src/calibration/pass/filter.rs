@@ -1,6 +1,8 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
+mod at_rest;
 mod back;
+mod dwells;
 mod operation;
 mod propagation;
 mod standing;
@@ -8,8 +10,10 @@ mod tape;
 mod update;
 
 pub(in crate::calibration) use back::{Effect, Followed, Told};
+pub(in crate::calibration) use dwells::Dwells;
 pub(in crate::calibration) use operation::{Driver, Operation};
 pub(in crate::calibration) use standing::{Innovations, Observer, Taken, Verdict};
+pub(super) use update::Linear;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -106,8 +106,8 @@ impl Observer for Judge<'_> {
         if accepted {
             *row = 0;
             *self.cost += distance;
-            let of_each = scalars.map(|s| s.variance.ln());
-            *self.log_determinant += of_each.iter().sum::<f64>();
+            let of_each = scalars.map(|s| s.variance);
+            *self.log_determinant += of_each.iter().product::<f64>().ln();
         } else {
             *row += 1;
             *self.cost += self.limit;

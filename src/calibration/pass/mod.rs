@@ -1,13 +1,16 @@
 //! One pass of the filter over all stretches: with feedback as it goes, or linearised at a given point.
 
+mod courses;
 mod earlier;
 mod filter;
 mod gate;
+mod given;
 mod local;
 mod measurement;
 mod mode;
 mod posteriors;
 mod result;
+mod rows;
 mod segment;
 mod sensitivity;
 mod stretch;
@@ -18,8 +21,8 @@ use super::model::Model;
 use super::problem::{Problem, Stretch};
 use earlier::Earlier;
 pub(super) use filter::{
-    Driver, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Taken, Told,
-    Verdict,
+    Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Taken,
+    Told, Verdict,
 };
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
@@ -56,9 +59,12 @@ pub(super) fn pass_trying(
         Mode::Feedback => PriorErrors::none(),
         Mode::Held(_) => PriorErrors::at(model, at),
     };
+    let filter = Filter::new(model, &errors).trying(tried);
+    let dwells = Dwells::of(&filter);
     let mut sums = Sums {
         at: at.clone(),
-        filter: Filter::new(model, &errors).trying(tried),
+        filter,
+        dwells,
         innovations: Vec::new(),
         history: Vec::new(),
         posteriors: Posteriors::default(),

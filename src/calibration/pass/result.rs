@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::earlier::Earlier;
-use super::filter::Filter;
+use super::filter::{Dwells, Filter};
 use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
@@ -87,10 +87,10 @@ pub struct Own {
 }
 
 /// What a pass has come to so far.
-#[derive(Debug, Clone)]
 pub(super) struct Sums {
     pub at: Linearisation,
     pub filter: Filter,
+    pub dwells: Dwells,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
     pub posteriors: Posteriors,

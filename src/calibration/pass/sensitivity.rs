@@ -8,20 +8,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::measurement::ScalarInnovation;
-
-/// Rows of the normal equations that are summed at once.
-const ROWS: usize = 96;
+use super::filter::Linear;
 
 /// Parameters that are tried in a pass, and what they do to it.
 #[derive(Debug, Clone)]
 pub(in crate::calibration) struct Sensitivity {
     /// U, a column for each state.
     of_states: DMatrix<f64>,
-    /// Whitened rows `[G ν]` that are not yet in the sum, a column each.
-    rows: DMatrix<f64>,
-    filled: usize,
-    /// Sum of `[G ν]ᵀ [G ν]`.
+    /// Sum of `[G ν]ᵀ [G ν]`, whitened.
     sum: DMatrix<f64>,
 }
 
@@ -30,8 +24,6 @@ impl Sensitivity {
     pub fn new(parameters: usize, states: usize) -> Self {
         Self {
             of_states: DMatrix::zeros(parameters, states),
-            rows: DMatrix::zeros(parameters + 1, ROWS),
-            filled: 0,
             sum: DMatrix::zeros(parameters + 1, parameters + 1),
         }
     }
@@ -46,23 +38,13 @@ impl Sensitivity {
         self.of_states.column_mut(state).scale_mut(keep);
     }
 
-    /// The states that move, each at its place, become `phi` times those that stand in its columns, plus
-    /// what each parameter adds to them.
-    pub fn propagate<const MOVING: usize>(
-        &mut self,
-        phi: &[[f64; MOVING]],
-        place: impl Fn(usize) -> usize,
-        added: impl Iterator<Item = (usize, [f64; MOVING])>,
-    ) {
-        let phi = DMatrix::from_fn(phi.len(), MOVING, |k, row| phi[k][row]);
-        let mut moved = self.of_states.columns(0, phi.nrows()) * phi;
-        for (parameter, by) in added {
-            for (row, by) in by.into_iter().enumerate() {
-                moved[(parameter, row)] += by;
-            }
-        }
-        for (moving, column) in moved.column_iter().enumerate() {
-            self.of_states.column_mut(place(moving)).copy_from(&column);
+    /// The states that move become what `transition` makes of the first states, plus what each parameter adds to
+    /// them (rows, by parameter).
+    pub fn propagate(&mut self, moving: &[usize], transition: &DMatrix<f64>, added: &DMatrix<f64>) {
+        let first = self.of_states.columns(0, transition.ncols());
+        let moved = first * transition.transpose() + added;
+        for (&state, column) in moving.iter().zip(moved.column_iter()) {
+            self.of_states.column_mut(state).copy_from(&column);
         }
     }
 
@@ -75,52 +57,28 @@ impl Sensitivity {
         self.of_states.column_mut(state).copy_from(&sum);
     }
 
-    /// A scalar measurement is taken in: H over states and parameters, gain, innovation and its
-    /// variance.
-    pub fn update(
+    /// Measurements H are taken in by a gain: what whitens their innovations, and the whitened innovations.
+    pub(super) fn update(
         &mut self,
-        [states, parameters]: [&[f64]; 2],
-        gain: &[f64],
-        ScalarInnovation {
-            innovation,
-            variance,
-        }: ScalarInnovation,
+        h: &Linear,
+        gain: &DMatrix<f64>,
+        (whiten, whitened): (&DMatrix<f64>, &DVector<f64>),
     ) {
-        let mut sensed = DVector::zeros(self.of_states.nrows());
-        for (column, &weight) in self.of_states.column_iter().zip(states) {
-            if weight != 0.0 {
-                sensed.axpy(weight, &column, 1.0);
-            }
-        }
-        for (sensed, weight) in sensed.iter_mut().zip(parameters) {
-            *sensed += weight;
-        }
-        for (mut column, gain) in self.of_states.column_iter_mut().zip(gain) {
-            column.axpy(-gain, &sensed, 1.0);
-        }
-        let whiten = variance.sqrt().recip();
-        let mut row = self.rows.column_mut(self.filled);
-        row.rows_mut(0, sensed.len()).copy_from(&(&sensed * whiten));
-        row[sensed.len()] = innovation * whiten;
-        self.filled += 1;
-        if self.filled == ROWS {
-            self.flush();
-        }
-    }
-
-    fn flush(&mut self) {
-        let rows = self.rows.columns(0, self.filled);
-        self.sum.gemm(1.0, &rows, &rows.transpose(), 1.0);
-        self.filled = 0;
+        let sensed = &h.states * self.of_states.transpose() + &h.tried;
+        self.of_states
+            .gemm(-1.0, &sensed.transpose(), &gain.transpose(), 1.0);
+        let last = sensed.ncols();
+        let mut rows = (whiten * sensed).insert_column(last, 0.0);
+        rows.set_column(last, whitened);
+        self.sum.gemm(1.0, &rows.transpose(), &rows, 1.0);
     }
 
     /// Information of the parameters, the score (the gradient of ln of the likelihood at zero), and the
     /// derivative of these states' means.
     pub fn normal_equations(
-        mut self,
+        self,
         states: impl Iterator<Item = usize>,
     ) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
-        self.flush();
         let n = self.of_states.nrows();
         let states: Vec<usize> = states.collect();
         (

@@ -32,6 +32,8 @@ pub(super) struct OneStretch<'a> {
     navigator: Navigator<'a>,
     pub sums: Sums,
     gate: Memory,
+    /// Of squared whitened innovations.
+    limit: f64,
     /// The attitude that the dwell holds without a table, as it is computed when it begins.
     held: Matrix3<f64>,
 }
@@ -92,6 +94,7 @@ impl<'a> OneStretch<'a> {
             navigator,
             sums,
             gate: Memory::default(),
+            limit: problem.gate(),
             held: initial,
         })
     }
@@ -220,7 +223,7 @@ impl<'a> OneStretch<'a> {
             stretch,
             model: &problem.model,
             mode: self.mode,
-            limit: problem.gate(),
+            limit: self.limit,
             dwell: sums.posteriors.dwells(),
             memory: &mut self.gate,
             innovations: &mut sums.innovations,
@@ -228,7 +231,7 @@ impl<'a> OneStretch<'a> {
             log_determinant: &mut sums.log_determinant,
         };
         let time = segment.end();
-        match sums.filter.stand(&segment, &mut judge) {
+        match sums.dwells.take_in(&mut sums.filter, &segment, &mut judge) {
             Taken::Whole => {}
             Taken::Abandoned => return Ok(false),
             Taken::Diverged => return Err(CalibrationError::Diverged { time }),

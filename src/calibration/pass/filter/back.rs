@@ -5,10 +5,13 @@
 //! of the covariance of that noise is what the noise does to the estimate (adjoint of the filter: Bryson and
 //! Ho, *Applied Optimal Control*, §12.7; Gelb, *Applied Optimal Estimation*, §7.1 for error budgets).
 
-use super::super::local::{Given, Local, Look, StepModel, roots};
+use super::super::courses::{Courses, Gain};
+use super::super::given::Given;
+use super::super::local::Local;
+use super::super::rows::roots;
 use super::super::segment::{Seen, Segment};
 use super::operation::{Driver, Operation};
-use super::standing::{Done, Observer, Taken, begins};
+use super::standing::{Done, Observer, Taken};
 use super::{ATTITUDE, Filter, NAVIGATION};
 use crate::calibration::parameters::PARAMETERS;
 use crate::navigation::Block;
@@ -39,7 +42,7 @@ impl Followed {
     }
 
     /// Follows back one operation; returns what its noise, of unit variance each, does: one effect for
-    /// what is drawn or taken, the effects of the moving states for what is carried.
+    /// what is drawn, one of each scalar that is taken, the effects of the moving states for what is carried.
     pub fn back(&mut self, operation: &Operation) -> Vec<Effect> {
         match operation {
             Operation::Drawn { states, sigma } => {
@@ -70,20 +73,28 @@ impl Followed {
                 vec![effect]
             }
             Operation::Taken {
-                row,
+                rows,
                 gain,
                 variance,
             } => {
-                let mut of_noise = [0.0; PARAMETERS];
-                for (of_state, gain) in self.of_states.iter().zip(gain) {
-                    add(&mut of_noise, -gain, of_state);
-                }
-                for (of_state, weight) in self.of_states.iter_mut().zip(row) {
-                    if *weight != 0.0 {
-                        add(of_state, *weight, &of_noise);
+                let of_scalars = gain.column_iter().map(|gain| {
+                    let mut of_noise = [0.0; PARAMETERS];
+                    for (of_state, gain) in self.of_states.iter().zip(gain.iter()) {
+                        add(&mut of_noise, -gain, of_state);
+                    }
+                    of_noise
+                });
+                let of_scalars: Vec<Effect> = of_scalars.collect();
+                for (of_noise, row) in of_scalars.iter().zip(rows.row_iter()) {
+                    for (of_state, weight) in self.of_states.iter_mut().zip(row.iter()) {
+                        if *weight != 0.0 {
+                            add(of_state, *weight, of_noise);
+                        }
                     }
                 }
-                vec![of_noise.map(|x| x * variance.sqrt())]
+                let sigma = variance.sqrt();
+                let effects = of_scalars.iter().map(|effect| effect.map(|x| x * sigma));
+                effects.collect()
             }
             Operation::Carried { moving, transition } => {
                 let out = self.taken_out(moving);
@@ -111,45 +122,22 @@ pub(in crate::calibration) trait Told {
 impl Filter {
     /// Follows errors back through a part of a dwell: `at_end` is what errors of its moving states at its end
     /// do, `of_measured` what noise of each row does that it measured.
-    pub fn back_through(
+    pub(super) fn back_through<const M: usize, const G: usize>(
         &self,
         segment: &Segment,
-        observer: &mut impl Observer,
-        drivers: &[(Driver, Self)],
-        effects: [&[Effect]; 2],
-        told: &mut impl Told,
-    ) -> Taken {
-        let turn = self.layout.turn_at_rest().map_or(0, |_| 3);
-        match turn + self.varying.len() {
-            0 => self.back_with::<9, 15>(segment, observer, drivers, effects, told),
-            3 => self.back_with::<12, 18>(segment, observer, drivers, effects, told),
-            6 => self.back_with::<15, 21>(segment, observer, drivers, effects, told),
-            _ => self.back_with::<18, 24>(segment, observer, drivers, effects, told),
-        }
-    }
-
-    fn back_with<const M: usize, const G: usize>(
-        &self,
-        segment: &Segment,
+        courses: &mut Courses<M, G>,
         observer: &mut impl Observer,
         drivers: &[(Driver, Self)],
         [at_end, of_measured]: [&[Effect]; 2],
         told: &mut impl Told,
     ) -> Taken {
-        let moving = self.moving();
-        let mut local = Local::<M, G>::new(Given::certain(), begins(&moving));
+        courses.tidy();
+        let models = self.models(segment, courses);
+        let mut local = Local::new(Given::certain(), courses);
         let mut done = Vec::new();
-        let mut keep = |what: Done<M, G>| {
-            done.push(match what {
-                Done::Step(model) => Kept::Step(model),
-                Done::Observed { state, seen, look } => Kept::Observed {
-                    state,
-                    seen: *seen,
-                    look: Box::new(look.clone()),
-                },
-            });
-        };
-        match self.through(&mut local, segment, observer, &mut keep) {
+        match self.through(&mut local, (segment, &models), observer, &mut |what| {
+            done.push(what)
+        }) {
             Taken::Whole => {}
             other => return other,
         }
@@ -167,26 +155,22 @@ impl Filter {
         for (own, at_end) in of_errors.iter_mut().zip(at_end) {
             *own = *at_end;
         }
-        let models: Vec<StepModel<M>> = segment
-            .models
-            .iter()
-            .map(|block| self.step_model(block, &moving))
-            .collect();
-        let of_drivers = self.drivers::<M>(segment, &moving, drivers);
-        for kept in done.iter().rev() {
-            match kept {
-                Kept::Step(model) => {
-                    for (driver, root) in &of_drivers[*model] {
+        let of_drivers = self.drivers::<M>(segment, drivers);
+        for done in done.into_iter().rev() {
+            match done {
+                Done::Step(model) => {
+                    for (driver, root) in &of_drivers[model] {
                         told.driven(*driver, &combined(root, &of_errors));
                     }
                     let mut before = [[0.0; PARAMETERS]; M];
-                    for &(row, column, phi) in &models[*model].transition {
+                    for &(row, column, phi) in &courses.model(models[model]).transition {
                         add(&mut before[column], phi, &of_errors[row]);
                     }
                     of_errors = before;
                 }
-                Kept::Observed { state, seen, look } => {
-                    let effects = of_observation(look, &of_errors, &of_sum);
+                Done::Observed { state, seen, point } => {
+                    let gain = &courses.point(point).gain;
+                    let effects = of_observation(gain, &of_errors, &of_sum);
                     for (axis, effect) in effects.iter().enumerate() {
                         add(&mut of_errors[state + axis], 1.0, effect);
                     }
@@ -216,11 +200,11 @@ impl Filter {
     fn drivers<const M: usize>(
         &self,
         segment: &Segment,
-        moving: &[usize],
         drivers: &[(Driver, Self)],
     ) -> Vec<Vec<(Driver, [f64; M])>> {
+        let moving = self.moving();
         let models = segment.models.iter().map(|block| {
-            let of = |filter: &Self| filter.step_model::<M>(block, moving).noise;
+            let of = |filter: &Self| filter.step_model::<M>(block, &moving).noise;
             alone(drivers, of)
         });
         models.collect()
@@ -267,37 +251,27 @@ fn combined(sizes: &[f64], effects: &[Effect]) -> Effect {
     sum
 }
 
-/// What a filter of a part alone did.
-enum Kept<const M: usize, const G: usize> {
-    Step(usize),
-    Observed {
-        state: usize,
-        seen: Seen,
-        look: Box<Look<M, G>>,
-    },
-}
-
 /// What noise of each component of an observation does, of errors that are what they are after it.
 fn of_observation<const M: usize, const G: usize>(
-    look: &Look<M, G>,
+    gain: &Gain<M, G>,
     of_errors: &[Effect; M],
     of_sum: &[Effect; G],
 ) -> [Effect; 3] {
     let mut effects = [[0.0; PARAMETERS]; 3];
     for (k, effect) in effects.iter_mut().enumerate() {
-        for (of_sum, weight) in of_sum.iter().zip(&look.rows[k]) {
+        for (of_sum, weight) in of_sum.iter().zip(&gain.rows[k]) {
             add(effect, *weight, of_sum);
         }
-        for (of_error, gain) in of_errors.iter().zip(&look.gain[k]) {
-            add(effect, -gain, of_error);
+        for (of_error, weight) in of_errors.iter().zip(&gain.of_errors[k]) {
+            add(effect, -weight, of_error);
         }
     }
     // What was taken in is L⁻¹ of the observation.
     for k in (0..3).rev() {
         let (before, from) = effects.split_at_mut(k);
-        from[0].iter_mut().for_each(|x| *x /= look.root[(k, k)]);
+        from[0].iter_mut().for_each(|x| *x /= gain.root[(k, k)]);
         for (j, effect) in before.iter_mut().enumerate() {
-            add(effect, -look.root[(k, j)], &from[0]);
+            add(effect, -gain.root[(k, j)], &from[0]);
         }
     }
     effects

@@ -17,10 +17,10 @@ pub(in crate::calibration) enum Operation {
         keep: f64,
         variance: f64,
     },
-    /// A scalar of this row and variance of noise is taken in by this gain.
+    /// Scalars of these rows, each with this variance of noise, are taken in by a gain, a column each.
     Taken {
-        row: Vec<f64>,
-        gain: Vec<f64>,
+        rows: DMatrix<f64>,
+        gain: DMatrix<f64>,
         variance: f64,
     },
     /// The states that move (rows, in order) become these combinations of the first states (columns).

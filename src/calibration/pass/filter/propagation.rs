@@ -31,86 +31,59 @@ impl Filter {
             None => place,
         };
         let noise = self.noise_of_move::<MOVING>(block);
-        let phi = self.moving_rows::<MOVING>(block);
+        let noise = DMatrix::from_fn(MOVING, MOVING, |row, column| noise[row][column]);
+        let driving = self.driving_columns(block);
+        let transition = DMatrix::from_fn(MOVING, driving.len() + MOVING - NAVIGATION, |row, k| {
+            match (driving.get(k), row < NAVIGATION) {
+                (Some(column), true) => column[row],
+                // By as much as the attitude error has changed.
+                (Some(column), false) => column[own(row)] - f64::from(own(row) == k),
+                (None, _) => f64::from(moving[row] == k),
+            }
+        });
         let on = self.layout.terms().count();
-        let tried = self.layout.tried_terms().zip(&block.terms[on..]);
-        let tried: Vec<_> = tried
-            .map(|((k, _), term)| (k, std::array::from_fn(|place| term.column[own(place)])))
-            .collect();
-        self.carry(&phi, &moving, &noise, tried.into_iter());
+        let mut tried = DMatrix::zeros(self.layout.tried(), MOVING);
+        for ((k, _), term) in self.layout.tried_terms().zip(&block.terms[on..]) {
+            for place in 0..MOVING {
+                tried[(k, place)] = term.column[own(place)];
+            }
+        }
+        self.carry(&moving, transition, &noise, &tried);
     }
 
     /// Only the rows of Φ of the states that move differ from identity. Of `Φ P Φᵀ + Q` only their rows and
-    /// columns change. `phi` holds these rows, a column for each of the first states; `tried` what
-    /// parameters that are tried add.
-    pub(super) fn carry<const MOVING: usize>(
+    /// columns change. `transition` holds these rows, a column for each of the first states; `tried` what
+    /// parameters that are tried add, a row each.
+    pub(super) fn carry(
         &mut self,
-        phi: &[[f64; MOVING]],
         moving: &[usize],
-        noise: &[[f64; MOVING]; MOVING],
-        tried: impl Iterator<Item = (usize, [f64; MOVING])>,
+        transition: DMatrix<f64>,
+        noise: &DMatrix<f64>,
+        tried: &DMatrix<f64>,
     ) {
-        let n = self.x.len();
-        let mut x = [0.0; MOVING];
-        let mut rows = vec![[0.0; MOVING]; n];
-        let p = self.p.as_slice();
-        for (k, column) in phi.iter().enumerate() {
-            add_scaled(&mut x, column, self.x[k]);
-        }
-        for (j, row) in rows.iter_mut().enumerate() {
-            let p = &p[n * j..n * j + phi.len()];
-            let mut sum = [0.0; MOVING];
-            for (column, p) in phi.iter().zip(p) {
-                add_scaled(&mut sum, column, *p);
-            }
-            *row = sum;
-        }
-        let mut corner = *noise;
-        for (k, row_of_corner) in corner.iter_mut().enumerate() {
-            for (column, row) in phi.iter().zip(&rows) {
-                add_scaled(row_of_corner, row, column[k]);
-            }
-        }
-        for (state, row) in rows.iter().enumerate() {
-            if !moving.contains(&state) {
-                for (&moving, &covariance) in moving.iter().zip(row) {
-                    self.p[(moving, state)] = covariance;
-                    self.p[(state, moving)] = covariance;
-                }
-            }
+        let first = transition.ncols();
+        let x = &transition * self.x.rows(0, first);
+        let rows = &transition * self.p.rows(0, first);
+        let corner = rows.columns(0, first) * transition.transpose() + noise;
+        for (place, &state) in moving.iter().enumerate() {
+            self.x[state] = x[place];
+            self.p.set_row(state, &rows.row(place));
+            self.p.set_column(state, &rows.row(place).transpose());
         }
         for (column, &at_column) in moving.iter().enumerate() {
-            self.x[at_column] = x[column];
             for (row, &at_row) in moving.iter().enumerate() {
-                self.p[(at_row, at_column)] = corner[column][row];
+                self.p[(at_row, at_column)] = corner[(row, column)];
             }
+        }
+        if let Some(sensitivity) = &mut self.sensitivity {
+            sensitivity.propagate(moving, &transition, tried);
         }
         if let Some(tape) = &mut self.tape {
             tape.push(Operation::Carried {
                 moving: moving.to_vec(),
-                transition: DMatrix::from_fn(MOVING, phi.len(), |row, k| phi[k][row]),
+                transition,
             });
         }
-        if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.propagate(phi, |place| moving[place], tried);
-        }
-    }
-
-    /// The rows of Φ of the states that move, column by column: navigation errors, the states that drive
-    /// them, the turn at rest.
-    fn moving_rows<const MOVING: usize>(&self, block: &Block) -> Vec<[f64; MOVING]> {
-        let driving = self.driving_columns(block).into_iter().enumerate();
-        let driving = driving.map(|(state, column)| {
-            std::array::from_fn(|moving| match moving.checked_sub(NAVIGATION) {
-                // By as much as the attitude error has changed.
-                Some(axis) if state == ATTITUDE + axis => column[state] - 1.0,
-                Some(axis) => column[ATTITUDE + axis],
-                None => column[moving],
-            })
-        });
-        let turn = (NAVIGATION..MOVING)
-            .map(|itself| std::array::from_fn(|moving| if moving == itself { 1.0 } else { 0.0 }));
-        driving.chain(turn).collect()
     }
 
     /// What navigation errors, and each state that drives them, make of the navigation errors.
@@ -133,7 +106,7 @@ impl Filter {
             Some(turned) => of_turned(turned.by_parameters.column(index).as_slice(), row),
             None => of_parameter(index)[row],
         };
-        let mut columns: Vec<[f64; NAVIGATION]> = Vec::new();
+        let mut columns: Vec<[f64; NAVIGATION]> = Vec::with_capacity(self.x.len());
         let mut add = |column: &dyn Fn(usize) -> f64| columns.push(std::array::from_fn(column));
         for column in block.navigation.column_iter() {
             add(&|row| column[row]);
@@ -190,12 +163,5 @@ impl Filter {
             self.p.column_mut(state).scale_mut(keep);
             self.p[(state, state)] += sigma.powi(2) * (1.0 - keep * keep);
         }
-    }
-}
-
-#[inline]
-fn add_scaled<const N: usize>(sum: &mut [f64; N], column: &[f64; N], factor: f64) {
-    for k in 0..N {
-        sum[k] += column[k] * factor;
     }
 }

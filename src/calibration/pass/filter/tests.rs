@@ -298,20 +298,80 @@ impl Filter {
                         let errors = errors.chain(self.layout.table_base());
                         row.extend(errors.map(|first| (first + axis, -1.0)));
                     }
-                    let mut h = vec![0.0; self.x.len()];
+                    let mut h = DVector::zeros(self.x.len());
                     row.iter().for_each(|&(state, weight)| h[state] = weight);
-                    let ph = &self.p * DVector::from_column_slice(&h);
+                    let ph = &self.p * &h;
                     let z = seen.residual[axis];
                     scalars.push(ScalarInnovation {
-                        innovation: z - update::times(&h, self.x.as_slice()),
-                        variance: update::times(&h, ph.as_slice()) + open.variance(seen),
+                        innovation: z - h.dot(&self.x),
+                        variance: h.dot(&ph) + open.variance(seen),
                     });
-                    self.take_scalar([&h, &[]], z, open.variance(seen));
-                    self.mirror();
+                    let row = Linear {
+                        states: DMatrix::from_row_slice(1, h.len(), h.as_slice()),
+                        tried: DMatrix::zeros(1, 0),
+                    };
+                    let value = DVector::from_element(1, z);
+                    let across = &row.states * &self.p;
+                    self.take((&row, across), &value, open.variance(seen));
                 }
             }
         }
         scalars
+    }
+}
+
+/// Leaves out one observation.
+struct Without<'a> {
+    open: Open<'a>,
+    number: usize,
+}
+
+impl Observer for Without<'_> {
+    fn variance(&self, seen: &Seen) -> f64 {
+        self.open.variance(seen)
+    }
+
+    fn judge(&mut self, innovations: Innovations) -> Verdict {
+        self.open.judge(innovations);
+        match self.open.scalars.len() == 3 * (self.number + 1) {
+            true => Verdict::Rejected,
+            false => Verdict::Accepted,
+        }
+    }
+}
+
+#[test]
+fn what_dwells_before_have_worked_out_changes_nothing() {
+    let run = Scenario::load("demo").unwrap().simulate(3, 0).unwrap().run;
+    let problem = Problem::new(&run, &Options::default());
+    let (model, stretch) = (&problem.model, &problem.stretches()[0]);
+    let triads = crate::calibration::from_vector(model.form, &model.prior_mean);
+    let mut shared = Dwells::of(&filter());
+    let attitudes = [Vector3::zeros(), Vector3::new(0.3, -1.0, 2.0)].map(crate::attitude::exp);
+    for (attitude, left_out) in attitudes
+        .iter()
+        .zip([None, Some(7)])
+        .chain([(&attitudes[0], Some(40)), (&attitudes[1], None)])
+    {
+        let at = State::at_rest(*attitude);
+        let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, at);
+        let part = segments(&stretch.steps, true).next().unwrap();
+        let of = (&problem, stretch);
+        let segment = Segment::navigate(&mut navigator.unwrap(), of, &part, true, attitude);
+        let through = |dwells: &mut Dwells| {
+            let mut filter = filter();
+            let open = Open {
+                stretch,
+                model,
+                scalars: Vec::new(),
+            };
+            let number = left_out.unwrap_or(usize::MAX / 6);
+            let mut observer = Without { open, number };
+            let taken = dwells.take_in(&mut filter, &segment, &mut observer);
+            assert_eq!(taken, Taken::Whole);
+            (filter.x, filter.p, observer.open.scalars)
+        };
+        assert_eq!(through(&mut shared), through(&mut Dwells::of(&filter())));
     }
 }
 
@@ -366,7 +426,9 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
             scalars: Vec::new(),
         };
         let mut other = filter.clone();
-        assert_eq!(filter.stand(&segment, &mut open), Taken::Whole);
+        let mut dwells = Dwells::of(&filter);
+        let taken = dwells.take_in(&mut filter, &segment, &mut open);
+        assert_eq!(taken, Taken::Whole);
         let scalars = other.step_by_step(&segment, &open);
         assert_eq!(scalars.len(), open.scalars.len());
         for (one, other) in open.scalars.iter().zip(&scalars) {

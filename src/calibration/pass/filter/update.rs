@@ -1,102 +1,97 @@
-//! Measurements, one scalar after the other.
+//! Measurements.
 
-use super::super::measurement::{Measurement, ScalarInnovation};
+use nalgebra::{DMatrix, DVector};
+
+use super::super::measurement::Measurement;
 use super::Filter;
 use super::operation::Operation;
 
-impl Filter {
-    /// Takes in a measurement, one scalar after the other.
-    pub fn update(&mut self, measurement: &Measurement) {
-        let rows = measurement.rows.iter().zip(&measurement.residual);
-        for (row, &z) in rows {
-            let mut h = vec![0.0; self.x.len()];
-            row.iter().for_each(|&(state, weight)| h[state] = weight);
-            self.take_scalar([&h, &[]], z, measurement.variance);
+/// Quantities that are linear in the errors, a row each: by state, and by parameter that is tried.
+#[derive(Debug)]
+pub(in super::super) struct Linear {
+    pub states: DMatrix<f64>,
+    pub tried: DMatrix<f64>,
+}
+
+impl Linear {
+    pub fn zeros(rows: usize, filter: &Filter) -> Self {
+        Self {
+            states: DMatrix::zeros(rows, filter.x.len()),
+            tried: DMatrix::zeros(rows, filter.layout.tried()),
         }
-        self.mirror();
     }
 
-    /// Takes in a scalar by what it is of states and of parameters that are tried, in Joseph's form, which
-    /// keeps the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
-    /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18). Only the upper
-    /// half of the covariance is right after it, and is all that it needs.
-    pub(super) fn take_scalar(
-        &mut self,
-        [row, tried]: [&[f64]; 2],
-        z: f64,
-        variance_of_noise: f64,
-    ) {
-        let n = self.x.len();
-        let (mut ph, mut gain, mut rest) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        self.times_upper(row, &mut ph);
-        let variance = times(row, &ph) + variance_of_noise;
-        let scale = 1.0 / variance;
-        let scalar = ScalarInnovation {
-            innovation: z - times(row, self.x.as_slice()),
-            variance,
-        };
-        for ((x, gain), ph) in self.x.iter_mut().zip(&mut gain).zip(&ph) {
-            *gain = ph * scale;
-            *x += *gain * scalar.innovation;
+    /// Combinations of them, a row of weights each.
+    pub fn combined(&self, weights: &DMatrix<f64>) -> Self {
+        Self {
+            states: weights * &self.states,
+            tried: weights * &self.tried,
         }
+    }
+
+    /// The rows from a first on become more by others.
+    pub fn add(&mut self, first: usize, others: &Self) {
+        let count = others.states.nrows();
+        let mut rows = self.states.rows_mut(first, count);
+        rows += &others.states;
+        let mut rows = self.tried.rows_mut(first, count);
+        rows += &others.tried;
+    }
+}
+
+impl Filter {
+    /// Takes in a measurement.
+    pub fn update(&mut self, measurement: &Measurement) {
+        let mut h = Linear::zeros(measurement.rows.len(), self);
+        for (row, of_row) in measurement.rows.iter().enumerate() {
+            for &(state, weight) in of_row {
+                h.states[(row, state)] = weight;
+            }
+        }
+        let z = DVector::from_column_slice(measurement.residual.as_slice());
+        let across = &h.states * &self.p;
+        self.take((&h, across), &z, measurement.variance);
+    }
+
+    /// Takes in measurements `z = H x + v`, v white of variance R each, given H and H P, in Joseph's form, which
+    /// keeps the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
+    /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
+    pub(super) fn take(
+        &mut self,
+        (h, across): (&Linear, DMatrix<f64>),
+        z: &DVector<f64>,
+        variance: f64,
+    ) {
+        let mut innovation = &across * h.states.transpose();
+        (0..z.len()).for_each(|k| innovation[(k, k)] += variance);
+        let Some(root) = innovation.cholesky() else {
+            // Nothing is finite any more, and the pass diverges.
+            self.x.fill(f64::NAN);
+            return;
+        };
+        // L⁻¹ of the innovations' covariance L Lᵀ, P Hᵀ L⁻ᵀ, and K = P Hᵀ L⁻ᵀ L⁻¹.
+        let mut whiten = DMatrix::identity(z.len(), z.len());
+        root.l_dirty().solve_lower_triangular_mut(&mut whiten);
+        let whitened = &whiten * (z - &h.states * &self.x);
+        let by_whitened = across.transpose() * whiten.transpose();
+        let gain = &by_whitened * &whiten;
+        self.x.gemv(1.0, &by_whitened, &whitened, 1.0);
+        // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ.
+        self.p
+            .gemm(-1.0, &by_whitened, &by_whitened.transpose(), 1.0);
+        let rest = (&gain * variance - &self.p * h.states.transpose()) * 0.5;
+        self.p.gemm(1.0, &gain, &rest.transpose(), 1.0);
+        self.p.gemm(1.0, &rest, &gain.transpose(), 1.0);
+        self.p.fill_lower_triangle_with_upper_triangle();
         if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.update([row, tried], &gain, scalar);
+            sensitivity.update(h, &gain, (&whiten, &whitened));
         }
         if let Some(tape) = &mut self.tape {
             tape.push(Operation::Taken {
-                row: row.to_vec(),
-                gain: gain.clone(),
-                variance: variance_of_noise,
+                rows: h.states.clone(),
+                gain,
+                variance,
             });
         }
-        // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ: both symmetric, so the upper half will do.
-        let columns = self.p.as_mut_slice().chunks_exact_mut(n);
-        for (j, column) in columns.enumerate() {
-            let (column, gain, factor) = (&mut column[..=j], &gain[..=j], ph[j]);
-            for k in 0..=j {
-                column[k] -= gain[k] * factor;
-            }
-        }
-        self.times_upper(row, &mut rest);
-        for (rest, gain) in rest.iter_mut().zip(&gain) {
-            *rest = 0.5 * (gain * variance_of_noise - *rest);
-        }
-        let columns = self.p.as_mut_slice().chunks_exact_mut(n);
-        for (j, column) in columns.enumerate() {
-            add_both(&mut column[..=j], (gain[j], &rest), (rest[j], &gain));
-        }
     }
-
-    /// The lower half of the covariance from the upper.
-    pub(super) fn mirror(&mut self) {
-        self.p.fill_lower_triangle_with_upper_triangle();
-    }
-
-    /// `P hᵀ` from the upper half of P.
-    fn times_upper(&self, h: &[f64], product: &mut [f64]) {
-        let n = self.x.len();
-        product.fill(0.0);
-        for (j, column) in self.p.as_slice().chunks_exact(n).enumerate() {
-            let mut sum = h[j] * column[j];
-            for ((product, p), h_k) in product[..j].iter_mut().zip(column).zip(h) {
-                *product += h[j] * p;
-                sum += h_k * p;
-            }
-            product[j] += sum;
-        }
-    }
-}
-
-/// `column += a x + b y`, each as long as the column at least.
-#[inline]
-fn add_both(column: &mut [f64], (a, x): (f64, &[f64]), (b, y): (f64, &[f64])) {
-    let (x, y) = (&x[..column.len()], &y[..column.len()]);
-    for k in 0..column.len() {
-        column[k] += a * x[k] + b * y[k];
-    }
-}
-
-/// `h v`
-pub(super) fn times(h: &[f64], v: &[f64]) -> f64 {
-    h.iter().zip(v).map(|(h, v)| h * v).sum()
 }

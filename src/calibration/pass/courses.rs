@@ -1,0 +1,229 @@
+//! What filters of parts of dwells do, whatever they are told.
+//!
+//! Covariance and gain of a Kalman filter depend on which steps and observations follow one another, not on
+//! what is observed, and may be had beforehand (Gelb, *Applied Optimal Estimation*, §4.2). At rest they do not depend
+//! on the attitude either: East, North and Up, gravity and the Earth's rate are where they always are. So one
+//! dwell after the other goes the same course, and what belongs to it is worked out once.
+
+use nalgebra::Matrix3;
+
+use super::rows::{add, whiten};
+
+/// How navigation errors go on in one step, and what `g` and noise add to them. `M` states move.
+#[derive(PartialEq)]
+pub(super) struct StepModel<const M: usize> {
+    /// Covariance of noise.
+    pub noise: [[f64; M]; M],
+    /// What is not zero of Φ: row, column, value.
+    pub transition: Vec<(usize, usize, f64)>,
+    /// What the constants of `g` add: row, index in `g`, value.
+    pub driven: Vec<(usize, usize, f64)>,
+}
+
+/// Courses that parts of dwells have taken: a tree, from the begin of any of them on.
+pub(super) struct Courses<const M: usize, const G: usize> {
+    models: Vec<StepModel<M>>,
+    points: Vec<Point<M, G>>,
+}
+
+/// A point of a course.
+pub(super) struct Point<const M: usize, const G: usize> {
+    /// How the last observation before it was taken in.
+    pub gain: Gain<M, G>,
+    pub known: Box<Known<M, G>>,
+    /// Where each thing that may happen next leads.
+    next: Vec<(Event, usize)>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Event {
+    /// A step of this model.
+    Step(usize),
+    /// Three navigation errors from a state on are observed, each with this variance.
+    Observed(usize, f64),
+}
+
+/// How an observation is taken in where `g` is given.
+#[derive(Clone)]
+pub(super) struct Gain<const M: usize, const G: usize> {
+    /// Lower triangular root of its covariance.
+    pub root: Matrix3<f64>,
+    /// Rows of `g`, whitened by it.
+    pub rows: [[f64; G]; 3],
+    /// What the whitened observation gains of the navigation errors.
+    pub of_errors: [[f64; M]; 3],
+}
+
+/// What is known of navigation errors `U g + m` where `g` is given, and of `g` by observations alone.
+#[derive(Clone)]
+pub(super) struct Known<const M: usize, const G: usize> {
+    /// U
+    pub of_given: [[f64; G]; M],
+    /// Of m.
+    pub covariance: [[f64; M]; M],
+    /// Information of `g`.
+    pub information: [[f64; G]; G],
+}
+
+/// So many points are kept before a part begins: those of a few courses, some megabytes.
+const MOST: usize = 512;
+
+impl<const M: usize, const G: usize> Courses<M, G> {
+    /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
+    pub const BEGIN: usize = 0;
+
+    pub fn new(begins: [Option<usize>; M]) -> Self {
+        let mut of_given = [[0.0; G]; M];
+        for (row, begin) in of_given.iter_mut().zip(begins) {
+            if let Some(component) = begin {
+                row[component] = 1.0;
+            }
+        }
+        let known = Known {
+            of_given,
+            covariance: [[0.0; M]; M],
+            information: [[0.0; G]; G],
+        };
+        Self {
+            models: Vec::new(),
+            points: vec![Point::new(Gain::none(), known)],
+        }
+    }
+
+    /// Forgets what is kept where that is too much.
+    pub fn tidy(&mut self) {
+        if self.points.len() > MOST {
+            self.models.clear();
+            self.points.truncate(1);
+            self.points[Self::BEGIN].next.clear();
+        }
+    }
+
+    /// The number of a model.
+    pub fn number(&mut self, model: StepModel<M>) -> usize {
+        let known = self.models.iter().position(|known| *known == model);
+        known.unwrap_or_else(|| {
+            self.models.push(model);
+            self.models.len() - 1
+        })
+    }
+
+    pub fn model(&self, number: usize) -> &StepModel<M> {
+        &self.models[number]
+    }
+
+    pub fn point(&self, number: usize) -> &Point<M, G> {
+        &self.points[number]
+    }
+
+    /// Where a step leads.
+    pub fn step(&mut self, from: usize, model: usize) -> usize {
+        self.reached(from, Event::Step(model)).unwrap_or_else(|| {
+            let known = self.points[from].known.propagated(&self.models[model]);
+            self.leads(from, Event::Step(model), Point::new(Gain::none(), known))
+        })
+    }
+
+    /// Where it leads to take in three navigation errors from a state on, observed with this variance each; `None`
+    /// where their covariance is not positive definite.
+    pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
+        let event = Event::Observed(state, variance);
+        if let Some(reached) = self.reached(from, event) {
+            return Some(reached);
+        }
+        let known = &self.points[from].known;
+        let gain = known.gain(state, variance)?;
+        let known = known.told(&gain);
+        Some(self.leads(from, event, Point::new(gain, known)))
+    }
+
+    fn reached(&self, from: usize, event: Event) -> Option<usize> {
+        let next = &self.points[from].next;
+        let (_, to) = next.iter().find(|(known, _)| *known == event)?;
+        Some(*to)
+    }
+
+    fn leads(&mut self, from: usize, event: Event, to: Point<M, G>) -> usize {
+        let number = self.points.len();
+        self.points.push(to);
+        self.points[from].next.push((event, number));
+        number
+    }
+}
+
+impl<const M: usize, const G: usize> Point<M, G> {
+    fn new(gain: Gain<M, G>, known: Known<M, G>) -> Self {
+        Self {
+            gain,
+            known: Box::new(known),
+            next: Vec::new(),
+        }
+    }
+}
+
+impl<const M: usize, const G: usize> Gain<M, G> {
+    /// Nothing is observed.
+    fn none() -> Self {
+        Self {
+            root: Matrix3::identity(),
+            rows: [[0.0; G]; 3],
+            of_errors: [[0.0; M]; 3],
+        }
+    }
+}
+
+impl<const M: usize, const G: usize> Known<M, G> {
+    fn propagated(&self, model: &StepModel<M>) -> Self {
+        let mut of_given = [[0.0; G]; M];
+        let mut half = [[0.0; M]; M];
+        for &(row, column, phi) in &model.transition {
+            add(&mut of_given[row], phi, &self.of_given[column]);
+            add(&mut half[row], phi, &self.covariance[column]);
+        }
+        for &(row, component, by) in &model.driven {
+            of_given[row][component] += by;
+        }
+        let mut covariance = model.noise;
+        for (row, sum) in covariance.iter_mut().enumerate() {
+            for &(at, column, phi) in &model.transition {
+                sum[at] += phi * half[row][column];
+            }
+        }
+        Self {
+            of_given,
+            covariance,
+            information: self.information,
+        }
+    }
+
+    fn gain(&self, state: usize, variance: f64) -> Option<Gain<M, G>> {
+        let states = [0, 1, 2].map(|axis| state + axis);
+        let mut rows = states.map(|state| self.of_given[state]);
+        let mut of_errors = states.map(|state| self.covariance[state]);
+        let own = Matrix3::from_fn(|row, column| of_errors[row][states[column]])
+            + Matrix3::from_diagonal_element(variance);
+        let root = own.cholesky()?.l();
+        whiten(&root, &mut rows);
+        whiten(&root, &mut of_errors);
+        Some(Gain {
+            root,
+            rows,
+            of_errors,
+        })
+    }
+
+    /// After an observation.
+    fn told(&self, gain: &Gain<M, G>) -> Self {
+        let mut known = self.clone();
+        for (row, of_errors) in gain.rows.iter().zip(&gain.of_errors) {
+            for (state, gain) in of_errors.iter().enumerate() {
+                add(&mut known.of_given[state], -gain, row);
+                add(&mut known.covariance[state], -gain, of_errors);
+            }
+            for (of_component, weight) in known.information.iter_mut().zip(row) {
+                add(of_component, *weight, row);
+            }
+        }
+        known
+    }
+}
