@@ -13,7 +13,6 @@ pub(in crate::calibration) use back::{Effect, Followed, Told};
 pub(in crate::calibration) use dwells::Dwells;
 pub(in crate::calibration) use operation::{Driver, Operation};
 pub(in crate::calibration) use standing::{Innovations, Observer, Taken, Verdict};
-pub(super) use update::Linear;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -5,6 +5,7 @@ mod earlier;
 mod filter;
 mod gate;
 mod given;
+mod linear;
 mod local;
 mod measurement;
 mod mode;

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::Linear;
+use super::linear::Linear;
 
 /// Parameters that are tried in a pass, and what they do to it.
 #[derive(Debug, Clone)]

@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::super::courses::StepModel;
 use super::super::given::Given;
+use super::super::linear::Linear;
 use super::super::segment::Segment;
 use super::Filter;
-use super::update::Linear;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::navigation::Block;
 
@@ -41,7 +41,7 @@ impl Filter {
         moving: &[usize],
         size: usize,
     ) -> Map {
-        let mut given = Linear::zeros(size, self);
+        let mut given = self.none(size);
         let table = self.table_map(segment);
         for (component, &state) in given_at_begin(moving).enumerate() {
             given.states[(component, state)] = 1.0;
@@ -85,7 +85,7 @@ impl Filter {
 
     /// By how much the attitude of the table is off.
     fn table_map(&self, segment: &Segment) -> Linear {
-        let mut table = Linear::zeros(3, self);
+        let mut table = self.none(3);
         let errors = self.layout.table_position().into_iter();
         for error in errors.chain(self.layout.table_base()) {
             for axis in 0..3 {

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 use super::*;
 use crate::calibration::innovation::Observation;
 use crate::calibration::parameters::PARAMETERS;
+use crate::calibration::pass::linear::Linear;
 use crate::calibration::pass::measurement::{Measurement, ScalarInnovation};
 use crate::calibration::pass::segment::{Seen, Segment, segments};
 use crate::calibration::problem::Stretch;

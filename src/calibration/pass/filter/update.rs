@@ -2,47 +2,20 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::super::linear::Linear;
 use super::super::measurement::Measurement;
 use super::Filter;
 use super::operation::Operation;
 
-/// Quantities that are linear in the errors, a row each: by state, and by parameter that is tried.
-#[derive(Debug)]
-pub(in super::super) struct Linear {
-    pub states: DMatrix<f64>,
-    pub tried: DMatrix<f64>,
-}
-
-impl Linear {
-    pub fn zeros(rows: usize, filter: &Filter) -> Self {
-        Self {
-            states: DMatrix::zeros(rows, filter.x.len()),
-            tried: DMatrix::zeros(rows, filter.layout.tried()),
-        }
-    }
-
-    /// Combinations of them, a row of weights each.
-    pub fn combined(&self, weights: &DMatrix<f64>) -> Self {
-        Self {
-            states: weights * &self.states,
-            tried: weights * &self.tried,
-        }
-    }
-
-    /// The rows from a first on become more by others.
-    pub fn add(&mut self, first: usize, others: &Self) {
-        let count = others.states.nrows();
-        let mut rows = self.states.rows_mut(first, count);
-        rows += &others.states;
-        let mut rows = self.tried.rows_mut(first, count);
-        rows += &others.tried;
-    }
-}
-
 impl Filter {
+    /// So many quantities that no error does anything to.
+    pub(super) fn none(&self, rows: usize) -> Linear {
+        Linear::zeros(rows, self.x.len(), self.layout.tried())
+    }
+
     /// Takes in a measurement.
     pub fn update(&mut self, measurement: &Measurement) {
-        let mut h = Linear::zeros(measurement.rows.len(), self);
+        let mut h = self.none(measurement.rows.len());
         for (row, of_row) in measurement.rows.iter().enumerate() {
             for &(state, weight) in of_row {
                 h.states[(row, state)] = weight;
