@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use nalgebra::Vector3;
+
 use super::Draft;
 use super::name::axes_of_program;
 use super::units::short;
@@ -23,6 +25,9 @@ struct Class {
     /// m/s².
     accel_bias: f64,
 }
+
+/// A bias of more than so many σ of its class is none of its class.
+const BEYOND: f64 = 3.0;
 
 const CLASSES: [Class; 3] = [
     Class {
@@ -255,7 +260,35 @@ impl Draft {
                 names.join(", ")
             );
         }
-        let _ = writeln!(text, "columns = {{ {} }}", fields.join(", "));
+        let fields = fields.join(", ");
+        if let Some(axes) = self.turned_axes() {
+            text.push_str(&axes);
+        }
+        if self.blocked.is_empty() {
+            let _ = writeln!(text, "columns = {{ {fields} }}");
+        } else {
+            let why = self.blocked.join("; ");
+            let _ = writeln!(text, "# columns = {{ {fields} }}  # TODO: {why}");
+        }
+    }
+
+    /// Where gyros do not turn as the accelerometers' columns lie.
+    fn turned_axes(&self) -> Option<String> {
+        let axes = self.registers.as_ref()?.axes.as_ref();
+        let axes = axes.filter(|axes| !axes.agree() && self.quantities.is_count(Sensor::Gyro))?;
+        let triad = self.columns.triads.gyro?;
+        let name = |k: usize| {
+            let sign = if axes.scale[k] < 0.0 { "−" } else { "" };
+            format!("{sign}{}", self.columns.names[triad[k]])
+        };
+        Some(format!(
+            "# By gravity's directions over {} moves the gyros that turn about the accelerometers' axes are {}, {} and \
+             {}:\n# hence the order of their columns and the signs of their scale.\n",
+            axes.moves,
+            name(0),
+            name(1),
+            name(2)
+        ))
     }
 
     fn noise_table(&self, text: &mut String) {
@@ -318,16 +351,9 @@ impl Draft {
         let is_count = unit.word.is_none_or(|word| word == "count");
         let scale = self.quantities.scale(sensor);
         match (&unit.scale, is_count) {
-            (Some(scale), _) => line(
-                text,
-                "scale",
-                &format!("{:?}", seven(scale.value)),
-                &scale.why,
-            ),
-            (None, true) => todo(
-                text,
-                "scale",
-                match sensor {
+            (Some(scale), _) => line(text, "scale", &three(&scale.value), &scale.why),
+            (None, true) => {
+                let plain = match sensor {
                     Sensor::Gyro => {
                         "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, \
                          32.8, 16.4"
@@ -335,42 +361,98 @@ impl Draft {
                     Sensor::Accel => {
                         "counts for one m/s² by the data sheet: those for one g over 9.80665"
                     }
-                },
-            ),
+                };
+                todo(text, "scale", &self.open_scale(plain, sensor));
+            }
             (None, false) => {}
         }
-        let _ = writeln!(text, "scale_sigma_ppm = {:?}", class.scale_ppm);
+        let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
+        let _ = writeln!(
+            text,
+            "scale_sigma_ppm = {:?}",
+            class.scale_ppm.max(short(off))
+        );
         let _ = writeln!(
             text,
             "installation_sigma_arcsec = {:?}",
             class.installation / ARCSEC
         );
+        self.bias(text, sensor, scale.map(f64::abs), class);
+    }
+
+    fn open_scale(&self, plain: &str, sensor: Sensor) -> String {
+        let registers = self.registers.as_ref();
+        let why = match registers {
+            Some(found) if !found.has_rests => "; nothing is at rest, so nothing shows it",
+            Some(_) if sensor == Sensor::Accel => "; gravity at rest does not show it",
+            Some(_) => "; gravity's directions at rest do not show it",
+            None => "",
+        };
+        let likely = self.quantities.units.get(sensor).likely.as_ref();
+        let likely = likely.map_or(String::new(), |likely| format!("; {likely}"));
+        format!("{plain}{why}{likely}")
+    }
+
+    fn bias(&self, text: &mut String, sensor: Sensor, scale: Option<f64>, class: &Class) {
         let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        if offset != 0.0 {
-            line(
-                text,
-                "bias",
-                &format!("{:?}", offset * per_second),
-                "what an unsigned register says at zero",
-            );
-        }
         let usual = match sensor {
             Sensor::Gyro => class.gyro_bias,
             Sensor::Accel => class.accel_bias,
         };
-        let rest = self.rest.filter(|_| sensor == Sensor::Gyro).unwrap_or(0.0) * per_second;
-        match scale {
-            Some(scale) => {
-                let sigma = (usual * scale.abs()).max(2.0 * rest);
-                line(
-                    text,
-                    "bias_sigma",
-                    &format!("{:?}", short(sigma)),
-                    "in the file's unit, per second",
-                );
+        let mut sigma = scale.map(|scale| usual * scale);
+        match self.own_zero(sensor, sigma.map(|sigma| sigma / per_second)) {
+            Some((zero, off, why)) => {
+                let bias = zero.add_scalar(offset) * per_second;
+                line(text, "bias", &three(&bias), why);
+                sigma = sigma.map(|sigma| sigma.max(2.0 * off * per_second));
             }
+            None => {
+                if offset != 0.0 {
+                    line(
+                        text,
+                        "bias",
+                        &format!("{:?}", offset * per_second),
+                        "what an unsigned register says at zero",
+                    );
+                }
+                let rest = self.rest.filter(|_| sensor == Sensor::Gyro);
+                let rest = rest.map_or(0.0, |rest| rest.amax()) * per_second;
+                sigma = sigma.map(|sigma| sigma.max(2.0 * rest));
+            }
+        }
+        match sigma {
+            Some(sigma) => line(
+                text,
+                "bias_sigma",
+                &format!("{:?}", short(sigma)),
+                "in the file's unit, per second",
+            ),
             None => todo(text, "bias_sigma", "in the file's unit, per second"),
+        }
+    }
+
+    /// What the record shows a register to say at zero, with its σ, where it is none that its class has: in the
+    /// file's quantity a row.
+    fn own_zero(
+        &self,
+        sensor: Sensor,
+        usual: Option<f64>,
+    ) -> Option<(Vector3<f64>, f64, &'static str)> {
+        if !self.quantities.is_count(sensor) {
+            return None;
+        }
+        let registers = self.registers.as_ref()?;
+        match sensor {
+            Sensor::Accel => {
+                let gravity = registers.gravity.as_ref()?;
+                let why = "where gravity at rest is centred";
+                Some((gravity.own_zero?, gravity.zero_sigma, why))
+            }
+            Sensor::Gyro => {
+                let rest = self.rest.filter(|_| registers.has_rests)?;
+                (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "what it says at rest"))
+            }
         }
     }
 
@@ -406,6 +488,16 @@ fn places(count: usize) -> String {
         "one place".to_owned()
     } else {
         format!("{count} places")
+    }
+}
+
+/// One number for three that are the same.
+fn three(values: &Vector3<f64>) -> String {
+    let [x, y, z] = <[f64; 3]>::from(*values).map(seven);
+    if x == y && y == z {
+        format!("{x:?}")
+    } else {
+        format!("[{x:?}, {y:?}, {z:?}]")
     }
 }
 
