@@ -9,6 +9,7 @@ mod least_squares;
 mod motion;
 mod name;
 mod noise;
+mod priors;
 mod registers;
 mod rests;
 mod streams;
