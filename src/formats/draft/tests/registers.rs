@@ -1,4 +1,12 @@
+use std::cell::RefCell;
+
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
 use super::{draft, has};
+use crate::attitude::exp;
 
 const HEADER: &str = "t,gx,gy,gz,ax,ay,az\n";
 
@@ -39,9 +47,37 @@ fn the_zero_of_a_register_is_where_gravity_at_rest_is_centred() {
     }
 }
 
+/// Turns about axes of all directions with rests between, in rad/s and m/s².
+fn tumbling() -> Vec<[f64; 6]> {
+    let (mut rng, mut up) = (ChaCha8Rng::seed_from_u64(2), Vector3::z());
+    let mut rows = Vec::new();
+    for turn in 0..10 {
+        let t = f64::from(turn);
+        let axis = Vector3::new(t.sin(), (1.7 * t).cos(), (2.3 * t + 1.0).sin()).normalize();
+        for step in 0..270 {
+            let rate = if step < 185 {
+                Vector3::zeros()
+            } else {
+                axis * (1.6 + 0.4 * t.cos())
+            };
+            up = exp(-rate * 0.01) * up;
+            let [gyro, accel] = [(rate, 1e-3), (up * 9.8, 1e-2)].map(|(of, sigma)| {
+                of.map(|value| {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    value + sigma * noise
+                })
+            });
+            rows.push([gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z]);
+        }
+    }
+    rows
+}
+
 #[test]
 fn gyros_get_the_order_and_the_signs_of_the_axes_that_gravity_turns_about() {
-    let text = draft(HEADER, |k, [x, y, z, ax, ay, az]| {
+    let rows = tumbling();
+    let text = draft(HEADER, |k, _| {
+        let [x, y, z, ax, ay, az] = rows[k];
         row(k, [-z, x, -y, ax, ay, az], [65.5, 8192.0], [0.0; 6])
     });
     has(
@@ -55,18 +91,26 @@ fn gyros_get_the_order_and_the_signs_of_the_axes_that_gravity_turns_about() {
 
 #[test]
 fn one_attitude_leaves_the_zero_open_and_motion_without_rest_the_scale() {
-    // Of no axis the same at any time, and of any noise.
-    let noise = |k: usize| ((k * 7919 % 1009) as f64 / 1009.0 - 0.5) * 0.02;
+    let rng = RefCell::new(ChaCha8Rng::seed_from_u64(3));
+    let noisy = |value: f64, sigma: f64| {
+        let noise: f64 = StandardNormal.sample(&mut *rng.borrow_mut());
+        value + sigma * noise
+    };
     let text = draft(HEADER, |k, _| {
         let v = [
-            noise(k),
-            noise(k + 3),
-            noise(k + 5),
-            3.0 + noise(k + 7),
-            1.0 + noise(k + 11),
-            9.28,
+            (0.0, 2e-3),
+            (0.0, 2e-3),
+            (0.0, 2e-3),
+            (3.0, 0.02),
+            (1.0, 0.02),
+            (9.28, 0.02),
         ];
-        row(k, v, [65.5, 8192.0], [0.0; 6])
+        row(
+            k,
+            v.map(|(value, sigma)| noisy(value, sigma)),
+            [65.5, 8192.0],
+            [0.0; 6],
+        )
     });
     has(
         &text,
@@ -78,19 +122,15 @@ fn one_attitude_leaves_the_zero_open_and_motion_without_rest_the_scale() {
     assert!(text.contains("if it says nothing at zero"), "{text}");
     let text = draft(HEADER, |k, _| {
         let t = k as f64 * 0.01;
+        let (level, turned) = (0.9 * t, 1.7 * t);
         let up = [
-            (1.7 * t).sin() * (0.9 * t).cos(),
-            (1.7 * t).cos() * (0.9 * t).cos(),
-            (0.9 * t).sin(),
+            turned.sin() * level.cos(),
+            turned.cos() * level.cos(),
+            level.sin(),
         ];
-        let v = [
-            1.1 + (2.0 * t).sin(),
-            (1.3 * t).cos(),
-            0.4 + t.sin(),
-            9.8 * up[0],
-            9.8 * up[1],
-            9.8 * up[2],
-        ];
+        let rate = [1.1 + (2.0 * t).sin(), (1.3 * t).cos(), 0.4 + t.sin()];
+        let force = up.map(|of| noisy(9.8 * of, 0.02));
+        let v = [rate[0], rate[1], rate[2], force[0], force[1], force[2]];
         row(k, v, [65.5, 8192.0], [0.0; 6])
     });
     has(
