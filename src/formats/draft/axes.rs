@@ -279,14 +279,14 @@ fn bettered(
         moves.iter().flat_map(of).collect()
     };
     let (of_one, of_several) = (prior(TOLERANCE), prior(ANY_SCALE));
-    let one = fit(Parameters::zeros(), &of_one, PART, &equations)?;
-    let Some(several) = fit(one.at, &of_several, PART, &equations) else {
+    let one = fit(Parameters::zeros(), &of_one, PART, equations)?;
+    let Some(several) = fit(one.at, &of_several, PART, equations) else {
         return Some((one, false));
     };
     // Two accounts are held against each other at one σ.
     let sigma = several.sigma;
     let cost_of = |prior: &_, at: &Parameters| cost(&equations(at), sigma, prior, at);
-    let gain = fit_at(one.at, &of_one, sigma, &equations)
+    let gain = fit_at(one.at, &of_one, sigma, equations)
         .map(|one| cost_of(&of_one, &one.at) - cost_of(&of_several, &several.at));
     Some(match gain {
         Some(gain) if gain < chi_square_limit(2.0, CHANCE) => (one, false),
