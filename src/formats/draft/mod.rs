@@ -1,10 +1,17 @@
 //! A draft of `run.toml` for a log that has none: what its names and numbers show, each with the reason, and
 //! what only a person knows left open.
 
+mod axes;
 mod columns;
+mod data_sheet;
+mod gravity;
+mod least_squares;
 mod motion;
 mod name;
 mod noise;
+mod priors;
+mod registers;
+mod rests;
 mod streams;
 mod text;
 mod time;
@@ -25,6 +32,7 @@ use crate::imu::{PerSensor, Sensor};
 use crate::noise::NoiseFigures;
 use columns::Columns;
 use motion::Motion;
+use registers::Registers;
 use streams::{Streams, Written};
 use time::Clock;
 use units::Quantities;
@@ -44,12 +52,16 @@ pub struct Draft {
     columns: Columns,
     clock: Clock,
     quantities: Quantities,
-    /// What a register says at zero, a row.
+    /// What a register is made to say at zero, a row …
     offset: PerSensor<f64>,
+    /// … and what the record shows of it, of counts.
+    registers: Option<Registers>,
+    /// Why the columns cannot be taken as they are.
+    blocked: Vec<String>,
     /// In the file's quantity per second, where something is at rest.
     noise: PerSensor<Option<NoiseFigures>>,
-    /// Output of the gyros at rest, the file's quantity a row.
-    rest: Option<f64>,
+    /// Output of the gyros at rest above that, the file's quantity a row.
+    rest: Option<Vector3<f64>>,
     /// Sections laid end to end, as far as gravity shows.
     cuts: usize,
 }
@@ -133,11 +145,36 @@ impl Draft {
         }
         let clock = Clock::find(&sheet, &mut columns);
         let mut triads = columns.samples(&sheet);
+        let wrapped = triads.as_mut().map(registers::unwrap).unwrap_or_default();
+        let whole = triads
+            .as_ref()
+            .map(|triads| PerSensor::from_fn(|sensor| rests::is_whole(triads.get(sensor))));
+        let whole = whole.unwrap_or_default();
         let offset = triads.as_mut().map(units::centre).unwrap_or_default();
         let period = clock.period.unwrap_or(USUAL_PERIOD);
-        let motion = triads.as_ref().map(|triads| Motion::find(triads, period));
-        let quantities =
-            Quantities::find(&sheet, &columns, &clock, triads.as_ref(), motion.as_ref());
+        let mut motion = triads.as_ref().map(|triads| Motion::find(triads, period));
+        let mut quantities = Quantities::find(&sheet, &columns, &clock, whole, motion.as_ref());
+        let mut blocked = Vec::new();
+        let mut registers = None;
+        let cuts = motion.as_ref().map_or(0, |motion| motion.cuts);
+        let is_asked = quantities.has_counts() || cuts > 0;
+        if let Some(triads) = triads.as_mut().filter(|_| is_asked) {
+            let found = Registers::find(triads, period);
+            let is_count = PerSensor::from_fn(|sensor| quantities.is_count(sensor));
+            found.apply(triads, &mut columns, &is_count);
+            let again = motion.insert(Motion::find(triads, period));
+            if let Some(axes) = &found.axes {
+                // Where gyros carry gravity from rest to rest no sections were laid end to end.
+                again.cuts = 0;
+                again.angle = again.angle.or(axes.angle());
+            }
+            quantities = Quantities::find(&sheet, &columns, &clock, whole, Some(again));
+            quantities.of_registers(&found, clock.period);
+            if quantities.has_counts() {
+                blocked = registers::unfit(&columns, &sheet, &wrapped, &found);
+                registers = Some(found);
+            }
+        }
         let noise = |triads: &PerSensor<Vec<Vector3<f64>>>| {
             let (period, rest) = (clock.period?, motion.as_ref()?.longest_rest.clone());
             let at_rest = PerSensor::from_fn(|sensor| &triads.get(sensor)[rest.clone()]);
@@ -153,7 +190,9 @@ impl Draft {
         }
         Self {
             streams,
-            rest: motion.as_ref().map(|motion| motion.rest.amax()),
+            registers,
+            blocked,
+            rest: motion.as_ref().map(|motion| motion.rest),
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
             instance,
             columns,

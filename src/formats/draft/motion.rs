@@ -11,11 +11,11 @@ use crate::statistics::{SIGMA_OF_MEDIAN, median};
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
-const WINDOW: f64 = 0.25;
+pub(super) const WINDOW: f64 = 0.25;
 /// Windows at rest differ by less than this many σ of their noise …
-const SIGMAS: f64 = 6.0;
+pub(super) const SIGMAS: f64 = 6.0;
 /// … and this part of gravity or of the fastest turn.
-const PART: f64 = 1e-3;
+pub(super) const PART: f64 = 1e-3;
 /// Samples on either side of a cut …
 const BESIDE: usize = 8;
 /// … between which gravity's direction changes by this much at once, rad …
@@ -122,7 +122,7 @@ impl Motion {
 }
 
 /// Runs of windows at rest.
-fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
+pub(super) fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut begin = 0;
     for stretch in at_rest.chunk_by(|a, b| a == b) {

@@ -7,6 +7,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 
+mod registers;
+
 /// Three quarter turns about each axis in turn with rests between, at 100 Hz; `row` makes a line of time,
 /// angular rate and specific force.
 fn draft(header: &str, row: impl Fn(usize, [f64; 6]) -> String) -> String {

@@ -7,52 +7,6 @@ use super::name::axes_of_program;
 use super::units::short;
 use crate::imu::{NoiseKeys, Output, Sensor};
 use crate::noise::NoiseFigures;
-use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ};
-
-/// Knowledge before calibration that is usual in a class of instruments, 1σ.
-struct Class {
-    name: &'static str,
-    /// White noise of the gyros below which an instrument is of this class, rad/√s.
-    angle_random_walk: f64,
-    /// The same of the accelerometers, (m/s)/√s.
-    velocity_random_walk: f64,
-    scale_ppm: f64,
-    installation: f64,
-    /// rad/s.
-    gyro_bias: f64,
-    /// m/s².
-    accel_bias: f64,
-}
-
-const CLASSES: [Class; 3] = [
-    Class {
-        name: "a navigation-grade",
-        angle_random_walk: 0.01 * DEG_PER_SQRT_H,
-        velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
-        scale_ppm: 7_000.0,
-        installation: 600.0 * ARCSEC,
-        gyro_bias: 0.03 * DEGREE,
-        accel_bias: 0.05,
-    },
-    Class {
-        name: "a tactical-grade",
-        angle_random_walk: 0.1 * DEG_PER_SQRT_H,
-        velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
-        scale_ppm: 10_000.0,
-        installation: 3_600.0 * ARCSEC,
-        gyro_bias: 0.2 * DEGREE,
-        accel_bias: 0.2,
-    },
-    Class {
-        name: "a MEMS",
-        angle_random_walk: f64::INFINITY,
-        velocity_random_walk: f64::INFINITY,
-        scale_ppm: 50_000.0,
-        installation: 7_200.0 * ARCSEC,
-        gyro_bias: 2.0 * DEGREE,
-        accel_bias: 1.0,
-    },
-];
 
 impl Draft {
     /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
@@ -255,7 +209,35 @@ impl Draft {
                 names.join(", ")
             );
         }
-        let _ = writeln!(text, "columns = {{ {} }}", fields.join(", "));
+        let fields = fields.join(", ");
+        if let Some(axes) = self.turned_axes() {
+            text.push_str(&axes);
+        }
+        if self.blocked.is_empty() {
+            let _ = writeln!(text, "columns = {{ {fields} }}");
+        } else {
+            let why = self.blocked.join("; ");
+            let _ = writeln!(text, "# columns = {{ {fields} }}  # TODO: {why}");
+        }
+    }
+
+    /// Where gyros do not turn as the accelerometers' columns lie.
+    fn turned_axes(&self) -> Option<String> {
+        let axes = self.registers.as_ref()?.axes.as_ref();
+        let axes = axes.filter(|axes| !axes.agree() && self.quantities.is_count(Sensor::Gyro))?;
+        let triad = self.columns.triads.gyro?;
+        let name = |k: usize| {
+            let sign = if axes.scale[k] < 0.0 { "−" } else { "" };
+            format!("{sign}{}", self.columns.names[triad[k]])
+        };
+        Some(format!(
+            "# By gravity's directions over {} moves the gyros that turn about the accelerometers' axes are {}, {} and \
+             {}:\n# hence the order of their columns and the signs of their scale.\n",
+            axes.moves,
+            name(0),
+            name(1),
+            name(2)
+        ))
     }
 
     fn noise_table(&self, text: &mut String) {
@@ -286,92 +268,9 @@ impl Draft {
     }
 
     /// The noise of a triad, with the file's quantity per second for one rad/s or m/s².
-    fn figures(&self, sensor: Sensor) -> Option<(&NoiseFigures, f64)> {
+    pub(super) fn figures(&self, sensor: Sensor) -> Option<(&NoiseFigures, f64)> {
         let figures = self.noise.get(sensor).as_ref()?;
         Some((figures, self.quantities.scale(sensor)?.abs()))
-    }
-
-    /// By the noise of the gyros, else that of the accelerometers.
-    fn class(&self) -> &'static Class {
-        let walk = |sensor| {
-            let (figures, scale) = self.figures(sensor)?;
-            Some(figures.noise.random_walk / scale)
-        };
-        let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
-            (Some(walk), _) => walk < class.angle_random_walk,
-            (None, Some(walk)) => walk < class.velocity_random_walk,
-            (None, None) => class.angle_random_walk.is_infinite(),
-        };
-        let [.., widest] = &CLASSES;
-        CLASSES.iter().find(is_of).unwrap_or(widest)
-    }
-
-    fn prior(&self, text: &mut String, sensor: Sensor) {
-        let (class, unit) = (self.class(), self.quantities.units.get(sensor));
-        let _ = writeln!(
-            text,
-            "\n# usual of {} instrument: check them against the data sheet; N = scale * installation * u + bias\n\
-             [imu.prior.{}]",
-            class.name,
-            sensor.name()
-        );
-        let is_count = unit.word.is_none_or(|word| word == "count");
-        let scale = self.quantities.scale(sensor);
-        match (&unit.scale, is_count) {
-            (Some(scale), _) => line(
-                text,
-                "scale",
-                &format!("{:?}", seven(scale.value)),
-                &scale.why,
-            ),
-            (None, true) => todo(
-                text,
-                "scale",
-                match sensor {
-                    Sensor::Gyro => {
-                        "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, \
-                         32.8, 16.4"
-                    }
-                    Sensor::Accel => {
-                        "counts for one m/s² by the data sheet: those for one g over 9.80665"
-                    }
-                },
-            ),
-            (None, false) => {}
-        }
-        let _ = writeln!(text, "scale_sigma_ppm = {:?}", class.scale_ppm);
-        let _ = writeln!(
-            text,
-            "installation_sigma_arcsec = {:?}",
-            class.installation / ARCSEC
-        );
-        let offset = *self.offset.get(sensor);
-        let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        if offset != 0.0 {
-            line(
-                text,
-                "bias",
-                &format!("{:?}", offset * per_second),
-                "what an unsigned register says at zero",
-            );
-        }
-        let usual = match sensor {
-            Sensor::Gyro => class.gyro_bias,
-            Sensor::Accel => class.accel_bias,
-        };
-        let rest = self.rest.filter(|_| sensor == Sensor::Gyro).unwrap_or(0.0) * per_second;
-        match scale {
-            Some(scale) => {
-                let sigma = (usual * scale.abs()).max(2.0 * rest);
-                line(
-                    text,
-                    "bias_sigma",
-                    &format!("{:?}", short(sigma)),
-                    "in the file's unit, per second",
-                );
-            }
-            None => todo(text, "bias_sigma", "in the file's unit, per second"),
-        }
     }
 
     fn table(&self, text: &mut String) {
@@ -397,7 +296,7 @@ pub(super) fn line(text: &mut String, key: &str, value: &str, why: &str) {
     let _ = writeln!(text, "{key} = {value}  # {why}");
 }
 
-fn todo(text: &mut String, key: &str, why: &str) {
+pub(super) fn todo(text: &mut String, key: &str, why: &str) {
     let _ = writeln!(text, "# {key} =  # TODO: {why}");
 }
 
@@ -410,7 +309,7 @@ fn places(count: usize) -> String {
 }
 
 /// A number to seven digits.
-fn seven(value: f64) -> f64 {
+pub(super) fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 

@@ -3,8 +3,10 @@
 use nalgebra::Vector3;
 
 use super::columns::Columns;
+use super::data_sheet::{Scale, likely_for_g};
 use super::motion::Motion;
 use super::name::{self, Name};
+use super::registers::Registers;
 use super::time::Clock;
 use crate::formats::Sheet;
 use crate::imu::{Output, PerSensor, Sensor};
@@ -14,32 +16,18 @@ use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 const GRAVITY_FACTOR: f64 = 1.25;
 /// So do turns.
 const TURN_FACTOR: f64 = 1.3;
-/// A measured scale this near to one of a data sheet is that.
-const NEAR: f64 = 0.03;
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
-/// Counts for a degree a second that data sheets state.
-const DATA_SHEET: [f64; 16] = [
-    131.0, 65.5, 32.8, 16.4, 131.072, 65.536, 32.768, 16.384, 262.144, 14.375, 114.29, 57.14,
-    28.57, 14.29, 50.0, 20.0,
-];
-
-/// Counts for one of `run.toml`'s units, with the reason.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Scale {
-    /// The file's quantity per second for one rad/s or m/s².
-    pub value: f64,
-    pub why: String,
-}
-
 /// What is known of the unit of a triad.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Unit {
     /// The word for `run.toml`, if it is known.
     pub word: Option<&'static str>,
     pub why: String,
-    /// For counts, where something shows it.
+    /// For counts, where something shows it …
     pub scale: Option<Scale>,
+    /// … and what is likely where nothing does.
+    pub likely: Option<String>,
 }
 
 /// What rows hold.
@@ -57,7 +45,7 @@ impl Quantities {
         sheet: &Sheet,
         columns: &Columns,
         clock: &Clock,
-        triads: Option<&PerSensor<Vec<Vector3<f64>>>>,
+        whole: PerSensor<bool>,
         motion: Option<&Motion>,
     ) -> Self {
         let mut found = Self {
@@ -66,7 +54,7 @@ impl Quantities {
             units: PerSensor::default(),
             opposed: false,
         };
-        let (Some(triads), Some(motion)) = (triads, motion) else {
+        let Some(motion) = motion else {
             return found;
         };
         let named = PerSensor::from_fn(|sensor| {
@@ -74,12 +62,6 @@ impl Quantities {
             Name::of(&sheet.names[first])
                 .unit
                 .or_else(|| name::unit(&sheet.units[first]))
-        });
-        let whole = PerSensor::from_fn(|sensor| {
-            triads
-                .get(sensor)
-                .iter()
-                .all(|sample| sample.iter().all(|value| value.fract() == 0.0))
         });
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
         let angle = motion.angle.map(f64::abs);
@@ -95,6 +77,46 @@ impl Quantities {
         found
     }
 
+    /// Whether a triad holds counts of no known size.
+    pub fn has_counts(&self) -> bool {
+        Sensor::ALL.into_iter().any(|sensor| self.is_count(sensor))
+    }
+
+    pub fn is_count(&self, sensor: Sensor) -> bool {
+        self.units.get(sensor).word == Some("count")
+    }
+
+    /// Takes in what the record shows of the registers behind its counts.
+    pub fn of_registers(&mut self, found: &Registers, period: Option<f64>) {
+        let per_second = self.per_second(period.unwrap_or(f64::NAN));
+        let accel = &mut self.units.accel;
+        if accel.word == Some("count") && accel.scale.as_ref().is_none_or(|of| !of.is_named) {
+            accel.scale = found
+                .gravity
+                .as_ref()
+                .filter(|_| per_second.is_finite())
+                .map(|gravity| Scale::of_gravity(gravity, per_second));
+        }
+        let row = match self.output {
+            Output::Rate => period.unwrap_or(f64::NAN),
+            Output::Pulse | Output::Increment => 1.0,
+        };
+        let gyro = &mut self.units.gyro;
+        let Some(axes) = found.axes.as_ref().filter(|_| row.is_finite()) else {
+            return;
+        };
+        let is_named = gyro.scale.as_ref().is_some_and(|of| of.is_named);
+        if gyro.word.is_none_or(|word| word == "count") && !is_named {
+            if gyro.word.is_none() {
+                gyro.word = Some("count");
+                gyro.why = "no known unit fits the turns of gravity".to_owned();
+            }
+            let scale = Scale::of_axes(axes, row, self.output);
+            gyro.scale = Some(scale);
+            self.opposed = false;
+        }
+    }
+
     /// Rows to rates.
     pub fn per_second(&self, period: f64) -> f64 {
         match self.output {
@@ -108,7 +130,7 @@ impl Quantities {
         let unit = self.units.get(sensor);
         unit.scale
             .as_ref()
-            .map(|scale| scale.value)
+            .map(|scale| scale.value.abs().mean())
             .or_else(|| crate::formats::unit_scale(sensor, unit.word?))
     }
 
@@ -167,7 +189,11 @@ impl Quantities {
                     (false, None) => format!("no known unit makes {size}"),
                 };
                 let per_g = gravity * self.per_second(seconds);
-                unit.scale = per_g.is_finite().then(|| accel_scale(named, per_g));
+                unit.scale = match named {
+                    Some("mg") => Some(Scale::of_name(1e3 / STANDARD_GRAVITY, "mg")),
+                    _ => None,
+                };
+                unit.likely = per_g.is_finite().then(|| likely_for_g(per_g));
             }
         }
         self.units.accel = unit;
@@ -233,11 +259,8 @@ impl Quantities {
                     (false, None) => "no known unit fits the turns of gravity".to_owned(),
                 };
                 unit.scale = match named {
-                    Some("mdps") => Some(Scale {
-                        value: 1e3 / DEGREE,
-                        why: "mdps, as the file says".to_owned(),
-                    }),
-                    _ => measured.map(|value| gyro_scale(value, self.output)),
+                    Some("mdps") => Some(Scale::of_name(1e3 / DEGREE, "mdps")),
+                    _ => measured.map(|value| Scale::of_steps(value, self.output)),
                 };
             }
             _ => unit.why = "nothing turns, so nothing shows it".to_owned(),
@@ -279,52 +302,6 @@ pub(super) fn centre(triads: &mut PerSensor<Vec<Vector3<f64>>>) -> PerSensor<f64
             .for_each(|sample| sample.add_scalar_mut(-zero));
         zero
     })
-}
-
-fn accel_scale(named: Option<&str>, per_g: f64) -> Scale {
-    if named == Some("mg") {
-        return Scale {
-            value: 1e3 / STANDARD_GRAVITY,
-            why: "mg, as the file says".to_owned(),
-        };
-    }
-    let power = 2f64.powf(per_g.log2().round());
-    if (per_g / power - 1.0).abs() < NEAR {
-        return Scale {
-            value: power / STANDARD_GRAVITY,
-            why: format!("{power} counts for one g; {} at rest", short(per_g)),
-        };
-    }
-    Scale {
-        value: short(per_g / STANDARD_GRAVITY),
-        why: "from gravity at rest; the data sheet knows better".to_owned(),
-    }
-}
-
-fn gyro_scale(measured: f64, output: Output) -> Scale {
-    let per_degree = measured * DEGREE;
-    let sheet = DATA_SHEET
-        .into_iter()
-        .filter(|_| output == Output::Rate)
-        .min_by(|a, b| {
-            (a / per_degree - 1.0)
-                .abs()
-                .total_cmp(&(b / per_degree - 1.0).abs())
-        })
-        .filter(|sheet| (sheet / per_degree - 1.0).abs() < NEAR);
-    match sheet {
-        Some(sheet) => Scale {
-            value: sheet / DEGREE,
-            why: format!(
-                "{sheet} counts for 1 deg/s; {} by the turns of gravity",
-                short(per_degree)
-            ),
-        },
-        None => Scale {
-            value: short(measured),
-            why: "from the turns of gravity; the data sheet knows better".to_owned(),
-        },
-    }
 }
 
 /// A number to four digits.

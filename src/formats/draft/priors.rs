@@ -1,0 +1,204 @@
+//! What is known before calibration: scale and bias as the record shows them, the rest as is usual in the class
+//! of its noise.
+
+use std::fmt::Write;
+
+use nalgebra::Vector3;
+
+use super::Draft;
+use super::text::{line, seven, todo};
+use super::units::short;
+use crate::imu::Sensor;
+use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ};
+
+/// Knowledge before calibration that is usual in a class of instruments, 1σ.
+struct Class {
+    name: &'static str,
+    /// White noise of the gyros below which an instrument is of this class, rad/√s.
+    angle_random_walk: f64,
+    /// The same of the accelerometers, (m/s)/√s.
+    velocity_random_walk: f64,
+    scale_ppm: f64,
+    installation: f64,
+    /// rad/s.
+    gyro_bias: f64,
+    /// m/s².
+    accel_bias: f64,
+}
+
+/// A bias of more than so many σ of its class is none of its class.
+const BEYOND: f64 = 3.0;
+
+const CLASSES: [Class; 3] = [
+    Class {
+        name: "a navigation-grade",
+        angle_random_walk: 0.01 * DEG_PER_SQRT_H,
+        velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 7_000.0,
+        installation: 600.0 * ARCSEC,
+        gyro_bias: 0.03 * DEGREE,
+        accel_bias: 0.05,
+    },
+    Class {
+        name: "a tactical-grade",
+        angle_random_walk: 0.1 * DEG_PER_SQRT_H,
+        velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 10_000.0,
+        installation: 3_600.0 * ARCSEC,
+        gyro_bias: 0.2 * DEGREE,
+        accel_bias: 0.2,
+    },
+    Class {
+        name: "a MEMS",
+        angle_random_walk: f64::INFINITY,
+        velocity_random_walk: f64::INFINITY,
+        scale_ppm: 50_000.0,
+        installation: 7_200.0 * ARCSEC,
+        gyro_bias: 2.0 * DEGREE,
+        accel_bias: 1.0,
+    },
+];
+
+impl Draft {
+    /// By the noise of the gyros, else that of the accelerometers.
+    fn class(&self) -> &'static Class {
+        let walk = |sensor| {
+            let (figures, scale) = self.figures(sensor)?;
+            Some(figures.noise.random_walk / scale)
+        };
+        let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
+            (Some(walk), _) => walk < class.angle_random_walk,
+            (None, Some(walk)) => walk < class.velocity_random_walk,
+            (None, None) => class.angle_random_walk.is_infinite(),
+        };
+        let [.., widest] = &CLASSES;
+        CLASSES.iter().find(is_of).unwrap_or(widest)
+    }
+
+    pub(super) fn prior(&self, text: &mut String, sensor: Sensor) {
+        let (class, unit) = (self.class(), self.quantities.units.get(sensor));
+        let _ = writeln!(
+            text,
+            "\n# usual of {} instrument: check them against the data sheet; N = scale * installation * u + bias\n\
+             [imu.prior.{}]",
+            class.name,
+            sensor.name()
+        );
+        let is_count = unit.word.is_none_or(|word| word == "count");
+        let scale = self.quantities.scale(sensor);
+        match (&unit.scale, is_count) {
+            (Some(scale), _) => line(text, "scale", &three(&scale.value), &scale.why),
+            (None, true) => {
+                let plain = match sensor {
+                    Sensor::Gyro => {
+                        "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, \
+                         32.8, 16.4"
+                    }
+                    Sensor::Accel => {
+                        "counts for one m/s² by the data sheet: those for one g over 9.80665"
+                    }
+                };
+                todo(text, "scale", &self.open_scale(plain, sensor));
+            }
+            (None, false) => {}
+        }
+        let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
+        let _ = writeln!(
+            text,
+            "scale_sigma_ppm = {:?}",
+            class.scale_ppm.max(short(off))
+        );
+        let _ = writeln!(
+            text,
+            "installation_sigma_arcsec = {:?}",
+            class.installation / ARCSEC
+        );
+        self.bias(text, sensor, scale.map(f64::abs), class);
+    }
+
+    fn open_scale(&self, plain: &str, sensor: Sensor) -> String {
+        let registers = self.registers.as_ref();
+        let why = match registers {
+            Some(found) if !found.has_rests => "; nothing is at rest, so nothing shows it",
+            Some(_) if sensor == Sensor::Accel => "; gravity at rest does not show it",
+            Some(_) => "; gravity's directions at rest do not show it",
+            None => "",
+        };
+        let likely = self.quantities.units.get(sensor).likely.as_ref();
+        let likely = likely.map_or(String::new(), |likely| format!("; {likely}"));
+        format!("{plain}{why}{likely}")
+    }
+
+    fn bias(&self, text: &mut String, sensor: Sensor, scale: Option<f64>, class: &Class) {
+        let offset = *self.offset.get(sensor);
+        let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
+        let usual = match sensor {
+            Sensor::Gyro => class.gyro_bias,
+            Sensor::Accel => class.accel_bias,
+        };
+        let mut sigma = scale.map(|scale| usual * scale);
+        match self.own_zero(sensor, sigma.map(|sigma| sigma / per_second)) {
+            Some((zero, off, why)) => {
+                let bias = zero.add_scalar(offset) * per_second;
+                line(text, "bias", &three(&bias), why);
+                sigma = sigma.map(|sigma| sigma.max(2.0 * off * per_second));
+            }
+            None => {
+                if offset != 0.0 {
+                    line(
+                        text,
+                        "bias",
+                        &format!("{:?}", offset * per_second),
+                        "what an unsigned register says at zero",
+                    );
+                }
+                let rest = self.rest.filter(|_| sensor == Sensor::Gyro);
+                let rest = rest.map_or(0.0, |rest| rest.amax()) * per_second;
+                sigma = sigma.map(|sigma| sigma.max(2.0 * rest));
+            }
+        }
+        match sigma {
+            Some(sigma) => line(
+                text,
+                "bias_sigma",
+                &format!("{:?}", short(sigma)),
+                "in the file's unit, per second",
+            ),
+            None => todo(text, "bias_sigma", "in the file's unit, per second"),
+        }
+    }
+
+    /// What the record shows a register to say at zero, with its σ, where it is none that its class has: in the
+    /// file's quantity a row.
+    fn own_zero(
+        &self,
+        sensor: Sensor,
+        usual: Option<f64>,
+    ) -> Option<(Vector3<f64>, f64, &'static str)> {
+        if !self.quantities.is_count(sensor) {
+            return None;
+        }
+        let registers = self.registers.as_ref()?;
+        match sensor {
+            Sensor::Accel => {
+                let gravity = registers.gravity.as_ref()?;
+                let why = "where gravity at rest is centred";
+                Some((gravity.own_zero?, gravity.zero_sigma, why))
+            }
+            Sensor::Gyro => {
+                let rest = self.rest.filter(|_| registers.has_rests)?;
+                (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "what it says at rest"))
+            }
+        }
+    }
+}
+
+/// One number for three that are the same.
+fn three(values: &Vector3<f64>) -> String {
+    let [x, y, z] = <[f64; 3]>::from(*values).map(seven);
+    if x == y && y == z {
+        format!("{x:?}")
+    } else {
+        format!("[{x:?}, {y:?}, {z:?}]")
+    }
+}
