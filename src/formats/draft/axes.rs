@@ -14,7 +14,8 @@ use crate::imu::PerSensor;
 use crate::statistics::{chi_square_limit, median};
 use crate::units::DEGREE;
 
-/// Output of one chip is straight to this part, 1σ: a scale found at large rates is none at small ones.
+/// Output of one chip is straight to this part, 1σ, as data sheets of such chips state (MPU-6050, section 6.1: 0.2 %): a
+/// scale found at large rates is none at small ones.
 const LINEAR: f64 = 2e-3;
 /// Length of the steps over which gyros are added up, s.
 const STEP: f64 = 0.02;
