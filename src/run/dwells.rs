@@ -91,10 +91,7 @@ impl Run {
                 Some(LabelledMotion::Turns { .. }) => Vec::new(),
                 None => standstills
                     .iter()
-                    .map(|standstill| {
-                        let Range { start, end } = standstill.samples;
-                        start.max(samples.start)..end.min(samples.end)
-                    })
+                    .map(|standstill| standstill.common(&samples))
                     .filter(|common| common.len() as f64 * self.recording.imu.period >= SHORTEST)
                     .collect(),
             }
@@ -114,10 +111,9 @@ impl Run {
         samples: &Range<usize>,
         standstills: &[Dwell],
     ) -> Option<Range<usize>> {
-        let within = standstills.iter().map(|standstill| {
-            let Range { start, end } = standstill.samples;
-            start.max(samples.start)..end.min(samples.end)
-        });
+        let within = standstills
+            .iter()
+            .map(|standstill| standstill.common(samples));
         let longest = within.max_by_key(ExactSizeIterator::len)?;
         let imu = &self.recording.imu;
         if (longest.len() as f64) * imu.period < SHORTEST {
@@ -188,6 +184,12 @@ impl Dwell {
             samples: segment.samples.clone(),
             position: None,
         }
+    }
+
+    /// The samples that it has in common with others; an empty range where none.
+    fn common(&self, samples: &Range<usize>) -> Range<usize> {
+        let Range { start, end } = self.samples;
+        start.max(samples.start)..end.min(samples.end)
     }
 
     /// Begin and end, s.

@@ -9,7 +9,7 @@ use turncal::calibration::{
     estimate, mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
-use turncal::recording::{Bridge, Recording, SampleError, Series, Stretch, TableLog};
+use turncal::recording::{Bridge, Recording, SampleError, Segment, Series, Stretch, TableLog};
 use turncal::run::{Aiding, Run};
 use turncal::simulation::{Given, Scenario, Simulated};
 
@@ -408,6 +408,41 @@ fn sections_without_an_order_hide_what_moves_would_have_shown() {
             0.0
         };
         assert!(*more > limit, "{triad} {kind:?}: {more}");
+    }
+}
+
+#[test]
+fn a_section_whose_label_says_nothing_is_a_dwell_where_the_imu_stands() {
+    let mut run = Scenario::load("demo")
+        .unwrap()
+        .simulate(SEED, 0)
+        .unwrap()
+        .run;
+    run.recording.table = None;
+    let standing: Vec<Range<usize>> = run
+        .dwells(Aiding::Velocity)
+        .into_iter()
+        .take(4)
+        .map(|dwell| dwell.samples)
+        .collect();
+    // The second section begins in a move.
+    let sections = [standing[0].clone(), standing[1].end..standing[3].start];
+    let imu = &run.recording.imu;
+    let sections = sections.map(|samples| Segment {
+        start: imu.time(samples.start),
+        end: imu.time(samples.end),
+        samples,
+        label: "part".to_owned(),
+        motion: None,
+    });
+    run.recording.segments = sections.to_vec();
+    run.recording.imu.continuous = false;
+    let found = run.dwells(Aiding::Velocity);
+    let found: Vec<&Range<usize>> = found.iter().map(|dwell| &dwell.samples).collect();
+    assert_eq!(found.len(), 2, "{found:?}");
+    for (found, stood) in found.iter().zip([&standing[0], &standing[2]]) {
+        assert!(found.start >= stood.start && found.end <= stood.end);
+        assert!(found.len() as f64 > 0.9 * stood.len() as f64);
     }
 }
 

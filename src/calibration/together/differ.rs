@@ -311,6 +311,8 @@ impl Said {
                     ratio: ratio(group, &variances)?,
                 })
             })
+            // One that came in first may be explained by those after it.
+            .filter(|found| found.ratio > limit)
             .collect();
         (!found.is_empty()).then_some(found)
     }

@@ -10,7 +10,7 @@ use super::least_squares::{Equation, Fit, cost, fit, fit_at};
 use super::motion::{PART, mean, means};
 use super::rests::{Rests, TOLERANCE};
 use crate::attitude::{exp, skew};
-use crate::imu::PerSensor;
+use crate::imu::{AxisOrder, PerSensor};
 use crate::statistics::{chi_square_limit, median};
 use crate::units::DEGREE;
 
@@ -35,7 +35,7 @@ const SAME: f64 = 1.25;
 const SEARCHED: f64 = 8.0;
 /// … and is bettered from starts so far apart: from half of it on the least one is reached.
 const APART: f64 = 1.1;
-/// So many moves, those after which gravity lies most otherwise, tell arrangements from one another …
+/// So many moves, those after which gravity lies most otherwise, tell orders of axes from one another …
 const TELLING: usize = 12;
 /// … and so few do not.
 const FEWEST: usize = 3;
@@ -61,43 +61,8 @@ pub(super) struct Axes {
     pub moves: usize,
 }
 
-/// Columns by axis with their signs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Arrangement {
-    columns: [usize; 3],
-    signs: [f64; 3],
-}
-
-impl Arrangement {
-    fn all() -> impl Iterator<Item = Self> {
-        const ORDERS: [[usize; 3]; 6] = [
-            [0, 1, 2],
-            [0, 2, 1],
-            [1, 0, 2],
-            [1, 2, 0],
-            [2, 0, 1],
-            [2, 1, 0],
-        ];
-        let sign = |bits: usize, axis: usize| if bits >> axis & 1 == 0 { 1.0 } else { -1.0 };
-        ORDERS.into_iter().flat_map(move |columns| {
-            (0..8).map(move |bits| Self {
-                columns,
-                signs: std::array::from_fn(|axis| sign(bits, axis)),
-            })
-        })
-    }
-
-    fn matrix(&self) -> Matrix3<f64> {
-        let mut matrix = Matrix3::zeros();
-        for axis in 0..3 {
-            matrix[(axis, self.columns[axis])] = self.signs[axis];
-        }
-        matrix
-    }
-}
-
 impl Axes {
-    /// None where the moves do not tell one arrangement and scale from all others.
+    /// None where the moves do not tell one order and scale from all others.
     pub fn find(
         samples: &PerSensor<Vec<Vector3<f64>>>,
         rests: &Rests,
@@ -119,8 +84,8 @@ impl Axes {
         if telling.len() < FEWEST {
             return None;
         }
-        let mut tried: Vec<(f64, f64, Arrangement)> = Vec::new();
-        for of in Arrangement::all() {
+        let mut tried: Vec<(f64, f64, AxisOrder)> = Vec::new();
+        for of in AxisOrder::all() {
             for k in -reach..=reach {
                 let angle = first * APART.powi(k);
                 tried.push((off(&telling, &(of.matrix() * angle)), angle, of));
@@ -134,14 +99,14 @@ impl Axes {
         let common_part = Parameters::from_fn(|k, _| if k < 3 { 1.0 / 3.0 } else { 0.0 });
         let rival = tried
             .iter()
-            .filter(|(_, other, arrangement)| {
-                *arrangement != of || !(SAME.recip()..SAME).contains(&(other / common))
+            .filter(|(_, other, order)| {
+                *order != of || !(SAME.recip()..SAME).contains(&(other / common))
             })
             .map(|(off, ..)| *off)
             .fold(f64::INFINITY, f64::min);
         (least < NEAR && rival > NEAR.max(RIVAL * least)).then_some(Self {
-            columns: of.columns,
-            scale: Vector3::from_fn(|axis, _| of.signs[axis] / angles[axis]),
+            columns: of.source,
+            scale: Vector3::from_fn(|axis, _| of.sign(axis) / angles[axis]),
             sigma: LINEAR.hypot(common_part.dot(&(found.covariance * common_part)).sqrt()),
             by_axis,
             moves: moves.len(),
@@ -203,14 +168,14 @@ impl Move {
         &self,
         at: &Parameters,
         first: f64,
-        arrangement: &Matrix3<f64>,
+        order: &Matrix3<f64>,
     ) -> [Equation<PARAMETERS>; 2] {
         let askew = askew(at);
         let angles = Vector3::from_fn(|axis, _| first * at[axis].exp());
         let mut up = self.before;
         let mut changes = SMatrix::<f64, 3, PARAMETERS>::zeros();
         for step in &self.steps {
-            let plain = (arrangement * step).component_mul(&angles);
+            let plain = (order * step).component_mul(&angles);
             // What changes during a step is turned by half of it, before and after.
             let half = exp(-0.5 * (askew * plain));
             let middle = half * up;
@@ -269,14 +234,10 @@ fn off(moves: &[&Move], angle: &Matrix3<f64>) -> f64 {
     median(&mut angles).unwrap_or(f64::INFINITY)
 }
 
-/// The likeliest scales and askewness of an arrangement, and whether they are those of several chips.
-fn bettered(
-    moves: &[Move],
-    first: f64,
-    arrangement: &Matrix3<f64>,
-) -> Option<(Fit<PARAMETERS>, bool)> {
+/// The likeliest scales and askewness of axes in an order, and whether they are those of several chips.
+fn bettered(moves: &[Move], first: f64, order: &Matrix3<f64>) -> Option<(Fit<PARAMETERS>, bool)> {
     let equations = |at: &Parameters| -> Vec<Equation<PARAMETERS>> {
-        let of = |carry: &Move| carry.equations(at, first, arrangement);
+        let of = |carry: &Move| carry.equations(at, first, order);
         moves.iter().flat_map(of).collect()
     };
     let (of_one, of_several) = (prior(TOLERANCE), prior(ANY_SCALE));
