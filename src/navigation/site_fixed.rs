@@ -22,6 +22,9 @@ use crate::recording::{ImuSamples, Near};
 /// Within this time, s, what happened first is taken to act on all that follows as a whole; the sensitivity of
 /// navigation to errors is of second order in it.
 const PART: f64 = 0.1;
+/// Rounds in which the input is found that error terms add to. A time offset of one sample of 10 ms at 200 °/s turns
+/// specific force by 0.03, and each round leaves that part of the one before: a part of 10⁻⁶ of the offset's own effect.
+const ROUNDS: usize = 4;
 
 /// The whole number of samples nearest to a time, at least one.
 pub(crate) fn samples_of(time: f64, period: f64) -> usize {
@@ -189,8 +192,8 @@ impl<'a> Navigator<'a> {
         if self.terms.values == TermVector::zeros() {
             return (increments, sensed);
         }
-        // Triads see u + t(u), and u is what is looked for; the second round leaves the third order.
-        for _ in 0..2 {
+        // Triads see u + t(u), and u is what is looked for.
+        for _ in 0..ROUNDS {
             let added = |sensor| sensed.added(sensor, &self.terms.values) * period;
             increments = Increments {
                 angle: of_triads.angle - added(Sensor::Gyro),
