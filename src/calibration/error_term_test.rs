@@ -8,6 +8,7 @@ mod evidence;
 mod joint;
 mod left_off;
 mod seen;
+mod unseen;
 
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,7 @@ use evidence::ln_survival;
 use joint::{Fit, Joint, once_more};
 pub use left_off::LeftOff;
 pub use seen::seen_and_left_off;
+pub use unseen::unseen_variation;
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

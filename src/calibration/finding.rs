@@ -97,6 +97,11 @@ pub enum Finding {
         /// What was learnt, with what is stated.
         sources: Vec<SourceFigures>,
     },
+    /// Biases that may vary though the noise learnt from the record does not hold that; σ do.
+    BiasesMayVary {
+        /// By how much the largest σ grew.
+        growth: f64,
+    },
     /// An error term that the data show and that is not estimated.
     ErrorTermSignificant {
         /// The name by which it is switched on.
@@ -321,6 +326,12 @@ impl fmt::Display for Finding {
                     sources.join("; ")
                 )
             }
+            Self::BiasesMayVary { growth } => write!(
+                f,
+                "Nothing is stated of how biases vary, and this record would hardly show it. σ hold that they may, \
+                 as those of such instruments do, and are up to {growth:.1} times as large for it. `turncal allan` \
+                 on a longer record at rest gives the figures of [imu.noise] that say how much."
+            ),
             Self::ErrorTermSignificant {
                 term,
                 alternatives,

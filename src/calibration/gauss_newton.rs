@@ -121,6 +121,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         covariance_by_noise,
         covariance_by_headings: by_headings,
         covariance_by_error_terms: ParameterMatrix::zeros(),
+        covariance_by_variation: ParameterMatrix::zeros(),
         prior_sigma: stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: priors,

@@ -35,6 +35,9 @@ pub struct Outcome {
     /// What error terms that the data show, and that are not estimated, add to the covariance of the
     /// estimate; see [`crate::calibration::Solution::assess`].
     pub covariance_by_error_terms: ParameterMatrix,
+    /// What biases add to it that may vary though the noise learnt from the record does not hold that; see
+    /// [`crate::calibration::Solution::assess`].
+    pub covariance_by_variation: ParameterMatrix,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
@@ -124,10 +127,16 @@ impl Outcome {
         self.covariance_by_error_terms = by_error_terms;
     }
 
-    /// How many times larger the σ of a parameter are, at most, for what error terms do that are left off.
-    pub(super) fn growth_by_error_terms(&self) -> f64 {
+    /// Adds to the covariance of the estimate what biases do that may vary unseen.
+    pub(super) fn widen_by_variation(&mut self, by_variation: ParameterMatrix) {
+        self.estimate.covariance += by_variation - self.covariance_by_variation;
+        self.covariance_by_variation = by_variation;
+    }
+
+    /// How many times larger the σ of a parameter are, at most, for this part of their covariance.
+    pub(super) fn growth_by(&self, part: &ParameterMatrix) -> f64 {
         let with = self.estimate.covariance;
-        let without = with - self.covariance_by_error_terms;
+        let without = with - part;
         let variances = [without, with].map(|covariance| covariance.diagonal());
         largest_growth(variances[0].as_slice(), variances[1].as_slice())
     }

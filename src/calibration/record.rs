@@ -38,6 +38,17 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
+    /// Its findings with those that come of the tests of error terms and of what these add to its covariance.
+    pub(super) fn findings_with(&self, tests: &[ErrorTermTest]) -> Vec<Finding> {
+        let growth = self.growth_by(&self.covariance_by_variation);
+        // What rounds to once as large says nothing.
+        let may_vary = (growth >= 1.05).then_some(Finding::BiasesMayVary { growth });
+        let left_off = self.growth_by(&self.covariance_by_error_terms);
+        let shown = ErrorTermTest::most_significant(tests, Some(left_off));
+        let findings = self.findings.iter().cloned();
+        findings.chain(may_vary).chain(shown).collect()
+    }
+
     /// This calibration of a problem, with what error terms did to it and what it leaves of gravity and
     /// turns.
     pub fn record(
@@ -46,11 +57,7 @@ impl Outcome {
         tests: &[ErrorTermTest],
         quality: &Quality,
     ) -> Calibration {
-        let mut findings = self.findings.clone();
-        findings.extend(ErrorTermTest::most_significant(
-            tests,
-            Some(self.growth_by_error_terms()),
-        ));
+        let findings = self.findings_with(tests);
         Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::Ekf),

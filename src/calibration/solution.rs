@@ -4,7 +4,9 @@ use super::attempt::Progress;
 use super::budget::{Budget, BudgetSource};
 use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
-use super::error_term_test::{ErrorTermTest, seen_and_left_off, test_error_terms};
+use super::error_term_test::{
+    ErrorTermTest, seen_and_left_off, test_error_terms, unseen_variation,
+};
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::gauss_newton::estimate;
@@ -131,7 +133,8 @@ impl Solution {
     }
 
     /// Tests error terms and judges what is left of gravity and turns. What error terms do that the data
-    /// show, and that are not estimated, goes into the covariance of the estimate.
+    /// show, and that are not estimated, goes into the covariance of the estimate; so does what biases do that
+    /// may vary unseen where the noise was learnt.
     ///
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the solution.
@@ -153,6 +156,10 @@ impl Solution {
                     outcome.widen(left_off);
                     budget = budget.map(|b| b.and(BudgetSource::ErrorTermsLeftOff, left_off));
                 }
+                if let Some(variation) = unseen_variation(problem, outcome, &error_terms)? {
+                    outcome.widen_by_variation(variation);
+                    budget = budget.map(|b| b.and(BudgetSource::UnseenVariation, variation));
+                }
                 Ok(Assessment {
                     error_terms,
                     quality: quality?,
@@ -169,14 +176,10 @@ impl Solution {
 
     /// What must be known before using the figures.
     pub fn findings(&self, assessment: &Assessment) -> Vec<Finding> {
-        let mut findings = match self {
-            Self::Filter(outcome) => outcome.findings.clone(),
+        match self {
+            Self::Filter(outcome) => outcome.findings_with(&assessment.error_terms),
             Self::ClosedForm(closed_form) => closed_form.findings.clone(),
-        };
-        let growth = self.outcome().map(Outcome::growth_by_error_terms);
-        let tests = &assessment.error_terms;
-        findings.extend(ErrorTermTest::most_significant(tests, growth));
-        findings
+        }
     }
 
     /// The calibration, in the file's quantity.

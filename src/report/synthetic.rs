@@ -161,6 +161,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         covariance_by_noise: ParameterMatrix::zeros(),
         covariance_by_headings: ParameterMatrix::zeros(),
         covariance_by_error_terms: ParameterMatrix::zeros(),
+        covariance_by_variation: ParameterMatrix::zeros(),
         model: Model::new(&run, &Options::default().installation(form)),
         noise: NoiseReport {
             policy: Default::default(),

@@ -65,12 +65,15 @@ impl Budget {
         let filter: ParameterMatrix = by_source.iter().map(|(_, covariance)| covariance).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
         let left_off = outcome.covariance_by_error_terms;
-        let scatter = outcome.estimate.covariance - outcome.covariance_by_noise - left_off;
+        let variation = outcome.covariance_by_variation;
+        let beside = outcome.covariance_by_noise + left_off + variation;
+        let scatter = outcome.estimate.covariance - beside;
         let parts = by_source.into_iter().chain([
             (BudgetSource::Curvature, bent),
             (BudgetSource::Headings, outcome.covariance_by_headings),
             (BudgetSource::DwellScatter, scatter),
             (BudgetSource::ErrorTermsLeftOff, left_off),
+            (BudgetSource::UnseenVariation, variation),
         ]);
         let variance = outcome.estimate.covariance.diagonal();
         let counts = |part: &ParameterMatrix| {

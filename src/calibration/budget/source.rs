@@ -93,6 +93,8 @@ pub enum BudgetSource {
     DwellScatter,
     /// What error terms do that the data show and that are not estimated.
     ErrorTermsLeftOff,
+    /// What biases do that may vary though the noise learnt from the record does not hold that.
+    UnseenVariation,
 }
 
 impl BudgetSource {
@@ -137,6 +139,7 @@ impl BudgetSource {
             Self::Headings => "headings that cannot be told apart",
             Self::DwellScatter => "scatter of dwells",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",
+            Self::UnseenVariation => "biases that may vary unseen",
         }
     }
 

@@ -59,7 +59,7 @@ pub fn seen_and_left_off(
 }
 
 /// Mean square of what a pass with more states finds, less the covariance of one without.
-fn between(with: &PassResult, without: &PassResult) -> ParameterMatrix {
+pub(super) fn between(with: &PassResult, without: &PassResult) -> ParameterMatrix {
     let change = to_vector(&with.estimate.triads) - to_vector(&without.estimate.triads);
     with.covariance - without.covariance + change * change.transpose()
 }
