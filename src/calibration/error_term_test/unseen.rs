@@ -14,6 +14,7 @@ use super::joint::once_more;
 use super::seen::between;
 use super::{ErrorTermTest, Role};
 use crate::imu::{GaussMarkov, Noise, Sensor};
+use crate::run::Aiding;
 
 /// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one …
 const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
@@ -21,7 +22,8 @@ const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 /// What the covariance of an estimate lacks for biases of a triad that may vary though its record does not
-/// call for it; none where the noise is the stated one, or where biases of both triads vary in it.
+/// call for it; none where the noise is the stated one, where biases of both triads vary in it, or where a table is
+/// read, whose attitudes show how biases vary.
 ///
 /// A short record hardly tells a bias that varies slowly from one that does not, and the likelihood that
 /// chose the noise takes the simpler of the two. Where the data contradict the stated noise, it is no word
@@ -39,7 +41,8 @@ pub fn unseen_variation(
 ) -> Result<Option<ParameterMatrix>, CalibrationError> {
     let seen =
         |test: &ErrorTermTest| test.term == ErrorTerm::GaussMarkovBias && test.role != Role::None;
-    if !outcome.noise.learnt || tests.iter().any(seen) {
+    let table = problem.model.aiding == Aiding::Table;
+    if table || !outcome.noise.learnt || tests.iter().any(seen) {
         return Ok(None);
     }
     let stated = &problem.model.noise;
@@ -106,8 +109,8 @@ mod tests {
     /// Fixed before the first run was made.
     const SEED: u64 = 13;
 
-    fn solved(run: &Run, noise: NoisePolicy) -> Outcome {
-        let options = Options::default().noise(noise);
+    fn solved(run: &Run, aiding: Aiding, noise: NoisePolicy) -> Outcome {
+        let options = Options::default().aiding(aiding).noise(noise);
         let problem = Problem::new(run, &options);
         let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
         solution.assess(&problem).unwrap();
@@ -115,14 +118,19 @@ mod tests {
     }
 
     #[test]
-    fn stated_noise_that_the_data_bear_out_says_that_biases_are_constant() {
+    fn stated_noise_that_the_data_bear_out_or_a_table_says_that_biases_are_constant() {
         let run = Scenario::load("demo")
             .unwrap()
             .simulate(SEED, 0)
             .unwrap()
             .run;
-        let outcome = solved(&run, NoisePolicy::Stated);
-        assert_eq!(outcome.covariance_by_variation.amax(), 0.0);
+        for (aiding, noise) in [
+            (Aiding::Velocity, NoisePolicy::Stated),
+            (Aiding::Table, NoisePolicy::Learnt),
+        ] {
+            let outcome = solved(&run, aiding, noise);
+            assert_eq!(outcome.covariance_by_variation.amax(), 0.0);
+        }
     }
 
     #[test]
@@ -132,7 +140,7 @@ mod tests {
             .simulate(SEED, 0)
             .unwrap()
             .run;
-        let outcome = solved(&run, NoisePolicy::Learnt);
+        let outcome = solved(&run, Aiding::Velocity, NoisePolicy::Learnt);
         let of = outcome.covariance_by_variation;
         let variance = outcome.estimate.covariance.diagonal();
         let without = variance - of.diagonal();
