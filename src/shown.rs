@@ -1,5 +1,7 @@
 //! Text of others as it is shown.
 
+use std::path::{Path, PathBuf};
+
 /// A message shows so many characters of one input, no more.
 pub(crate) const LONGEST: usize = 200;
 
@@ -11,9 +13,34 @@ pub(crate) fn excerpt(text: &str) -> String {
     }
 }
 
+/// No file system has longer names.
+const LONGEST_NAME: usize = 255;
+
+/// A path as it is, but for names that no file has: these are cut.
+pub(crate) fn path(path: &Path) -> String {
+    let names = || {
+        path.components()
+            .map(|name| name.as_os_str().to_string_lossy())
+    };
+    if names().all(|name| name.chars().count() <= LONGEST_NAME) {
+        return path.display().to_string();
+    }
+    let names: PathBuf = names().map(|name| excerpt(&name)).collect();
+    names.display().to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_path_is_shown_as_it_is_but_for_names_that_no_file_has() {
+        for short in ["/a/b c/run.toml", "../run.toml", "./run.toml", "run.toml"] {
+            assert_eq!(path(Path::new(short)), short);
+        }
+        let long = format!("/a/{}/run.toml", "x".repeat(5_000));
+        assert!(path(Path::new(&long)).chars().count() < LONGEST + 20);
+    }
 
     #[test]
     fn an_excerpt_ends_between_two_characters() {

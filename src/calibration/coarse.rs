@@ -154,6 +154,7 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
                 growth,
                 worst: worst.groups.iter().map(|&k| times[k]).collect(),
                 without: worst.without,
+                base: None,
             })
             .into_iter()
             .chain(drift)

@@ -9,7 +9,7 @@ use super::noise::SourceFigures;
 use super::prior_cause::PriorCause;
 use crate::imu::InstallationForm;
 use crate::run::motion::ContradictedLabel;
-use crate::units::DEGREE;
+use crate::units::{ARCSEC, DEGREE};
 
 /// A finding with its figures; [`fmt::Display`] words it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -173,6 +173,8 @@ pub enum Finding {
         worst: Vec<[f64; 2]>,
         /// χ² without any one of these.
         without: f64,
+        /// 1σ of the table's level and north, rad, if that explains all.
+        base: Option<f64>,
     },
     /// Parameters whose even change in time explains residuals of the closed form.
     ChangesInTime {
@@ -442,6 +444,7 @@ impl fmt::Display for Finding {
                 growth,
                 worst,
                 without,
+                base,
             } => {
                 let times = |[begin, end]: &[f64; 2]| format!("{begin:.1} s to {end:.1} s");
                 let worst: Vec<String> = worst.iter().map(times).collect();
@@ -453,6 +456,13 @@ impl fmt::Display for Finding {
                      there: a bump, a wrong label or attitude; if not, at what all have in common: stated \
                      noise, level and north, gravity's direction, a hand that is not still.",
                     worst.join(" or ")
+                )?;
+                let Some(base) = base else { return Ok(()) };
+                write!(
+                    f,
+                    " A base that is off level and north by {:.3e}″ (1σ) explains all of it, and σ hold that: state \
+                     level_sigma_arcsec and north_sigma_arcsec in [turntable].",
+                    base / ARCSEC
                 )
             }
         }

@@ -10,14 +10,17 @@ use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 /// where the system does not let them be started.
 pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, ThreadPoolBuildError> {
     match ThreadPoolBuilder::new().build() {
-        Ok(pool) => Ok(pool.install(work)),
+        Ok(pool) if pool.current_num_threads() > 1 => return Ok(pool.install(work)),
+        // The first thread does as well, and better where addresses are few: glibc has 64 MB of them for every
+        // other thread, and where it cannot have them asks anew at each allocation.
+        Ok(_) => {}
         Err(_) => {
             eprintln!("note: the system does not let threads be started; working on one alone");
-            let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
-            let _pool = alone.build()?;
-            Ok(work())
         }
     }
+    let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    let _pool = alone.build()?;
+    Ok(work())
 }
 
 /// Does so many pieces of work, as many at once as there are threads; each is begun and ended by one of them, so

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::shown::{LONGEST, excerpt};
+use crate::shown::{self, LONGEST, excerpt};
 
 /// Why a file could not be read or written, in one sentence or a few.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}{place}: {message}", file.display())]
+#[error("{}{place}: {message}", shown::path(file))]
 pub struct FileError {
     /// The file at fault.
     pub file: PathBuf,

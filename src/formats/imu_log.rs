@@ -442,7 +442,7 @@ impl ImuLog<'_> {
             Some((name, number)) => Some((csv.column(name)?, number)),
             None => None,
         };
-        let (mut blank, mut duplicates) = (0, 0);
+        let (mut blank, mut lacking, mut duplicates) = (0, 0, 0);
         let mut held = Held::default();
         let mut long: Option<LongLog> = None;
         let mut before = [f64::NAN; 6];
@@ -452,10 +452,19 @@ impl ImuLog<'_> {
             {
                 continue;
             }
-            // Rows that another sensor wrote; without a time they would be missing.
-            if clock.column.is_some() && places.iter().all(|&place| csv.is_blank(place)) {
-                blank += 1;
-                continue;
+            // Rows that another sensor wrote, or in which a sensor said nothing; a time tells that they are missing.
+            let empty = places.iter().filter(|&&place| csv.is_blank(place));
+            match empty.count() {
+                0 => {}
+                _ if clock.column.is_none() => {}
+                6 => {
+                    blank += 1;
+                    continue;
+                }
+                _ => {
+                    lacking += 1;
+                    continue;
+                }
             }
             let mut row = [0.0; 6];
             for (value, &place) in row.iter_mut().zip(&places) {
@@ -498,11 +507,24 @@ impl ImuLog<'_> {
                 self.source.file.display()
             ));
         }
+        if lacking > 0 {
+            notes.push(format!(
+                "{lacking} row(s) of {} lack a value of the gyros or accelerometers and count as missing.",
+                self.source.file.display()
+            ));
+        }
         if long.is_none() && held.len() < FEWEST_SAMPLES {
+            let (found, advice) = match lacking {
+                0 => (String::new(), "Record a run with dwells and turns."),
+                _ => (
+                    format!(" and {lacking} rows that lack a value of the gyros or accelerometers"),
+                    "If they are in rows of their own, add accel_from = {} to [imu].",
+                ),
+            };
             return Err(csv.error(
-                format_args!("{} samples", held.len()),
+                format_args!("{} samples{found}", held.len()),
                 format_args!("at least {FEWEST_SAMPLES}"),
-                "Record a run with dwells and turns.",
+                advice,
             ));
         }
         let samples = match long {

@@ -222,7 +222,7 @@ impl Track {
         let mut columns = [const { Vec::new() }; 3];
         let mut before = [f64::NAN; 3];
         while rows.advance()? && !rows.may_be_cut() {
-            if places.iter().all(|&place| rows.is_blank(place)) {
+            if places.iter().any(|&place| rows.is_blank(place)) {
                 continue;
             }
             let mut row = [0.0; 3];

@@ -52,9 +52,14 @@ pub(super) fn both_triads(
     if !findings.is_empty() {
         prior = widened(&prior, &of_positions).unwrap_or(prior);
     }
+    let base = base_of_both(observed, &prior)?;
     let mut common = Vec::new();
     for sensor in Sensor::ALL {
         let stated = observed.get(sensor);
+        let known = match base {
+            Some(sigma) => stated.on_base_within(sigma),
+            None => stated.clone(),
+        };
         let fit = fitted(stated, &prior, sensor)?;
         let residuals = left_by(stated, &fit.triad);
         findings.extend(
@@ -66,6 +71,7 @@ pub(super) fn both_triads(
             .as_ref()
             .filter(|residuals| residuals.growth().is_some());
         let fit = match rings {
+            None if base.is_some() => fitted(&known, &prior, sensor)?,
             None => fit,
             Some(residuals) => {
                 let all: Vec<usize> = (0..stated.positions.len()).collect();
@@ -76,8 +82,13 @@ pub(super) fn both_triads(
                 } else {
                     &all
                 };
-                let variance = unexplained(stated, &fit.triad, places);
-                let wider = fitted(&stated.widened(variance, places), &prior, sensor)?;
+                // Nor are they where the base explains it: they may agree with each other on what this one alone tells.
+                let base = base_off(residuals, stated, &fit.triad).and(base);
+                let wider = match base {
+                    Some(_) => known.clone(),
+                    None => known.widened(unexplained(&known, &fit.triad, places), places),
+                };
+                let wider = fitted(&wider, &prior, sensor)?;
                 let times = worst.groups.iter().map(|&k| stated.times[k]);
                 let variances = [&fit, &wider].map(|fit| fit.covariance.diagonal());
                 findings.push(Finding::ResidualsLarge {
@@ -88,6 +99,7 @@ pub(super) fn both_triads(
                     growth: largest_growth(variances[0].as_slice(), variances[1].as_slice()),
                     worst: times.collect(),
                     without: worst.without,
+                    base,
                 });
                 wider
             }
@@ -97,7 +109,7 @@ pub(super) fn both_triads(
         covariance
             .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
             .copy_from(&fit.covariance);
-        common.push(fit.gain * stated.output_errors(&fit.triad.sensitivity()));
+        common.push(fit.gain * known.output_errors(&fit.triad.sensitivity()));
     }
     // Both triads stand on one table.
     if let [of_gyro, of_accel] = &common[..]
@@ -145,6 +157,35 @@ fn changing_in_time(residuals: &Residuals, observed: &Observed, sensor: Sensor) 
     let times: Vec<f64> = times.collect();
     let worst = residuals.worst(&by_position(inputs.len()));
     drift(residuals, &changing, &times, worst.without)
+}
+
+/// 1σ of the base's level and north, rad, on which both triads stand, if it explains what residuals of one ring for.
+fn base_of_both(
+    observed: &PerSensor<Observed>,
+    prior: &Model,
+) -> Result<Option<f64>, CalibrationError> {
+    let mut base: Option<f64> = None;
+    for sensor in Sensor::ALL {
+        let stated = observed.get(sensor);
+        let fit = fitted(stated, prior, sensor)?;
+        let residuals = left_by(stated, &fit.triad).filter(|left| left.growth().is_some());
+        let off = residuals.and_then(|left| base_off(&left, stated, &fit.triad));
+        base = base.into_iter().chain(off).reduce(f64::max);
+    }
+    Ok(base)
+}
+
+/// The same of one triad.
+fn base_off(residuals: &Residuals, observed: &Observed, triad: &Triad) -> Option<f64> {
+    if observed.base.is_empty() {
+        return None;
+    }
+    let of_base = observed.output_errors_of_base(&triad.sensitivity());
+    let explained = residuals.explained_by(&of_base);
+    let left = residuals.chi_square() - explained.fall;
+    let squares: f64 = explained.coefficients.iter().map(|c| c * c).sum();
+    (explained.degrees > 0 && residuals.would_hold(left, explained.degrees))
+        .then(|| (squares / explained.degrees as f64).sqrt())
 }
 
 /// The variance that every axis of these positions must have more for χ² of the residuals to be what is

@@ -31,6 +31,9 @@ pub(super) struct Observed {
     /// How the inputs change with each error of what they are known from, for one σ of it: three rows a
     /// position, along body axes.
     pub errors: DMatrix<f64>,
+    /// How the inputs change with turns of the table's base about East, North and Up, in rad, whatever is stated of
+    /// it; these are the first columns of `errors` then. Without columns where there is no table.
+    pub base: DMatrix<f64>,
 }
 
 impl Observed {
@@ -42,6 +45,7 @@ impl Observed {
             times: vec![[0.0; 2]; count],
             between: DMatrix::zeros(count, count),
             errors: DMatrix::zeros(3 * count, 0),
+            base: DMatrix::zeros(3 * count, 0),
         }
     }
 
@@ -54,9 +58,21 @@ impl Observed {
                 false => noise.covariance_of_means(times[i], times[j]),
             }),
             errors: DMatrix::zeros(3 * count, 0),
+            base: DMatrix::zeros(3 * count, 0),
             positions,
             times,
         }
+    }
+
+    /// The same on a base whose level and north are known to this σ only, rad.
+    pub fn on_base_within(&self, sigma: f64) -> Self {
+        let mut wider = self.clone();
+        let columns = self.base.ncols();
+        wider
+            .errors
+            .columns_mut(0, columns)
+            .copy_from(&(&self.base * sigma));
+        wider
     }
 
     /// Largest input.
@@ -79,9 +95,18 @@ impl Observed {
     /// How all outputs change with the errors of what the inputs are known from, by a triad of this
     /// sensitivity.
     pub fn output_errors(&self, sensitivity: &Matrix3<f64>) -> DMatrix<f64> {
-        let mut errors = self.errors.clone();
+        self.of_outputs(&self.errors, sensitivity)
+    }
+
+    /// The same of a turn of the table's base by 1 rad.
+    pub fn output_errors_of_base(&self, sensitivity: &Matrix3<f64>) -> DMatrix<f64> {
+        self.of_outputs(&self.base, sensitivity)
+    }
+
+    fn of_outputs(&self, of_inputs: &DMatrix<f64>, sensitivity: &Matrix3<f64>) -> DMatrix<f64> {
+        let mut errors = of_inputs.clone();
         for k in 0..self.positions.len() {
-            let of_input = sensitivity * self.errors.fixed_rows::<3>(3 * k);
+            let of_input = sensitivity * of_inputs.fixed_rows::<3>(3 * k);
             errors.fixed_rows_mut::<3>(3 * k).copy_from(&of_input);
         }
         errors

@@ -40,6 +40,7 @@ pub fn six_position_of(
         let positions = of_six.iter().map(|&k| all[k]).collect();
         Ok(Observed {
             errors: errors(run, model, dwells, &of_six, sensor),
+            base: of_base(run, dwells, &of_six, sensor),
             ..Observed::over(positions, times, noise)
         })
     };
@@ -135,6 +136,21 @@ fn errors(
         }
     }
     errors
+}
+
+/// How the inputs of some dwells change with a turn of the base by 1 rad.
+fn of_base(run: &Run, dwells: &[Dwell], some: &[usize], sensor: Sensor) -> DMatrix<f64> {
+    let mut of_base = DMatrix::zeros(3 * some.len(), 3);
+    let turned = skew(known(run, sensor));
+    for (row, &number) in some.iter().enumerate() {
+        if let Some(position) = &dwells[number].position {
+            let of_input = position.attitude.tr_mul(&turned);
+            of_base
+                .fixed_view_mut::<3, 3>(3 * row, 0)
+                .copy_from(&of_input);
+        }
+    }
+    of_base
 }
 
 /// The positions whose input lies along a body axis, if all six are there, else all.

@@ -29,6 +29,8 @@ pub(super) struct Columns {
 
 /// Part of the rows that must be numbers.
 const NUMBERS: f64 = 0.5;
+/// Sensors fail in fewer rows; where one of both says nothing in more, the other has another rate.
+const LACKING: f64 = 0.1;
 /// So many instruments may share a log.
 const MOST_INSTANCES: usize = 8;
 /// Part of the steps of a time that go forward.
@@ -102,6 +104,29 @@ impl Columns {
         }
         (samples.gyro.len() > 1).then_some(samples)
     }
+}
+
+/// The columns whose names say that they are of this sensor.
+pub(super) fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
+    let is = |k: &usize| Name::of(&sheet.names[*k]).sensor() == Some(sensor);
+    (0..sheet.names.len()).filter(is).collect()
+}
+
+/// Whether gyros and accelerometers have rows of their own, as their names tell.
+pub(super) fn have_rows_of_their_own(sheet: &Sheet) -> bool {
+    let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
+    let is_there =
+        |places: &[usize], row: usize| places.iter().any(|&k| sheet.columns[k][row].is_finite());
+    let (mut both, mut one) = (0, 0);
+    for row in 0..sheet.columns.first().map_or(0, Vec::len) {
+        match (is_there(&places.gyro, row), is_there(&places.accel, row)) {
+            (true, true) => both += 1,
+            (false, false) => {}
+            _ => one += 1,
+        }
+    }
+    let has = |sensor: Sensor| !places.get(sensor).is_empty();
+    Sensor::ALL.into_iter().all(has) && f64::from(one) > LACKING * f64::from(both + one)
 }
 
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {

@@ -82,7 +82,14 @@ impl Draft {
     pub fn of_stream(path: &Path, stream: Option<&str>) -> Result<Self, FileError> {
         match Streams::of_file(path, stream)? {
             Some((streams, sheet)) => Ok(Self::of_sheet(sheet, Some(streams))),
-            None => Ok(Self::of_sheet(Sheet::read(path, FEWEST_ROWS)?, None)),
+            None => {
+                let sheet = Sheet::read(path, FEWEST_ROWS)?;
+                if columns::have_rows_of_their_own(&sheet) {
+                    let (streams, sheet) = Streams::of_two_files(path, path, None)?;
+                    return Ok(Self::of_sheet(sheet, Some(streams)));
+                }
+                Ok(Self::of_sheet(sheet, None))
+            }
         }
     }
 
@@ -91,7 +98,7 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
     pub fn of_two_files(gyro: &Path, accel: &Path, accel_name: &str) -> Result<Self, FileError> {
-        let (streams, sheet) = Streams::of_two_files(gyro, accel, accel_name)?;
+        let (streams, sheet) = Streams::of_two_files(gyro, accel, Some(accel_name))?;
         Ok(Self::of_sheet(sheet, Some(streams)))
     }
 
@@ -101,7 +108,9 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
     pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
-        let Some(streams) = &mut self.streams else {
+        let of_text = |streams: &Streams| streams.written.is_some();
+        let streams = self.streams.as_mut().filter(|streams| !of_text(streams));
+        let Some(streams) = streams else {
             return Err(FileError::new(
                 log,
                 Place::File,

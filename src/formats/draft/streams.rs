@@ -187,13 +187,11 @@ impl Streams {
         if let Some(accel) = &self.accel {
             let (time, unit) = &self.time.accel;
             let place = match &self.written {
-                None => format!("stream = {}", quoted(accel)),
-                Some(written) => format!(
-                    "file = {}",
-                    quoted(written.accel.as_deref().unwrap_or_default())
-                ),
+                None => format!("stream = {}, ", quoted(accel)),
+                Some(Written { accel: Some(file) }) => format!("file = {}, ", quoted(file)),
+                Some(Written { accel: None }) => String::new(),
             };
-            let mut keys = format!("{place}, time = {}", quoted(time));
+            let mut keys = format!("{place}time = {}", quoted(time));
             if !unit.is_empty() {
                 let _ = write!(keys, ", time_unit = {}", quoted(unit));
             }

@@ -295,6 +295,18 @@ fn a_rate_in_a_comment_decides_what_a_time_without_a_unit_is() {
         format!("{}\t{}\t", 48_211 + 100 * k, row(v))
     });
     has(&text, &["sample_period_s = 0.01 ", "columns = { gyro = "]);
+    // Neither a counter nor a time.
+    let text = draft(&format!("{comments}{names}"), |_, v| {
+        format!("{}\t", row(v))
+    });
+    has(
+        &text,
+        &[
+            "sample_period_s = 0.01  # 100 Hz, as the file says",
+            "gyro_unit = \"rad/s\"",
+            "columns = { gyro = ",
+        ],
+    );
     // Steps of ten are milliseconds at 100 Hz and microseconds at 100 kHz.
     let text = draft(
         "# sampling rate 100 Hz\nclock,wx,wy,wz,fx,fy,fz\n",
@@ -337,6 +349,28 @@ fn rows_of_a_second_instrument_and_rows_without_samples_are_passed_over() {
         &[
             "# sample_period_s = 0.01 ",
             "continuous = true  # no gap in time",
+        ],
+    );
+}
+
+#[test]
+fn gyros_and_accelerometers_in_rows_of_their_own_are_two_streams_of_one_file() {
+    let header = "t,gx,gy,gz,ax,ay,az,note\n";
+    let text = draft(header, |k, [gx, gy, gz, ax, ay, az]| {
+        let time = k as f64 * 0.01;
+        let gyro = format!("{time:.3},{gx},{gy},{gz},,,,");
+        match k % 2 {
+            0 => gyro,
+            _ => format!("{gyro}\n{:.3},,,,{ax},{ay},{az},", time + 0.002),
+        }
+    });
+    has(
+        &text,
+        &[
+            "accel_from = { time = \"t\", time_unit = \"s\" }",
+            "gyro_unit = \"rad/s\"",
+            "accel_unit = \"m/s^2\"",
+            "columns = { time = \"t\", gyro = [\"gx\", \"gy\", \"gz\"], accel = [\"ax\", \"ay\", \"az\"] }",
         ],
     );
 }

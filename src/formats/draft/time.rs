@@ -36,7 +36,8 @@ impl Clock {
     /// Looks at the column of time, or takes another or none where `run.toml` has no word for its unit.
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(sheet.rate, "no column goes forward like a time");
+            let period = sheet.rate.map(f64::recip);
+            return Self::without(period, "no column goes forward like a time");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of(&sheet.names[column]);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::FEWEST_ROWS;
-use super::columns::Columns;
+use super::columns::{self, Columns};
 use super::name;
 use super::name::Name;
 use super::streams::{Member, Places, Streams, Written, joined};
@@ -14,16 +14,17 @@ use crate::formats::{FileError, Place, Sheet};
 use crate::imu::{PerSensor, Sensor};
 
 impl Streams {
-    /// Looks at the files of both triads; the accelerometers' is called so in the draft.
+    /// Looks at the files of both triads, which may be one with rows of either; the accelerometers' is called so in
+    /// the draft if it is another.
     pub fn of_two_files(
         gyro: &Path,
         accel: &Path,
-        accel_name: &str,
+        accel_name: Option<&str>,
     ) -> Result<(Self, Sheet), FileError> {
         let files = PerSensor { gyro, accel };
         let looked = PerSensor {
-            gyro: look(gyro)?,
-            accel: look(accel)?,
+            gyro: look(gyro, Sensor::Gyro)?,
+            accel: look(accel, Sensor::Accel)?,
         };
         let sources = PerSensor::from_fn(|sensor| Source::of_file(files.get(sensor)));
         let member = |sensor: Sensor| -> Result<Member, FileError> {
@@ -70,7 +71,7 @@ impl Streams {
             axes: looked.gyro.0.stream.axes,
             damage: None,
             written: Some(Written {
-                accel: Some(accel_name.to_owned()),
+                accel: accel_name.map(str::to_owned),
             }),
             found: vec![looked.gyro.0, looked.accel.0],
         };
@@ -81,8 +82,12 @@ impl Streams {
 /// A file as a stream of its own, and its column of time with the word for its unit.
 type Looked = (Found, Option<(String, &'static str)>);
 
-fn look(file: &Path) -> Result<Looked, FileError> {
-    let sheet = Sheet::read(file, FEWEST_ROWS)?;
+fn look(file: &Path, sensor: Sensor) -> Result<Looked, FileError> {
+    let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
+    let of_sensor = columns::named(&sheet, sensor);
+    if !of_sensor.is_empty() {
+        sheet.retain(|columns, row| of_sensor.iter().any(|&k| columns[k][row].is_finite()));
+    }
     let mut columns = Columns::find(&sheet);
     let clock = Clock::find(&sheet, &mut columns);
     let time = columns

@@ -86,6 +86,26 @@ fn a_table_log_that_does_not_reach_over_the_record_is_said() {
 }
 
 #[test]
+fn a_row_that_lacks_a_value_is_missing_and_one_that_lacks_all_is_another_sensors() {
+    let blank = |rows: Vec<String>| {
+        let spoilt = |(number, row): (usize, String)| {
+            let fields: Vec<&str> = row.split(',').collect();
+            match number {
+                101 | 201 => [&fields[..3], &[""], &fields[4..]].concat().join(","),
+                151 => format!("{},,,,,,\n", fields[0]),
+                _ => row,
+            }
+        };
+        rows.into_iter().enumerate().map(spoilt).collect()
+    };
+    let run = reread(|_| (), blank);
+    assert!(says(&run, "2 row(s)") && says(&run, "count as missing"));
+    assert!(says(&run, "1 row(s)") && says(&run, "are passed over"));
+    let whole = reread(|_| (), as_they_are);
+    assert_eq!(run.recording.imu.len(), whole.recording.imu.len());
+}
+
+#[test]
 fn rows_of_zeros_and_values_beyond_any_instrument_are_found_and_bridged() {
     let spoil = |mut rows: Vec<String>| {
         let spoilt = |row: &str, values: &str| {
