@@ -330,9 +330,9 @@ impl fmt::Display for Finding {
             }
             Self::BiasesMayVary { growth } => write!(
                 f,
-                "Nothing is stated of how biases vary, and this record would hardly show it. σ hold that they may, \
-                 as those of such instruments do, and are up to {growth:.1} times as large for it. `turncal allan` \
-                 on a longer record at rest gives the figures of [imu.noise] that say how much."
+                "[imu.noise] states no variation of biases, and this record is too short to show one. σ include a \
+                 variation of the usual size, and are up to {growth:.1} times as large for it. `turncal allan` on a \
+                 longer record at rest gives the figures that [imu.noise] wants."
             ),
             Self::ErrorTermSignificant {
                 term,
@@ -460,7 +460,7 @@ impl fmt::Display for Finding {
                 let Some(base) = base else { return Ok(()) };
                 write!(
                     f,
-                    " A base that is off level and north by {:.3e}″ (1σ) explains all of it, and σ hold that: state \
+                    " A table base off level and north by {:.1}″ (1σ) explains all of it, and σ include that: state \
                      level_sigma_arcsec and north_sigma_arcsec in [turntable].",
                     base / ARCSEC
                 )

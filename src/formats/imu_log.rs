@@ -518,7 +518,7 @@ impl ImuLog<'_> {
                 0 => (String::new(), "Record a run with dwells and turns."),
                 _ => (
                     format!(" and {lacking} rows that lack a value of the gyros or accelerometers"),
-                    "If they are in rows of their own, add accel_from = {} to [imu].",
+                    "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
                 ),
             };
             return Err(csv.error(
