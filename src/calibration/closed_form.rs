@@ -2,6 +2,7 @@
 //! second line of the printed Eq. 15 says `N_g` where the accelerometer is meant), and what takes its
 //! place without a table.
 
+mod both_triads;
 mod gravity;
 mod labels;
 mod least_squares;

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::super::error::CalibrationError;
 use super::super::model::Model;
 use super::super::problem::Problem;
-use super::least_squares::both_triads;
+use super::both_triads::both_triads;
 use super::observed::{Observed, Position};
 use super::result::{ClosedForm, Reference, hidden};
 use crate::attitude::skew;
