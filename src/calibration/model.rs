@@ -11,7 +11,7 @@ use super::parameters::{ParameterVector, parameter, to_vector};
 use super::standstill::FLOOR;
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
-    TermVector, ThermalModel, Triad,
+    TermVector, ThermalModel,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
@@ -144,16 +144,11 @@ impl Model {
     fn set_form(&mut self, run: &Run, form: InstallationForm) {
         self.form = form;
         self.prior_mean = to_vector(&run.instrument.prior_mean(form));
+        let sigma = run.instrument.prior_sigma(form, self.aiding.body_frame());
         for sensor in Sensor::ALL {
-            let mut sigma = run.instrument.prior.get(sensor).sigma(form);
-            if self.aiding == Aiding::Velocity && sensor == Sensor::Accel {
-                for fixed in Triad::above_the_diagonal(form) {
-                    sigma[fixed] = 0.0;
-                }
-            }
             self.prior_sigma
                 .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
-                .copy_from(&sigma);
+                .copy_from(sigma.get(sensor));
         }
     }
 

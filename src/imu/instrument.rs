@@ -1,6 +1,10 @@
 //! What is known of an instrument before it is calibrated.
 
-use super::{InstallationForm, MotionNoise, Noise, Nominal, PerSensor, Prior, TermVector, Triad};
+use super::triad::INSTALLATION;
+use super::{
+    BodyFrame, InstallationForm, MotionNoise, Noise, Nominal, PerSensor, Prior, TermVector, Triad,
+    TriadVector,
+};
 
 /// An instrument as data sheet and experience describe it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,5 +43,32 @@ impl Instrument {
     /// Both triads as the prior has them.
     pub fn prior_mean(&self, form: InstallationForm) -> PerSensor<Triad> {
         PerSensor::from_fn(|sensor| self.prior.get(sensor).mean(form))
+    }
+
+    /// 1σ of each parameter before calibration; zero where the form does not have it or the body frame holds it.
+    ///
+    /// [`Prior`] speaks of the mounting face. In a frame along the accelerometers, turned from it by the angles
+    /// above their diagonal, each of these angles joins the one across the diagonal and the gyros' angles of the
+    /// same pair of axes, so variances add (first order in the angles; that the sums have a summand in common
+    /// is left out).
+    pub fn prior_sigma(
+        &self,
+        form: InstallationForm,
+        body_frame: BodyFrame,
+    ) -> PerSensor<TriadVector> {
+        let mut sigma = PerSensor::from_fn(|sensor| self.prior.get(sensor).sigma(form));
+        if body_frame == BodyFrame::Table {
+            return sigma;
+        }
+        let of_accel = self.prior.accel.installation_sigma;
+        for (angle, &(row, column)) in form.angle_names().iter().enumerate() {
+            let turned = of_accel[row.min(column)];
+            let above = column > row;
+            for (of_triad, held) in [(&mut sigma.gyro, false), (&mut sigma.accel, above)] {
+                let own = &mut of_triad[INSTALLATION + angle];
+                *own = if held { 0.0 } else { own.hypot(turned) };
+            }
+        }
+        sigma
     }
 }

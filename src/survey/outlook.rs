@@ -3,7 +3,7 @@
 use crate::calibration::sensor_and_parameter;
 use crate::calibration::{CalibrationError, Group, bound, coarse_start, six_position};
 use crate::calibration::{Estimate, OBSERVED_BELOW, Options, Problem, parameter_name};
-use crate::imu::{InstallationForm, TermVector};
+use crate::imu::{BodyFrame, InstallationForm, TermVector};
 use crate::run::{Aiding, Run};
 
 /// Forms differ by what the data must say, not by what they can.
@@ -61,30 +61,30 @@ pub(super) fn methods(run: &Run) -> Vec<MethodOutlook> {
 }
 
 fn expected(run: &Run, path: Path) -> Result<Expected, String> {
-    let estimate = match path {
+    let expected = match path {
         Path::SixPosition => {
             let problem = Problem::new(run, &Options::default());
-            six_position(&problem).map(|closed| closed.estimate)
+            six_position(&problem)
+                .map(|closed| summary(run, closed.reference.body_frame(), &closed.estimate))
         }
         Path::TableAiding if run.recording.table.is_none() => Err(CalibrationError::NoTable),
         Path::TableAiding => filtered(run, Aiding::Table),
         Path::VelocityAiding => filtered(run, Aiding::Velocity),
     };
-    match estimate {
-        Ok(estimate) => Ok(summary(run, &estimate)),
-        Err(error) => Err(error.to_string()),
-    }
+    expected.map_err(|error| error.to_string())
 }
 
-/// The covariance that the filter ends with, linearised where it would begin.
-fn filtered(run: &Run, aiding: Aiding) -> Result<Estimate, CalibrationError> {
+/// What the filter ends with, linearised where it would begin.
+fn filtered(run: &Run, aiding: Aiding) -> Result<Expected, CalibrationError> {
     let problem = Problem::new(run, &Options::default().aiding(aiding));
     let start = coarse_start(&problem)?;
-    Ok(bound(&problem, &start.at.triads, &TermVector::zeros())?.estimate)
+    let bound = bound(&problem, &start.at.triads, &TermVector::zeros())?;
+    Ok(summary(run, aiding.body_frame(), &bound.estimate))
 }
 
-fn summary(run: &Run, estimate: &Estimate) -> Expected {
+fn summary(run: &Run, body_frame: BodyFrame, estimate: &Estimate) -> Expected {
     let sigma = estimate.sigma();
+    let prior = run.instrument.prior_sigma(FORM, body_frame);
     let group = |group: Group| {
         let indices = group.estimated(estimate);
         let mean = indices.iter().map(|&k| sigma[k].powi(2)).sum::<f64>() / indices.len() as f64;
@@ -92,7 +92,7 @@ fn summary(run: &Run, estimate: &Estimate) -> Expected {
     };
     let hidden = |&k: &usize| {
         let (sensor, of_triad) = sensor_and_parameter(k);
-        sigma[k] > OBSERVED_BELOW * run.instrument.prior.get(sensor).sigma(FORM)[of_triad]
+        sigma[k] > OBSERVED_BELOW * prior.get(sensor)[of_triad]
     };
     Expected {
         sigma: Group::all().map(group).collect(),

@@ -6,6 +6,8 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::attitude;
 use crate::calibration::comparison::{Named, compare};
+use crate::calibration::parameters::to_vector;
+use crate::imu::{Instrument, Prior};
 
 /// Scale factors in counts, installation of hundredths, biases; no σ.
 pub(crate) fn record() -> Calibration {
@@ -232,4 +234,53 @@ fn a_negative_scale_factor_is_the_reference_and_a_turned_axis_an_error() {
         error.to_string().starts_with("b: the accel z axis"),
         "{error}"
     );
+}
+
+/// Instruments drawn from the prior, which speaks of the mounting face, scatter along the accelerometers as the prior
+/// in that frame says: root mean squares of 4,000 draws, whose own 1σ is 1.1 %.
+#[test]
+fn the_prior_along_the_accelerometers_is_that_of_the_mounting_face_turned() {
+    const DRAWS: usize = 4000;
+    let prior = |installation: [f64; 3]| Prior {
+        scale_sigma: Vector3::repeat(1e-4),
+        installation_sigma: installation.into(),
+        bias: Vector3::zeros(),
+        bias_sigma: Vector3::repeat(1e-5),
+    };
+    let prior = PerSensor {
+        gyro: prior([2e-4, 1e-4, 3e-4]),
+        accel: prior([1e-4, 3e-4, 2e-4]),
+    };
+    let instrument = Instrument::new(prior, PerSensor::default());
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for form in InstallationForm::ALL {
+        let mut squares = ParameterVector::zeros();
+        for _ in 0..DRAWS {
+            let drawn = PerSensor::from_fn(|sensor| {
+                let sigma = prior.get(sensor).sigma(form);
+                let error =
+                    sigma.map(|s| s * Distribution::<f64>::sample(&StandardNormal, &mut rng));
+                let mean = prior.get(sensor).mean(form).to_vector();
+                Triad::from_vector(form, &(mean + error))
+            });
+            let turned = in_body_frame(&drawn, BodyFrame::Accelerometer);
+            let error = PerSensor::from_fn(|sensor| {
+                let mean = prior.get(sensor).mean(form);
+                let turned = turned.get(sensor).in_form(form);
+                Triad::from_vector(form, &(turned.to_vector() - mean.to_vector()))
+            });
+            squares += to_vector(&error).map(|e| e * e);
+        }
+        let of = instrument.prior_sigma(form, BodyFrame::Accelerometer);
+        for (i, sum) in squares.iter().enumerate() {
+            let (sensor, of_triad) = sensor_and_parameter(i);
+            let (sigma, found) = (of.get(sensor)[of_triad], (sum / DRAWS as f64).sqrt());
+            let off = (found - sigma).abs();
+            // Four σ of the draws, and squares of the angles.
+            assert!(
+                off <= 0.045 * sigma + 1e-7,
+                "{form:?} {i}: {found} for {sigma}"
+            );
+        }
+    }
 }
