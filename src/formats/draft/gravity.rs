@@ -47,39 +47,22 @@ impl Gravity {
     /// From the mean outputs at rests, above what registers are made to say at zero. None where zero is neither
     /// there nor shown by the rests.
     pub fn find(rests: &[Vector3<f64>]) -> Option<Self> {
-        let mut own_zero = false;
-        let mut chosen = Sphere::fit(rests, TOLERANCE, ABOUT_ZERO);
-        if let Some(other) = Sphere::fit(rests, TOLERANCE, ANYWHERE).filter(|other| {
-            chosen
-                .as_ref()
-                .is_none_or(|one| other.beats(one, rests, 3.0))
-        }) {
-            own_zero = true;
-            chosen = Some(other);
-        }
-        let zero = if own_zero { ANYWHERE } else { ABOUT_ZERO };
-        let mut by_axis = false;
-        if let Some(other) = Sphere::fit(rests, ANY_SCALE, zero).filter(|other| {
-            chosen
-                .as_ref()
-                .is_none_or(|one| other.beats(one, rests, 2.0))
-        }) {
-            by_axis = true;
-            chosen = Some(other);
-        }
-        let chosen = chosen?;
+        let account = |own_zero, by_axis| Sphere::fit(rests, own_zero, by_axis);
+        let chosen = likelier(account(false, false), account(true, false), rests, 3.0);
+        let own_zero = chosen.as_ref().is_some_and(|sphere| sphere.own_zero);
+        let chosen = likelier(chosen, account(own_zero, true), rests, 2.0)?;
         let zero_sigma = chosen.zero_sigma();
-        if own_zero && zero_sigma > ABOUT_ZERO * chosen.size {
+        if chosen.own_zero && zero_sigma > ABOUT_ZERO * chosen.size {
             return None;
         }
         let zero = chosen.zero();
         let mean = Parameters::from_fn(|k, _| if k < 3 { 1.0 / 3.0 } else { 0.0 });
         Some(Self {
-            own_zero: own_zero.then_some(zero),
+            own_zero: chosen.own_zero.then_some(zero),
             zero_sigma,
             scale: chosen.scale(),
             sigma: mean.dot(&(chosen.fit.covariance * mean)).sqrt(),
-            by_axis,
+            by_axis: chosen.by_axis,
             rests: rests.len(),
             correction: chosen.correction(),
             zero,
@@ -92,9 +75,26 @@ impl Gravity {
     }
 }
 
+/// The simpler account, unless one with so many parameters more is likelier by more than chance.
+fn likelier(
+    simple: Option<Sphere>,
+    other: Option<Sphere>,
+    rests: &[Vector3<f64>],
+    parameters: f64,
+) -> Option<Sphere> {
+    match (simple, other) {
+        (Some(simple), Some(other)) if !other.beats(&simple, rests, parameters) => Some(simple),
+        (simple, other) => other.or(simple),
+    }
+}
+
 /// Axes that sense one g at every rest.
 #[derive(Debug, Clone)]
 struct Sphere {
+    /// Whether zero may be anywhere.
+    own_zero: bool,
+    /// Whether the scales of the axes may differ by more than those of one chip.
+    by_axis: bool,
     /// The unit of scales and zero.
     size: f64,
     fit: Fit<PARAMETERS>,
@@ -102,7 +102,10 @@ struct Sphere {
 }
 
 impl Sphere {
-    fn fit(rests: &[Vector3<f64>], spread: f64, zero: f64) -> Option<Self> {
+    fn fit(rests: &[Vector3<f64>], own_zero: bool, by_axis: bool) -> Option<Self> {
+        let zero = if own_zero { ANYWHERE } else { ABOUT_ZERO };
+        let spread = if by_axis { ANY_SCALE } else { TOLERANCE };
+        let prior = prior(spread, zero);
         let about = |centre: &Vector3<f64>| {
             let mut sizes: Vec<f64> = rests.iter().map(|rest| (rest - centre).norm()).collect();
             median(&mut sizes).filter(|size| *size > 0.0)
@@ -114,12 +117,17 @@ impl Sphere {
             .flatten()
         {
             let Some(size) = about(&centre) else { continue };
-            let prior = prior(spread, zero);
             let start = Parameters::from_fn(|k, _| if k < 6 { 0.0 } else { centre[k - 6] / size });
             let Some(fit) = fit(start, &prior, PART, |at| equations(rests, size, at)) else {
                 continue;
             };
-            let sphere = Self { size, fit, prior };
+            let sphere = Self {
+                own_zero,
+                by_axis,
+                size,
+                fit,
+                prior,
+            };
             // The better of two is that with the lesser cost at one σ.
             let sigma = best
                 .as_ref()
