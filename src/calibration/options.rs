@@ -27,7 +27,7 @@ pub struct Options {
     pub terms: Vec<ErrorTerm>,
     /// Which noise is used.
     pub noise: NoisePolicy,
-    /// Chance that the gate rejects a sound observation.
+    /// Chance that the gate rejects any observation of a sound record.
     pub false_rejection: f64,
     /// Converged when no parameter moves by more than this many of its σ.
     pub converged_sigma: f64,
@@ -42,7 +42,7 @@ impl Default for Options {
             aiding: None,
             terms: Vec::new(),
             noise: NoisePolicy::default(),
-            false_rejection: 1e-6,
+            false_rejection: 1e-3,
             converged_sigma: 0.02,
             passes: 20,
         }

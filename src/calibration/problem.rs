@@ -250,7 +250,10 @@ impl<'a> Problem<'a> {
 
     /// Squared whitened innovation of three components beyond which an observation is an outlier.
     pub(super) fn gate(&self) -> f64 {
-        chi_square_limit(3.0, self.options.false_rejection)
+        let steps = self.stretches.iter().flat_map(|stretch| &stretch.steps);
+        let observations: usize = steps.map(|step| self.observed(step).count()).sum();
+        let of_each = self.options.false_rejection / observations.max(1) as f64;
+        chi_square_limit(3.0, of_each)
     }
 }
 
@@ -337,4 +340,24 @@ fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'
     parts
         .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), stillness))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+    use super::*;
+    use crate::calibration::Method;
+    use crate::simulation::Scenario;
+
+    #[test]
+    fn one_sound_record_in_a_thousand_loses_an_observation() {
+        let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
+        let problem = Problem::new(&simulated.run, &Options::default());
+        let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let observations = solution.outcome().unwrap().innovations.len();
+        let of_each = ChiSquared::new(3.0).unwrap().sf(problem.gate());
+        assert_relative_eq!(observations as f64 * of_each, 1e-3, max_relative = 1e-6);
+    }
 }
