@@ -74,6 +74,7 @@ pub(super) fn pass_trying(
         attitudes: Vec::new(),
         own: Vec::new(),
     };
+    let limit = problem.gate();
     let mut before = None;
     for (number, (stretch, prior)) in problem.stretches().iter().zip(priors).enumerate() {
         let known = match mode {
@@ -90,7 +91,7 @@ pub(super) fn pass_trying(
             sums.posteriors.begin(sums.filter.constants());
         }
         before = Some(stretch);
-        let mut one = OneStretch::new(problem, stretch, number, mode, sums)?;
+        let mut one = OneStretch::new(problem, stretch, number, (mode, limit), sums)?;
         one.run()?;
         sums = one.sums;
         let (filter, next) = (&sums.filter, problem.stretches().get(number + 1));

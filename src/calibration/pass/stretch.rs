@@ -80,7 +80,7 @@ impl<'a> OneStretch<'a> {
         problem: &'a Problem<'a>,
         stretch: &'a Stretch<'a>,
         number: usize,
-        mode: Mode<'a>,
+        (mode, limit): (Mode<'a>, f64),
         sums: Sums,
     ) -> Result<Self, CalibrationError> {
         let initial = sums.at.initial_attitudes[number];
@@ -94,7 +94,7 @@ impl<'a> OneStretch<'a> {
             navigator,
             sums,
             gate: Memory::default(),
-            limit: problem.gate(),
+            limit,
             held: initial,
         })
     }
