@@ -168,6 +168,18 @@ impl Stamps {
         Ok(Stamp::Later)
     }
 
+    /// Takes the stamp of the row before for this one, too.
+    pub fn again(&mut self, csv: &LogRows) {
+        if let Some(&(time, _)) = self.of_rows.last() {
+            self.of_rows.push((time, csv.line()));
+        }
+    }
+
+    /// Whether rows are counted, each with a number of its own.
+    pub fn is_count(&self) -> bool {
+        self.unit == TimeUnit::Count
+    }
+
     /// Lets go of the first rows' stamps.
     pub fn let_go(&mut self, rows: usize) {
         self.of_rows.drain(..rows);

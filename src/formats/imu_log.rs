@@ -1,5 +1,6 @@
 //! The instrument's samples.
 
+mod even;
 mod long;
 
 use nalgebra::Vector3;
@@ -18,6 +19,7 @@ use crate::recording::{
     Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
     stretches_between,
 };
+use even::{evened, place};
 use long::{LongLog, Sizes, Whole};
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
@@ -117,6 +119,12 @@ impl Layout {
     }
 }
 
+/// The pulse whose rounding has this RMS error on each axis: an error of integrals between edges is as bounded as
+/// that, and as independent of how long it is summed over.
+fn pulse_of(error: [f64; 3]) -> f64 {
+    12f64.sqrt() * Vector3::from(error).norm() / 3f64.sqrt()
+}
+
 /// Rows that are held, without duplicates.
 #[derive(Default)]
 struct Held {
@@ -149,6 +157,8 @@ struct Read<'a> {
     rows: usize,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
+    /// RMS errors of integrals that samples put on an even clock have, in the columns' quantity times samples.
+    error: PerSensor<[f64; 3]>,
 }
 
 /// What the file holds.
@@ -188,7 +198,7 @@ impl ImuLog<'_> {
             samples,
             temperature,
             integral_error,
-        } = self.content(sizes, notes)?;
+        } = self.content(sizes, notes, None)?;
         let (mut imu, missing) = match samples {
             Samples::Long(whole) => {
                 let missing = whole.missing;
@@ -200,15 +210,11 @@ impl ImuLog<'_> {
             }
         };
         notes.extend(stamps.lost_count(missing));
-        // As bounded as the error of whole pulses, and as independent of how long it is summed over.
         let error = self
             .axes
             .each(Vector3::from(integral_error))
             .component_div(&self.nominal.accel.0);
-        imu.pulse.accel = imu
-            .pulse
-            .accel
-            .hypot(12f64.sqrt() * error.norm() / 3f64.sqrt());
+        imu.pulse.accel = imu.pulse.accel.hypot(pulse_of(error.into()));
         if let Some(temperature) = temperature {
             let read = temperature.read(&self.source.file.display().to_string());
             notes.extend(read.notes);
@@ -231,6 +237,7 @@ impl ImuLog<'_> {
             bridges,
             rows,
             missing: _,
+            error,
         } = whole;
         let read = Read {
             layout,
@@ -239,6 +246,7 @@ impl ImuLog<'_> {
             rows,
             faults,
             bridges,
+            error,
         };
         // Samples are then whole steps, as pulses are. Pulses are rounded a second time where some of them are
         // interpolated: what is not whole there stays with the sum.
@@ -262,8 +270,7 @@ impl ImuLog<'_> {
         held: Held,
         mut clock: Uniform,
     ) -> (ImuSamples, usize) {
-        let samples = clock.numbers.last().map_or(0, |last| last + 1);
-        let missing = samples - clock.numbers.len();
+        let missing = clock.numbers.last().map_or(0, |last| last + 1) - clock.numbers.len();
         let lines = stamps.of_rows.iter().map(|&(_, line)| line);
         let period = clock.period;
         let units = layout.units(self, period);
@@ -283,11 +290,16 @@ impl ImuLog<'_> {
             period,
             duplicates: held.duplicates,
         };
+        let (repaired, error) = match &clock.wander {
+            Some(wander) => evened(rows.repair(), (wander, self.stamp.lag()), self.output),
+            None => (rows.repair(), PerSensor::default()),
+        };
         let Repaired {
             columns,
             faults,
             bridges,
-        } = rows.repair();
+        } = repaired;
+        let samples = columns[0].len();
 
         let seconds = self.seconds(period);
         let series = PerSensor::from_fn(|sensor| {
@@ -315,6 +327,7 @@ impl ImuLog<'_> {
             rows: count,
             faults,
             bridges,
+            error,
         };
         (self.samples(read, samples, series, pulse), missing)
     }
@@ -333,8 +346,17 @@ impl ImuLog<'_> {
             rows,
             faults,
             bridges,
+            error,
         } = read;
         let period = clock.period;
+        let units = layout.units(self, period);
+        let pulse = PerSensor::from_fn(|sensor| {
+            let of_column = |k: usize| error.get(sensor)[k] * units[3 * sensor as usize + k];
+            pulse.get(sensor).hypot(pulse_of([0, 1, 2].map(of_column)))
+        });
+        let lag = self.stamp.lag();
+        let ahead = clock.wander.as_ref();
+        let ahead = ahead.map_or(0.0, |wander| place(wander, lag, 0).ceil());
         let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
         for (k, facts) in facts.into_iter().enumerate() {
             of_axes.get_mut(sensor(k))[layout.body_axes[k]] = facts;
@@ -342,7 +364,7 @@ impl ImuLog<'_> {
         ImuSamples {
             stretches: stretches_between(
                 samples,
-                clock.first - self.stamp.lag() * period,
+                clock.first + (ahead - lag) * period,
                 period,
                 &faults,
             ),
@@ -426,7 +448,14 @@ impl ImuLog<'_> {
         })
     }
 
-    fn content(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<Content, FileError> {
+    /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
+    /// found to have.
+    fn content(
+        &self,
+        sizes: Sizes,
+        notes: &mut Vec<String>,
+        known: Option<&Uniform>,
+    ) -> Result<Content, FileError> {
         let mut csv = self.open()?;
         let clock = self.clock_of_rows();
         let mut stamps = clock.start(&mut csv)?;
@@ -443,6 +472,7 @@ impl ImuLog<'_> {
             None => None,
         };
         let (mut blank, mut lacking, mut duplicates) = (0, 0, 0);
+        let mut at_once = (0, 0);
         let mut held = Held::default();
         let mut long: Option<LongLog> = None;
         let mut before = [f64::NAN; 6];
@@ -476,7 +506,15 @@ impl ImuLog<'_> {
                     duplicates += 1;
                     continue;
                 }
-                Stamp::Same => return Err(Stamps::same(&csv)),
+                Stamp::Same if stamps.is_count() => return Err(Stamps::same(&csv)),
+                Stamp::Same => {
+                    if at_once.0 == 0 {
+                        at_once.1 = csv.line();
+                    }
+                    at_once.0 += 1;
+                    stamps.again(&csv);
+                    before = row;
+                }
                 Stamp::Later => before = row,
             }
             for (column, value) in held.columns.iter_mut().zip(row) {
@@ -493,14 +531,54 @@ impl ImuLog<'_> {
                 None if held.len() == sizes.long => {
                     csv.pack();
                     let layout = layout.clone();
-                    let begun = LongLog::new(self, (layout, sizes), &held, &stamps);
+                    let begun = LongLog::new(self, (layout, sizes), &held, &stamps, known);
                     long = Some(begun.map_err(|error| csv.placed(error))?);
                 }
                 _ => {}
             }
         }
+        let samples = match long {
+            Some(mut long) => long
+                .take(&mut held, &mut stamps, true)
+                .map(|()| Samples::Long(Box::new(long.finish(duplicates)))),
+            None if held.len() < FEWEST_SAMPLES => {
+                let (found, advice) = match lacking {
+                    0 => (String::new(), "Record a run with dwells and turns."),
+                    _ => (
+                        format!(
+                            " and {lacking} rows that lack a value of the gyros or accelerometers"
+                        ),
+                        "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
+                    ),
+                };
+                return Err(csv.error(
+                    format_args!("{} samples{found}", held.len()),
+                    format_args!("at least {FEWEST_SAMPLES}"),
+                    advice,
+                ));
+            }
+            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
+                .map(|clock| Samples::Held(Box::new((held, clock)))),
+        };
+        let samples = samples.map_err(|error| csv.placed(error))?;
+        let clock = match &samples {
+            Samples::Long(whole) => &whole.clock,
+            Samples::Held(held) => &held.1,
+        };
+        if known.is_none() && clock.wander.is_some() && matches!(samples, Samples::Long(_)) {
+            return self.content(sizes, notes, Some(clock));
+        }
+        notes.extend(clock.uneven());
         notes.extend(csv.cut_off("It is left out"));
         notes.extend_from_slice(csv.remarks());
+        let (same, line) = at_once;
+        if same > 0 {
+            notes.push(format!(
+                "{same} row(s) of {} have the time of the row before and other values, the first in line {line}: each \
+                 counts as a sample.",
+                self.source.file.display()
+            ));
+        }
         if blank > 0 {
             notes.push(format!(
                 "{blank} row(s) of {} have nothing in the columns of both triads and are passed over.",
@@ -513,30 +591,8 @@ impl ImuLog<'_> {
                 self.source.file.display()
             ));
         }
-        if long.is_none() && held.len() < FEWEST_SAMPLES {
-            let (found, advice) = match lacking {
-                0 => (String::new(), "Record a run with dwells and turns."),
-                _ => (
-                    format!(" and {lacking} rows that lack a value of the gyros or accelerometers"),
-                    "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
-                ),
-            };
-            return Err(csv.error(
-                format_args!("{} samples{found}", held.len()),
-                format_args!("at least {FEWEST_SAMPLES}"),
-                advice,
-            ));
-        }
-        let samples = match long {
-            Some(mut long) => long
-                .take(&mut held, &mut stamps, true)
-                .and_then(|()| long.finish(duplicates))
-                .map(|whole| Samples::Long(Box::new(whole))),
-            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
-                .map(|clock| Samples::Held(Box::new((held, clock)))),
-        };
         Ok(Content {
-            samples: samples.map_err(|error| csv.placed(error))?,
+            samples,
             integral_error: csv.integral_error(),
             layout,
             stamps,

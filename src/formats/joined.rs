@@ -5,16 +5,14 @@
 //! from sample to sample is exact, so errors do not add up; what is left is the error of the integral at an edge,
 //! which the record itself tells (see [`Course::edge_error`]).
 
-mod course;
-
 use std::path::{Path, PathBuf};
 
 use super::clock::{Clock, Stamp, Stamps, TimeUnit};
+use super::course::Course;
 use super::error::{FileError, Place};
 use super::source::Source;
 use super::uniform::Uniform;
 use crate::imu::{Output, PerSensor};
-use course::Course;
 
 /// The column of time, in s.
 pub(super) const TIME: &str = "time";
@@ -59,30 +57,17 @@ impl Joined {
     pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
         let gyro = Track::read(&parts.gyro)?;
         let accel = Track::read(&parts.accel)?;
-        let seconds = match output {
-            Output::Rate => accel.clock.period,
-            Output::Increment | Output::Pulse => 1.0,
-        };
-        let courses = accel.courses(lag);
+        let courses = accel.courses();
         let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
-        let period = gyro.clock.period;
-        let over = match output {
-            Output::Rate => period,
-            Output::Increment | Output::Pulse => 1.0,
-        };
-        // Clocks that are one give values as they stand, to the last bit.
-        let factor = match (seconds / over - 1.0).abs() < 1e-9 {
-            true => 1.0,
-            false => seconds / over,
-        };
+        // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
         let ahead = gyro.clock.first - accel.clock.first;
+        let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
         let mut course = 0;
         let mut weights = 0.0;
         for (k, &number) in gyro.clock.numbers.iter().enumerate() {
-            let time = gyro.clock.first + number as f64 * period;
-            // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
-            let begin = ahead + (number as f64 - lag) * period;
-            let end = begin + period;
+            let time = gyro.clock.first + gyro.clock.time(number as f64);
+            let begin = place(number as f64 - lag);
+            let end = place(number as f64 + 1.0 - lag);
             while courses
                 .get(course)
                 .is_some_and(|course| course.end() < begin)
@@ -93,6 +78,11 @@ impl Joined {
             // Where one of both lacks samples, the row does.
             let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
                 continue;
+            };
+            let factor = match output {
+                // Clocks that are one give values as they stand, to the last bit.
+                Output::Rate if (end - begin - 1.0).abs() > 1e-9 => (end - begin).recip(),
+                _ => 1.0,
             };
             weights += weight;
             let mut row = vec![time];
@@ -122,6 +112,10 @@ impl Joined {
             [0, 1, 2].map(|k| mean[k] + of[k] / count)
         });
         let weight = weights / rows.len() as f64;
+        let seconds = match output {
+            Output::Rate => accel.clock.period,
+            Output::Increment | Output::Pulse => 1.0,
+        };
         let names = distinct(&PerSensor::from_fn(|sensor| parts.get(sensor).columns));
         let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
         let mut header = vec![TIME.to_owned()];
@@ -250,9 +244,10 @@ impl Track {
         }
         let mut remarks = rows.remarks().to_vec();
         remarks.extend(rows.cut_off("It is left out"));
-        let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period);
+        let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)
+            .map_err(|error| rows.placed(error))?;
         Ok(Self {
-            clock: clock.map_err(|error| rows.placed(error))?,
+            clock,
             columns,
             further: others,
             units,
@@ -260,19 +255,16 @@ impl Track {
         })
     }
 
-    /// Samples that follow one another.
-    fn courses(&self, lag: f64) -> Vec<Course> {
-        let Uniform {
-            period, numbers, ..
-        } = &self.clock;
+    /// Samples that follow one another, by their numbers.
+    fn courses(&self) -> Vec<Course> {
+        let numbers = &self.clock.numbers;
         let mut courses: Vec<Course> = Vec::new();
         for (k, &number) in numbers.iter().enumerate() {
             let follows = k > 0 && number == numbers[k - 1] + 1;
             if !follows {
                 courses.push(Course {
-                    begin: (number as f64 - lag) * period,
-                    period: *period,
-                    sums: [const { Vec::new() }; 3],
+                    begin: number as f64,
+                    ..Course::default()
                 });
             }
             if let Some(course) = courses.last_mut() {

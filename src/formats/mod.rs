@@ -7,6 +7,7 @@ mod axes;
 mod calibration_file;
 mod campaign;
 mod clock;
+mod course;
 mod csv_file;
 mod digest;
 pub mod draft;

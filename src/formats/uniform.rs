@@ -1,6 +1,8 @@
-//! The uniform clock behind stamps that are rounded, jitter and lack rows.
+//! The uniform clock behind stamps that are rounded, jitter, come late and lack rows.
 
 mod following;
+mod late;
+mod wander;
 
 use std::path::Path;
 
@@ -8,8 +10,12 @@ use super::error::{FileError, Place};
 use crate::recording::nanoseconds;
 use crate::statistics::median;
 pub(super) use following::Following;
+pub(super) use late::REACH;
+use late::punctual;
+use wander::Knots;
+pub(super) use wander::Wander;
 
-/// The uniform clock of increasing stamps.
+/// The uniform clock of stamps that do not go back.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Uniform {
     /// Due time of the first sample, s.
@@ -18,11 +24,13 @@ pub(super) struct Uniform {
     pub period: f64,
     /// The number of each row's sample; the first is 0. None where they were given out one by one.
     pub numbers: Vec<usize>,
-    /// Stamps against due times, s.
+    /// Stamps against due times, s; where samples wander, against when they are.
     pub jitter_rms: f64,
     pub jitter_max: f64,
     /// The period over the one that was given less one, where stamps contradict that.
     pub off_given: Option<f64>,
+    /// When samples are, where that is not as due within half a sample.
+    pub wander: Option<Wander>,
 }
 
 /// σ that one sound record in ten thousand exceeds.
@@ -32,16 +40,23 @@ const BY_CHANCE: f64 = 3.89;
 const PHASE: f64 = 0.02;
 /// … and its period, which makes the loop well damped.
 const PERIOD: f64 = 0.5 * PHASE * PHASE;
-/// A first stamp this near its due time is it, s.
+/// A first stamp this near its due time is it, and stamps jitter by no less, s.
 const EXACT: f64 = 1e-9;
 /// Stamps that give the first phase.
 const FIRST: usize = 50;
 
 impl Uniform {
-    /// Finds the number of each sample, and the clock that all stamps share within half a period. A
-    /// given period is that of the clock unless the stamps contradict it. There must be at least two
-    /// stamps.
+    /// Finds the number of each sample, and the clock that all stamps share. A given period is that of the clock
+    /// unless the stamps contradict it. There must be at least two stamps.
     pub fn new(file: &Path, stamps: &[(f64, u64)], given: Option<f64>) -> Result<Self, FileError> {
+        Self::counted(file, stamps, given).map(|(clock, _)| clock)
+    }
+
+    fn counted(
+        file: &Path,
+        stamps: &[(f64, u64)],
+        given: Option<f64>,
+    ) -> Result<(Self, Counting), FileError> {
         let first = stamps[0];
         let found = mean_step(stamps);
         if let Some(period) = given
@@ -55,14 +70,18 @@ impl Uniform {
                 "Correct sample_period_s, time_unit or the time column.",
             ));
         }
+        let clock = |about, given| {
+            let gap = |row: usize| gap(file, stamps[row - 1].0, stamps[row]);
+            Self::likeliest(stamps, about, given).map_err(gap)
+        };
         if let Some(period) = given
-            && let Ok(free) = Self::with_period(file, stamps, found, false)
+            && let Ok((free, counting)) = clock(found, false)
             && free.contradicts(period)
         {
             let off_given = Some(free.period / period - 1.0);
-            return Ok(Self { off_given, ..free });
+            return Ok((Self { off_given, ..free }, counting));
         }
-        Self::with_period(file, stamps, given.unwrap_or(found), given.is_some())
+        clock(given.unwrap_or(found), given.is_some())
     }
 
     /// Whether stamps drift from a clock of another period, over all of them, by more than jitter makes
@@ -75,86 +94,246 @@ impl Uniform {
         drift > self.jitter_max.max(BY_CHANCE * sigma)
     }
 
-    fn with_period(
-        file: &Path,
+    /// The clock that stamps tell best, rows missing where they say so or none at all. Each place where rows are
+    /// missing has to make stamps likelier by as much as it takes to name it among all rows (minimum description
+    /// length). Err is the row behind a gap that is too long.
+    fn likeliest(
         stamps: &[(f64, u64)],
         about: f64,
         given: bool,
-    ) -> Result<Self, FileError> {
-        let gap = |row: usize| gap(file, stamps[row - 1].0, stamps[row]);
+    ) -> Result<(Self, Counting), usize> {
+        let by_rows = || Self::with_period(stamps, about, given, Counting::ByRows);
+        let by_stamps = match Self::with_period(stamps, about, given, Counting::ByStamps) {
+            Ok(clock) => clock,
+            // Jitter of a sample and more may be counted as gaps without end.
+            Err(row) => {
+                let clock = by_rows()?;
+                let is_near = clock.jitter(stamps) < clock.period;
+                return is_near.then_some((clock, Counting::ByRows)).ok_or(row);
+            }
+        };
+        let pairs = by_stamps.numbers.windows(2);
+        let gaps = pairs.filter(|pair| pair[1] > pair[0] + 1).count() as f64;
+        if gaps > 0.0 {
+            let by_rows = by_rows()?;
+            let jitter = |clock: &Self| clock.jitter(stamps).max(EXACT);
+            let gain = stamps.len() as f64 * (jitter(&by_rows) / jitter(&by_stamps)).ln();
+            if gain < gaps * (stamps.len() as f64).ln() {
+                return Ok((by_rows, Counting::ByRows));
+            }
+        }
+        Ok((by_stamps, Counting::ByStamps))
+    }
 
-        let mut numbers = numbers(stamps, about, given).map_err(gap)?;
-        let (mut first, mut period) = fit(stamps, &numbers, about, given);
+    /// RMS of stamps about those near by, s.
+    fn jitter(&self, stamps: &[(f64, u64)]) -> f64 {
+        let placed = punctual(stamps, self.period);
+        self.knots(&placed).jitter().0
+    }
+
+    /// How far stamps are off their due times.
+    fn knots(&self, times: &[f64]) -> Knots {
+        let rows = times.iter().zip(&self.numbers);
+        Knots::of(rows.map(|(&time, &number)| (number, time - self.due(number))))
+    }
+
+    fn due(&self, number: usize) -> f64 {
+        self.first + number as f64 * self.period
+    }
+
+    fn with_period(
+        stamps: &[(f64, u64)],
+        about: f64,
+        given: bool,
+        counting: Counting,
+    ) -> Result<Self, usize> {
+        let mut placed = punctual(stamps, about);
+        let mut numbers = numbers(&placed, about, given, counting)?;
+        let (mut first, mut period) = fit(&placed, &numbers, about, given);
         // A period that jitter and gaps falsified may have lost count once or twice.
         if !given {
-            numbers = self::numbers(stamps, period, false).map_err(gap)?;
-            (first, period) = fit(stamps, &numbers, period, false);
+            placed = punctual(stamps, period);
+            numbers = self::numbers(&placed, period, false, counting)?;
+            (first, period) = fit(&placed, &numbers, period, false);
         }
 
         // Where nothing is rounded the fit must not be.
         if (first - stamps[0].0).abs() < EXACT {
             first = stamps[0].0;
         }
-        let (mut squares, mut largest) = (0.0, 0.0f64);
-        for (&(time, line), &number) in stamps.iter().zip(&numbers) {
-            let due = first + number as f64 * period;
-            let off = (time - due).abs();
-            if off > 0.5 * period {
-                return Err(not_uniform(file, (time, line), number, (due, period)));
-            }
-            squares += off * off;
-            largest = largest.max(off);
-        }
-        Ok(Self {
+        let mut clock = Self {
             first,
             period,
             numbers,
-            jitter_rms: (squares / stamps.len() as f64).sqrt(),
-            jitter_max: largest,
+            jitter_rms: 0.0,
+            jitter_max: 0.0,
             off_given: None,
+            wander: None,
+        };
+        let knots = clock.knots(&placed);
+        clock.wander = knots.wander(0.0, 0.0, period);
+        (clock.jitter_rms, clock.jitter_max) = match clock.wander {
+            Some(_) => knots.jitter(),
+            None => {
+                let rows = stamps.iter().zip(&clock.numbers);
+                let offs = rows.map(|(&(time, _), &number)| (time - clock.due(number)).abs());
+                let (squares, largest) = offs.fold((0.0, 0.0f64), |(squares, largest), off| {
+                    (squares + off * off, largest.max(off))
+                });
+                ((squares / stamps.len() as f64).sqrt(), largest)
+            }
+        };
+        Ok(clock)
+    }
+
+    /// When a sample is after the first is due, s; it need not be a whole one.
+    pub fn time(&self, number: f64) -> f64 {
+        let time = self.wander.as_ref().map(|wander| wander.time(number));
+        time.unwrap_or(number) * self.period
+    }
+
+    /// The sample of a time after the first is due, s.
+    pub fn number(&self, time: f64) -> f64 {
+        let time = time / self.period;
+        let number = self.wander.as_ref().map(|wander| wander.number(time));
+        number.unwrap_or(time)
+    }
+
+    /// What stamps do that no uniform clock does, in a sentence.
+    pub fn uneven(&self) -> Option<String> {
+        let ms = |time: f64| format!("{:.3} ms", 1e3 * time);
+        let sample = ms(self.period);
+        if let Some(wander) = &self.wander {
+            return Some(format!(
+                "By their stamps samples wander by up to {} against an even clock of {sample} a sample: they are \
+                 integrated over its samples.",
+                ms(wander.largest() * self.period),
+            ));
+        }
+        (self.jitter_max > self.period).then(|| {
+            format!(
+                "Stamps are late or early by up to {}, more than a sample of {sample}: later ones tell when it was \
+                 taken.",
+                ms(self.jitter_max),
+            )
         })
     }
+}
+
+/// By what samples are counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Counting {
+    ByStamps,
+    ByRows,
 }
 
 /// Counts samples by steps from row to row, with a clock that follows the stamps slowly.
 #[derive(Debug, Clone)]
 struct Counter {
+    counting: Counting,
     number: usize,
     period: f64,
     due: f64,
     /// Whether the period stays as it is.
     given: bool,
+    /// By how much rows at later stamps have to be nearer to them to be missing others, in samples.
+    price: f64,
 }
 
 impl Counter {
-    /// The number of the sample of a stamp, which may be beyond any.
-    fn next(&mut self, time: f64) -> f64 {
-        let step = ((time - self.due) / self.period).round().max(1.0);
+    /// The number of the sample of the first of these times, those of rows that follow one another; it may be beyond
+    /// any.
+    fn next(&mut self, times: &[f64]) -> f64 {
+        let step = match self.counting {
+            Counting::ByStamps => 1.0 + self.missing(times),
+            Counting::ByRows => 1.0,
+        };
         let next = self.number as f64 + step;
         self.number = next as usize;
         self.due += step * self.period;
-        let off = time - self.due;
+        let off = times[0] - self.due;
         self.due += PHASE * off;
         if !self.given {
             self.period += PERIOD * off / step;
         }
         next
     }
+
+    /// Samples before the first of these times that have no row: so many as put most rows at their times.
+    ///
+    /// Rows off by more than a sample do not say by how much; of a Laplacian jitter the distances that are left are
+    /// the likelihood.
+    fn missing(&self, times: &[f64]) -> f64 {
+        let rows = times.iter().take(WITNESSES).zip(1..);
+        let late = rows.map(|(time, row)| (time - self.due) / self.period - f64::from(row));
+        let late: Vec<f64> = match late.clone().next() {
+            Some(first) if first >= 0.5 => late.collect(),
+            _ => return 0.0,
+        };
+        let distance = |missing: f64| -> f64 {
+            let each = late.iter().map(|late| (late - missing).abs().min(1.0));
+            each.sum()
+        };
+        let none = distance(0.0) - self.price;
+        let mut likeliest = (none, 0.0);
+        for late in late
+            .iter()
+            .map(|late| late.round())
+            .filter(|&late| late > 0.0)
+        {
+            let left = distance(late);
+            // Of two alike the fewer, whatever rounding says.
+            let fewer = if late < likeliest.1 { ALIKE } else { -ALIKE };
+            if left < likeliest.0 + fewer {
+                likeliest = (left, late);
+            }
+        }
+        // Unless they are missing before a later one.
+        let (_, missing) = likeliest;
+        let from_here_on = late.iter().scan(0.0, |gain, &late| {
+            *gain += late.abs().min(1.0) - (late - missing).abs().min(1.0);
+            Some(*gain)
+        });
+        match from_here_on.into_iter().all(|gain| gain > 0.0) {
+            true => missing,
+            false => 0.0,
+        }
+    }
+}
+
+/// Distances of stamps nearer than this are the same, in samples.
+const ALIKE: f64 = 1e-6;
+/// Rows that tell whether some are missing before them.
+const WITNESSES: usize = 32;
+
+/// What it takes to name a row among so many, in samples of stamps' distances: the logarithm, by the scale of their
+/// jitter, which is about what steps are off by as often as not.
+fn price(times: &[f64], period: f64) -> f64 {
+    let off = |pair: &[f64]| ((pair[1] - pair[0]) / period - 1.0).abs();
+    let mut off: Vec<f64> = times.windows(2).map(off).collect();
+    median(&mut off).unwrap_or(0.0) * (times.len() as f64).ln()
 }
 
 /// Number of each sample; the row after a gap longer than all rows together if there is one.
-fn numbers(stamps: &[(f64, u64)], about: f64, given: bool) -> Result<Vec<usize>, usize> {
-    let most = 2 * stamps.len();
-    let mut numbers = Vec::with_capacity(stamps.len());
+fn numbers(
+    times: &[f64],
+    about: f64,
+    given: bool,
+    counting: Counting,
+) -> Result<Vec<usize>, usize> {
+    let most = 2 * times.len();
+    let mut numbers = Vec::with_capacity(times.len());
     numbers.push(0);
     let mut counter = Counter {
+        counting,
         number: 0,
         period: about,
-        due: stamps[0].0 + phase(stamps, about),
+        due: times[0] + phase(times, about),
         given,
+        price: price(times, about),
     };
-    for (row, &(time, _)) in stamps.iter().enumerate().skip(1) {
-        if counter.next(time) > most as f64 {
+    for row in 1..times.len() {
+        if counter.next(&times[row..]) > most as f64 {
             return Err(row);
         }
         numbers.push(counter.number);
@@ -172,57 +351,54 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
     )
 }
 
-fn not_uniform(
-    file: &Path,
-    (time, line): (f64, u64),
-    number: usize,
-    (due, period): (f64, f64),
-) -> FileError {
-    FileError::new(
-        file,
-        Place::Line(line),
-        format_args!("time {time} s at sample {}", number + 1),
-        format_args!("{} s at {period} s a sample", nanoseconds(due)),
-        "Correct sample_period_s, or resample the record to a uniform clock.",
-    )
-}
-
-/// Rows over which steps are compared: more hide jitter, fewer are seldom without a gap.
+/// Rows over which steps are compared: more hide jitter, fewer are seldom without a gap. Twice as many, as often as
+/// needed, where rows come in bursts.
 const SPAN: usize = 8;
-/// Spans without a gap are within this part of their median.
-const NO_GAP: f64 = 0.8 / SPAN as f64;
+/// Spans without a gap are within this of their median, in samples.
+const NO_GAP: f64 = 0.8;
 
 /// Mean step where no row is missing. It is free of the rounding that a single printed step keeps.
 fn mean_step(stamps: &[(f64, u64)]) -> f64 {
-    let span = SPAN.min(stamps.len() - 1);
-    let steps = |stamps: &[(f64, u64)]| (stamps[span].0 - stamps[0].0) / span as f64;
-    let mut sorted: Vec<f64> = stamps.windows(span + 1).map(steps).collect();
-    let median = median(&mut sorted).unwrap_or(f64::NAN);
-    sorted.retain(|step| (step - median).abs() <= NO_GAP * median);
-    sorted.iter().sum::<f64>() / sorted.len() as f64
+    let rows = stamps.len() - 1;
+    // Rows that are missing make this longer, never shorter.
+    let longest = (stamps[rows].0 - stamps[0].0) / rows as f64;
+    let mut span = SPAN;
+    while span < rows {
+        let steps = |stamps: &[(f64, u64)]| (stamps[span].0 - stamps[0].0) / span as f64;
+        let mut sorted: Vec<f64> = stamps.windows(span + 1).map(steps).collect();
+        let all = sorted.len();
+        let median = median(&mut sorted).unwrap_or(f64::NAN);
+        let within = NO_GAP / span as f64 * median;
+        sorted.retain(|step| (step - median).abs() <= within);
+        if 2 * sorted.len() > all && median - within <= longest {
+            return sorted.iter().sum::<f64>() / sorted.len() as f64;
+        }
+        span *= 2;
+    }
+    longest
 }
 
 /// From the first stamp to its due time by the circular mean of the first stamps' phases, which gaps
 /// do not disturb.
-fn phase(stamps: &[(f64, u64)], period: f64) -> f64 {
+fn phase(times: &[f64], period: f64) -> f64 {
     let turn = std::f64::consts::TAU / period;
-    let (sin, cos) = stamps
+    let (sin, cos) = times
         .iter()
         .take(FIRST)
-        .map(|&(time, _)| ((time - stamps[0].0) * turn).sin_cos())
+        .map(|&time| ((time - times[0]) * turn).sin_cos())
         .fold((0.0, 0.0), |(s, c), (sin, cos)| (s + sin, c + cos));
     f64::atan2(sin, cos) / turn
 }
 
 /// First due time and period by least squares of stamps on sample numbers; with a given period the
 /// first alone.
-fn fit(stamps: &[(f64, u64)], numbers: &[usize], about: f64, given: bool) -> (f64, f64) {
-    let origin = stamps[0].0;
-    let count = stamps.len() as f64;
+fn fit(times: &[f64], numbers: &[usize], about: f64, given: bool) -> (f64, f64) {
+    let origin = times[0];
+    let count = times.len() as f64;
     let mean = numbers.iter().map(|&n| n as f64).sum::<f64>() / count;
     let off = |time: f64, number: usize| time - origin - number as f64 * about;
     let (mut level, mut slope, mut spread) = (0.0, 0.0, 0.0);
-    for (&(time, _), &number) in stamps.iter().zip(numbers) {
+    for (&time, &number) in times.iter().zip(numbers) {
         let from_mean = number as f64 - mean;
         level += off(time, number) / count;
         slope += off(time, number) * from_mean;

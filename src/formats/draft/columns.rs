@@ -54,7 +54,7 @@ impl Columns {
                 accel: vec![ECHO_ACCEL],
             };
         } else if by_size {
-            found = by_numbers(sheet, time, temperature);
+            found = by_numbers(sheet, &names, [time, temperature]);
         }
         let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
         Self {
@@ -225,12 +225,13 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
 /// Triads side by side: gravity keeps the magnitude of one of them, the other is a gyro's.
 fn by_numbers(
     sheet: &Sheet,
-    time: Option<usize>,
-    temperature: Option<usize>,
+    names: &[Name],
+    taken: [Option<usize>; 2],
 ) -> PerSensor<Vec<[usize; 3]>> {
-    let free: Vec<usize> = (0..sheet.names.len())
-        .filter(|&k| Some(k) != time && Some(k) != temperature && is_numeric(sheet, k))
-        .collect();
+    let is_free = |&k: &usize| {
+        !taken.contains(&Some(k)) && !names[k].is_of_another_sensor() && is_numeric(sheet, k)
+    };
+    let free: Vec<usize> = (0..sheet.names.len()).filter(is_free).collect();
     let mut triads: Vec<(f64, [usize; 3])> = free
         .chunks_exact(3)
         .map(|columns| [columns[0], columns[1], columns[2]])

@@ -69,10 +69,14 @@ impl Name {
         let (mut rest, mut found) = (name.to_owned(), None);
         if let Some(open) = name.find(['[', '(']) {
             let inside = name[open..].trim_matches(['[', ']', '(', ')', ' ']);
-            // An index is no unit.
-            if !inside.chars().all(|c| c.is_ascii_digit()) {
-                found = unit(inside);
-                rest = name[..open].to_owned();
+            found = unit(inside);
+            let within = Self::of(inside);
+            match found {
+                // `%float(RawGyroX)`
+                None if within.axis.is_some() && within.stem.len() > 1 => return within,
+                // An index is no unit.
+                None if inside.chars().all(|c| c.is_ascii_digit()) => {}
+                _ => rest = name[..open].to_owned(),
             }
         }
         let rest = rest
@@ -108,7 +112,7 @@ impl Name {
     pub fn sensor(&self) -> Option<Sensor> {
         let has = |parts: &[&str]| parts.iter().any(|part| self.stem.contains(part));
         let is = |all: &[&str]| all.contains(&self.stem.as_str());
-        if has(&["mag", "quat", "euler", "cov", "std", "bias", "orientation"]) {
+        if self.is_of_another_sensor() {
             None
         } else if has(&[
             "gyr",
@@ -132,6 +136,21 @@ impl Name {
         } else {
             None
         }
+    }
+
+    /// Whether it is neither a gyro's nor an accelerometer's, by its name.
+    pub fn is_of_another_sensor(&self) -> bool {
+        let others = [
+            "mag",
+            "compass",
+            "quat",
+            "euler",
+            "cov",
+            "std",
+            "bias",
+            "orientation",
+        ];
+        others.iter().any(|other| self.stem.contains(other))
     }
 
     /// How much like a column of time it is, more is more.
@@ -242,6 +261,8 @@ mod tests {
             ("acc_x_mg", Accel, 'x', Some("mg")),
             ("fz", Accel, 'z', None),
             ("wx", Gyro, 'x', None),
+            ("%float(RawGyroX)", Gyro, 'x', None),
+            ("Acc X (calibrated)", Accel, 'x', None),
         ] {
             let name = Name::of(text);
             assert_eq!(
@@ -257,6 +278,7 @@ mod tests {
             "field.angular_velocity_covariance0",
             "Temp",
             "gyro_bias_x",
+            "%float(RawCompassX)",
         ] {
             assert_eq!(Name::of(text).sensor(), None, "{text}");
         }

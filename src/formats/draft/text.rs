@@ -184,9 +184,13 @@ impl Draft {
             (None, _) if self.clock.is_stated => {
                 let _ = writeln!(text, "# {}: rows follow one another.", self.clock.why);
             }
-            (None, _) => text.push_str(
-                "# TODO: no column goes forward like a time: name it, or give sample_period_s.\n",
-            ),
+            (None, _) => {
+                let why = &self.clock.why;
+                let _ = writeln!(
+                    text,
+                    "# TODO: {why}: name one that is, or give sample_period_s."
+                );
+            }
         }
         let mut missing = Vec::new();
         for sensor in Sensor::ALL {

@@ -41,6 +41,11 @@ impl Clock {
         };
         let steps = Steps::of(&stamps);
         let name = Name::of(&sheet.names[column]);
+        if name.is_counter() && name.is_time() < 2 && steps.usual != 1.0 {
+            let period = sheet.rate.map(f64::recip);
+            columns.time = None;
+            return Self::without(period, "a counter that other packets share is no time");
+        }
         let named = name.unit.or_else(|| name::unit(&sheet.units[column]));
         let named = UNITS.iter().find(|(unit, _)| Some(*unit) == named);
         let stated = sheet.rate.map(f64::recip);
@@ -51,7 +56,7 @@ impl Clock {
         let (unit, why) = match (named, known) {
             _ if columns.nanoseconds.is_some() => ("s", "seconds and nanoseconds".to_owned()),
             (Some(&(unit, _)), _) => (unit, "as the file says".to_owned()),
-            _ if steps.is_count && name.is_time() < 2 => {
+            _ if (steps.is_count || name.is_counter()) && name.is_time() < 2 => {
                 ("count", "steps of one: a counter of samples".to_owned())
             }
             (None, Some(period)) => {

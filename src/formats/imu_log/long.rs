@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use super::even::{Even, reached};
 use super::{Held, ImuLog, Layout};
 use crate::formats::clock::Stamps;
 use crate::formats::error::FileError;
-use crate::formats::uniform::{Following, Uniform};
+use crate::formats::uniform::{Following, REACH, Uniform};
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
 use crate::recording::{Bridge, ColumnFacts, Fault, FaultKind, Packed, Packer, finest_step};
@@ -46,6 +47,8 @@ pub(super) struct LongLog<'a> {
     next: usize,
     facts: Option<[ColumnFacts; 6]>,
     packers: PerSensor<Packer>,
+    /// Where it is known that samples wander.
+    even: Option<PerSensor<Even<'a>>>,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
     rows: usize,
@@ -63,15 +66,18 @@ pub(super) struct Whole {
     pub rows: usize,
     /// Samples without one.
     pub missing: usize,
+    /// RMS errors of integrals, in the columns' quantity times samples.
+    pub error: PerSensor<[f64; 3]>,
 }
 
 impl<'a> LongLog<'a> {
-    /// Begins with the first rows of a log.
+    /// Begins with the first rows of a log, whose clock may be known.
     pub fn new(
         log: &'a ImuLog<'a>,
         (layout, sizes): (Layout, Sizes),
         held: &Held,
         stamps: &Stamps,
+        known: Option<&'a Uniform>,
     ) -> Result<Self, FileError> {
         let (clock, numbers) = Following::new(&log.source.file, &stamps.of_rows, log.clock.period)?;
         let step = |column: usize| match log.output {
@@ -80,6 +86,9 @@ impl<'a> LongLog<'a> {
         };
         Ok(Self {
             packers: PerSensor::from_fn(|sensor| Packer::new(layout.columns(sensor).map(step))),
+            even: known.and_then(|clock| clock.wander.as_ref()).map(|wander| {
+                PerSensor::from_fn(|_| Even::new(wander, log.stamp.lag(), log.output))
+            }),
             log,
             layout,
             sizes,
@@ -96,7 +105,7 @@ impl<'a> LongLog<'a> {
 
     /// Whether so many rows are held that some can be taken.
     pub fn is_full(&self, held: &Held) -> bool {
-        held.len() >= self.taken + self.sizes.part + 2 * BESIDE
+        held.len() >= self.taken + self.sizes.part + 2 * BESIDE + REACH
     }
 
     /// Takes rows that are held, all of them at the end of the file, and lets go of what no later row asks for.
@@ -106,9 +115,10 @@ impl<'a> LongLog<'a> {
         stamps: &mut Stamps,
         at_end: bool,
     ) -> Result<(), FileError> {
-        for &stamp in &stamps.of_rows[self.numbers.len()..] {
-            self.numbers.push(self.clock.number(stamp)?);
-        }
+        // Rows further on tell whether one is late.
+        let new = &stamps.of_rows[self.numbers.len()..];
+        let count = new.len() - if at_end { 0 } else { REACH.min(new.len()) };
+        self.numbers.extend(self.clock.numbers(new, count)?);
         while self.is_full(held) {
             self.part(held, stamps, self.taken + self.sizes.part + 2 * BESIDE);
         }
@@ -197,8 +207,15 @@ impl<'a> LongLog<'a> {
         for sensor in Sensor::ALL {
             let of_axes = self.layout.columns(sensor).map(|column| &columns[column]);
             let packer = self.packers.get_mut(sensor);
-            for k in samples.start - first..samples.end - first {
-                packer.push(of_axes.map(|column| column[k]));
+            let samples = samples.start - first..samples.end - first;
+            let samples = samples.map(|k| of_axes.map(|column| column[k]));
+            match &mut self.even {
+                None => samples.for_each(|sample| packer.push(sample)),
+                Some(even) => {
+                    let even = even.get_mut(sensor);
+                    samples.for_each(|sample| even.push(sample));
+                    even.give(false, |sample| packer.push(sample));
+                }
             }
         }
     }
@@ -212,12 +229,26 @@ impl<'a> LongLog<'a> {
     }
 
     /// What the log is, all of its rows being taken.
-    pub fn finish(self, duplicates: usize) -> Result<Whole, FileError> {
-        let clock = self.clock.finish()?;
+    pub fn finish(mut self, duplicates: usize) -> Whole {
+        let clock = self.clock.finish();
         let units = self.layout.units(self.log, clock.period);
         let mut facts = self.facts.unwrap_or_default();
         for (facts, unit) in facts.iter_mut().zip(units) {
             facts.unit = unit;
+        }
+        let mut error = PerSensor::default();
+        if let (Some(wander), Some(even)) = (&clock.wander, &mut self.even) {
+            for sensor in Sensor::ALL {
+                let packer = self.packers.get_mut(sensor);
+                let even = even.get_mut(sensor);
+                even.give(true, |sample| packer.push(sample));
+                *error.get_mut(sensor) = even.error();
+            }
+            let of_faults = self.faults.iter_mut().map(|fault| &mut fault.samples);
+            let of_bridges = self.bridges.iter_mut().map(|bridge| &mut bridge.samples);
+            for samples in of_faults.chain(of_bridges) {
+                *samples = reached(wander, self.log.stamp.lag(), samples);
+            }
         }
         let PerSensor { gyro, accel } = self.packers;
         let units = |sensor| self.layout.body_units(self.log, sensor, clock.period);
@@ -248,15 +279,20 @@ impl<'a> LongLog<'a> {
         let mut bridges = self.bridges;
         Bridge::sort(&mut bridges);
         bridges.shrink_to_fit();
-        Ok(Whole {
+        let samples = match self.even {
+            Some(_) => packed.gyro.len(),
+            None => self.next,
+        };
+        Whole {
             clock,
             facts,
             packed,
-            samples: self.next,
+            samples,
             faults,
             bridges,
             rows: self.rows + duplicates,
             missing: self.next - self.rows,
-        })
+            error,
+        }
     }
 }

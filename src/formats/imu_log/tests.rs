@@ -41,8 +41,8 @@ fn log(file: &std::path::Path) {
     fs::write(file, text).unwrap();
 }
 
-fn read(file: &std::path::Path, sizes: Sizes) -> ImuSamples {
-    let log = ImuLog {
+fn of_file(file: &std::path::Path) -> ImuLog<'static> {
+    ImuLog {
         source: Source::of_file(file),
         clock: Clock {
             column: Some("t"),
@@ -63,8 +63,11 @@ fn read(file: &std::path::Path, sizes: Sizes) -> ImuSamples {
         continuous: true,
         nominal: PerSensor::from_fn(|_| Nominal(Vector3::new(1.0, 2.0, 1.0))),
         full_scale: PerSensor::default(),
-    };
-    log.read_by(sizes, &mut Vec::new()).unwrap()
+    }
+}
+
+fn read(file: &std::path::Path, sizes: Sizes) -> ImuSamples {
+    of_file(file).read_by(sizes, &mut Vec::new()).unwrap()
 }
 
 #[test]
@@ -125,4 +128,111 @@ fn a_log_read_in_parts_is_the_one_read_at_once() {
     let facts = |imu: &ImuSamples| imu.log.clone().unwrap();
     let (packed, whole) = (facts(&packed), facts(&whole));
     assert_eq!((packed.rows, &packed.columns), (whole.rows, &whole.columns));
+}
+
+/// An angle and a velocity in time, on six axes.
+fn course(time: f64, column: usize) -> f64 {
+    let rate = [0.3, 0.2, 0.5, 0.4, 0.7, 0.1][column];
+    9.8 * time + (rate * time).sin() / rate
+}
+
+/// What axes read between these times, the edges of samples.
+fn rates_between(edges: &[f64], file: &std::path::Path) {
+    let mut text = "t,a,b,c,d,e,f\n".to_owned();
+    for edge in edges.windows(2) {
+        write!(text, "{:.9}", edge[1]).unwrap();
+        for column in 0..6 {
+            let integral = course(edge[1], column) - course(edge[0], column);
+            write!(text, ",{}", integral / (edge[1] - edge[0])).unwrap();
+        }
+        text.push('\n');
+    }
+    fs::write(file, text).unwrap();
+}
+
+#[test]
+fn samples_of_a_clock_that_wanders_are_those_of_an_even_one() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("imu.csv");
+    // The period changes by ± 0.3 %, and is a millionth longer on average.
+    let edge = |k: usize| {
+        let even = 1e-2 * (1.0 + 1e-6) * k as f64;
+        5.0 + even + 0.03 * (even / 10.0).sin()
+    };
+    let edges: Vec<f64> = (0..=40_000).map(edge).collect();
+    rates_between(&edges, &file);
+    let rates = |sizes| {
+        let mut log = of_file(&file);
+        log.output = Output::Rate;
+        let mut notes = Vec::new();
+        let imu = log.read_by(sizes, &mut notes).unwrap();
+        assert!(notes[0].contains("wander by up to 3"), "{notes:?}");
+        imu
+    };
+    let parts = Sizes {
+        long: 15_000,
+        part: 4_000,
+    };
+    for imu in [rates(Sizes::default()), rates(parts)] {
+        assert_eq!((imu.faults.len(), imu.stretches.len()), (0, 1));
+        let lasts = edges[40_000] - edges[0] - imu.len() as f64 * imu.period;
+        assert!((0.0..2.0).contains(&(lasts / imu.period)), "{lasts}");
+        let mut largest = 0.0f64;
+        let mut time = imu.stretches[0].start;
+        for sample in imu.of(Sensor::Accel).iter() {
+            let integral = course(time + imu.period, 3) - course(time, 3);
+            // Right is the file's front, by way of front, right, down.
+            largest = largest.max((sample.y - integral / 2.0).abs());
+            time += imu.period;
+        }
+        // Twice the jitter of 64 straight stamps of this course: 0.03 (0.64 / 10)² / 8 s against a sample.
+        assert!(largest < 1e-3 * 9.8 * imu.period, "{largest}");
+    }
+}
+
+#[test]
+fn rows_that_come_late_or_in_bursts_are_counted() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("imu.csv");
+    let scatter = |k: usize| (k as f64 * 0.618_033_988_749_895).fract();
+    let bursts = |k: usize| 1e-2 * (k - k % 10 + 10) as f64;
+    let late = |k: usize| {
+        let busy = if k % 53 == 7 { 0.07 * scatter(k) } else { 0.0 };
+        1e-2 * k as f64 + 2e-3 * scatter(3 * k) + busy
+    };
+    let missing = |k: usize| k % 211 == 20 || (3000..3040).contains(&k);
+    let all: Vec<usize> = (0..20_000).collect();
+    let most: Vec<usize> = (0..20_000).filter(|&k| !missing(k)).collect();
+    for (kept, stamp) in [
+        (&all, &bursts as &dyn Fn(usize) -> f64),
+        (&all, &late),
+        (&most, &late),
+    ] {
+        let mut text = "t,a,b,c,d,e,f\n".to_owned();
+        let mut latest = 0.0f64;
+        for &k in kept {
+            latest = latest.max(stamp(k));
+            let of = |column| course(1e-2 * k as f64, column);
+            let [a, b, c, d, e, f] = [0, 1, 2, 3, 4, 5].map(of);
+            writeln!(text, "{latest:.6},{a},{b},{c},{d},{e},{f}").unwrap();
+        }
+        fs::write(&file, text).unwrap();
+        let mut log = of_file(&file);
+        log.clock.period = None;
+        let imu = log.read(&mut Vec::new()).unwrap();
+        assert_eq!(imu.len(), 20_000);
+        assert!((imu.period / 1e-2 - 1.0).abs() < 1e-5, "{}", imu.period);
+        let lost = imu
+            .faults
+            .iter()
+            .filter(|fault| fault.kind == FaultKind::Missing);
+        let lost: Vec<usize> = lost.flat_map(|fault| fault.samples.clone()).collect();
+        let wrong = |k: &usize| lost.contains(k) == kept.binary_search(k).is_ok();
+        // A row late by less than a sample just before one that is missing may as well be behind it.
+        let open = |k: &&usize| missing(**k) && (1..9).any(|before| (**k - before) % 53 == 7);
+        let open = all.iter().filter(open).count();
+        let wrong = all.iter().filter(|k| wrong(k)).count();
+        assert_eq!(lost.len(), all.len() - kept.len());
+        assert!(wrong <= 2 * open, "{wrong} of {}", lost.len());
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{BY_CHANCE, Counter, EXACT, Uniform, gap, not_uniform};
+use super::{BY_CHANCE, Counter, EXACT, Knots, Uniform, gap, price, punctual};
 use crate::formats::error::FileError;
 
 /// Rows of which the earliest and the latest stamp are kept.
@@ -19,6 +19,7 @@ pub(in crate::formats) struct Following {
     about: f64,
     last: f64,
     sums: Sums,
+    knots: Knots,
     ends: Vec<[Stamp; 2]>,
 }
 
@@ -27,7 +28,6 @@ pub(in crate::formats) struct Following {
 struct Stamp {
     off: f64,
     number: usize,
-    line: u64,
 }
 
 /// Sums over stamps, of which n is the number of the sample and x how far it is off.
@@ -48,44 +48,59 @@ impl Following {
         stamps: &[(f64, u64)],
         given: Option<f64>,
     ) -> Result<(Self, Vec<usize>), FileError> {
+        let (clock, counting) = Uniform::counted(file, stamps, given)?;
+        let number = clock.numbers.last().copied().unwrap_or(0);
+        let due = clock.first + clock.time(number as f64);
         let Uniform {
-            first,
             period,
             numbers,
             off_given,
             ..
-        } = Uniform::new(file, stamps, given)?;
-        let number = numbers.last().copied().unwrap_or(0);
+        } = clock;
+        let placed = punctual(stamps, period);
         let mut following = Self {
             file: file.to_owned(),
             given,
             counter: Counter {
+                counting,
                 number,
                 period,
-                due: first + number as f64 * period,
+                due,
                 given: given.is_some() && off_given.is_none(),
+                price: price(&placed, period),
             },
             origin: stamps[0].0,
             about: period,
             last: stamps[0].0,
             sums: Sums::default(),
+            knots: Knots::default(),
             ends: Vec::new(),
         };
-        for (&stamp, &number) in stamps.iter().zip(&numbers) {
-            following.add(stamp, number);
+        for ((&(time, _), placed), &number) in stamps.iter().zip(placed).zip(&numbers) {
+            following.add(time, placed, number);
         }
         Ok((following, numbers))
     }
 
-    /// The number of the next row's sample.
-    pub fn number(&mut self, stamp: (f64, u64)) -> Result<usize, FileError> {
-        let before = self.last;
-        if self.counter.next(stamp.0) > 2.0 * self.sums.count as f64 {
-            return Err(gap(&self.file, before, stamp));
-        }
-        let number = self.counter.number;
-        self.add(stamp, number);
-        Ok(number)
+    /// The numbers of the samples of the next so many rows, of which as many more should be given as tell whether a
+    /// row is late.
+    pub fn numbers(
+        &mut self,
+        stamps: &[(f64, u64)],
+        count: usize,
+    ) -> Result<Vec<usize>, FileError> {
+        let placed = punctual(stamps, self.about);
+        let rows = stamps.iter().enumerate().take(count);
+        rows.map(|(row, &stamp)| {
+            let before = self.last;
+            if self.counter.next(&placed[row..]) > 2.0 * self.sums.count as f64 {
+                return Err(gap(&self.file, before, stamp));
+            }
+            let number = self.counter.number;
+            self.add(stamp.0, placed[row], number);
+            Ok(number)
+        })
+        .collect()
     }
 
     /// About how long a sample is, s.
@@ -93,10 +108,16 @@ impl Following {
         self.about
     }
 
-    fn add(&mut self, (time, line): (f64, u64), number: usize) {
+    fn add(&mut self, time: f64, placed: f64, number: usize) {
         self.last = time;
         let n = number as f64;
-        let off = time - self.origin - n * self.about;
+        let due = self.origin + n * self.about;
+        let stamp = Stamp {
+            off: time - due,
+            number,
+        };
+        let off = placed - due;
+        self.knots.push(number, off);
         let Sums {
             count,
             n: sum_n,
@@ -105,15 +126,14 @@ impl Following {
             xn,
             xx,
         } = &mut self.sums;
-        let stamp = Stamp { off, number, line };
         if count.is_multiple_of(BUCKET) {
             self.ends.push([stamp; 2]);
         }
         if let Some([earliest, latest]) = self.ends.last_mut() {
-            if off < earliest.off {
+            if stamp.off < earliest.off {
                 *earliest = stamp;
             }
-            if off > latest.off {
+            if stamp.off > latest.off {
                 *latest = stamp;
             }
         }
@@ -126,24 +146,25 @@ impl Following {
     }
 
     /// The clock that all stamps shared, as [`Uniform::new`] finds it.
-    pub fn finish(self) -> Result<Uniform, FileError> {
-        let free = self.fit(self.about, false)?;
+    pub fn finish(mut self) -> Uniform {
+        self.knots = self.knots.finish();
+        let free = self.fit(self.about, false);
         let Some(given) = self.given else {
-            return Ok(free);
+            return free;
         };
         let drift = (free.period - given).abs() * self.counter.number as f64;
         let sigma = free.jitter_rms * (12.0 / self.sums.count as f64).sqrt();
         if drift > free.jitter_max.max(BY_CHANCE * sigma) {
-            return Ok(Uniform {
+            return Uniform {
                 off_given: Some(free.period / given - 1.0),
                 ..free
-            });
+            };
         }
         self.fit(given, true)
     }
 
     /// The line through stamps, or the one with this period.
-    fn fit(&self, period: f64, given: bool) -> Result<Uniform, FileError> {
+    fn fit(&self, period: f64, given: bool) -> Uniform {
         let Sums {
             count,
             n,
@@ -164,30 +185,31 @@ impl Following {
             first = self.origin;
         }
         let period = self.about + slope;
-        // Off a line through their mean, and that off the clock.
-        let covariance = xn - x * mean;
-        let about_line = xx - x * level - 2.0 * slope * covariance + slope * slope * spread;
-        let line_off = self.origin + level - slope * mean - first;
-        let mut largest = 0.0f64;
-        for stamp in self.ends.iter().flatten() {
-            let n = stamp.number as f64;
-            let time = self.origin + n * self.about + stamp.off;
-            let due = first + n * period;
-            let off = (time - due).abs();
-            if off > 0.5 * period {
-                let stamp = (time, stamp.line);
-                return Err(not_uniform(&self.file, stamp, n as usize, (due, period)));
+        let wander = self.knots.wander(first - self.origin, slope, period);
+        let (jitter_rms, jitter_max) = match wander {
+            Some(_) => self.knots.jitter(),
+            None => {
+                // Off a line through their mean, and that off the clock.
+                let covariance = xn - x * mean;
+                let about_line = xx - x * level - 2.0 * slope * covariance + slope * slope * spread;
+                let line_off = self.origin + level - slope * mean - first;
+                let off = |stamp: &Stamp| {
+                    (self.origin - first + stamp.number as f64 * -slope + stamp.off).abs()
+                };
+                let largest = self.ends.iter().flatten().map(off).fold(0.0, f64::max);
+                let rms = (about_line.max(0.0) / count + line_off * line_off).sqrt();
+                (rms, largest)
             }
-            largest = largest.max(off);
-        }
-        Ok(Uniform {
+        };
+        Uniform {
             first,
             period,
             numbers: Vec::new(),
-            jitter_rms: (about_line.max(0.0) / count + line_off * line_off).sqrt(),
-            jitter_max: largest,
+            jitter_rms,
+            jitter_max,
             off_given: None,
-        })
+            wander,
+        }
     }
 }
 
@@ -211,10 +233,9 @@ mod tests {
             let at_once = Uniform::new(file, &stamps, given).unwrap();
             let (mut following, mut numbers) =
                 Following::new(file, &stamps[..20_000], given).unwrap();
-            for &stamp in &stamps[20_000..] {
-                numbers.push(following.number(stamp).unwrap());
-            }
-            let followed = following.finish().unwrap();
+            let rest = &stamps[20_000..];
+            numbers.extend(following.numbers(rest, rest.len()).unwrap());
+            let followed = following.finish();
             assert_eq!(numbers, at_once.numbers);
             assert_eq!(followed.off_given.is_some(), at_once.off_given.is_some());
             assert!((followed.first - at_once.first).abs() < 1e-9);
@@ -225,20 +246,29 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_changes_its_rate_later_is_refused_where_it_is_off() {
+    fn a_clock_that_changes_its_rate_later_wanders() {
         let mut stamps = stamps(60_000, 0.01);
         for (time, line) in &mut stamps {
             *time += 3e-6 * line.saturating_sub(40_000) as f64;
         }
         let file = Path::new("imu.csv");
-        let (mut following, _) = Following::new(file, &stamps[..20_000], None).unwrap();
-        for &stamp in &stamps[20_000..] {
-            following.number(stamp).unwrap();
+        let at_once = Uniform::new(file, &stamps, None).unwrap();
+        let (mut following, mut numbers) = Following::new(file, &stamps[..20_000], None).unwrap();
+        let rest = &stamps[20_000..];
+        numbers.extend(following.numbers(rest, rest.len()).unwrap());
+        let followed = following.finish();
+        assert_eq!(numbers, at_once.numbers);
+        for clock in [&followed, &at_once] {
+            for number in [1e3, 3e4, 39_000.0, 41_000.0, 5e4, 59_000.0] {
+                let time = clock.first + clock.time(number);
+                let true_time = 3.0 + 0.01 * number + 3e-6 * (number - 39_998.0).max(0.0);
+                assert!(
+                    (time - true_time).abs() < 1e-3,
+                    "{number} {}",
+                    time - true_time
+                );
+                assert!((clock.number(clock.time(number)) - number).abs() < 1e-6);
+            }
         }
-        let error = following.finish().unwrap_err().to_string();
-        assert!(
-            error.contains("line") && error.contains("at sample"),
-            "{error}"
-        );
     }
 }

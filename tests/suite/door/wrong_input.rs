@@ -320,7 +320,6 @@ fn each_wrong_row_or_column_has_its_message() {
             "\n0.50,1,1,",
             "line 51 & 8 fields & 7",
         ),
-        ("imu.csv", "\n0.50,1,", "\n0.49,2,", "line 51 & duplicate"),
         (
             "imu.csv",
             "\n0.50,",

@@ -3,31 +3,31 @@
 /// The product of the distances from the middle of two edges to the four of the cubic.
 const MIDWAY: f64 = 0.5625;
 
-/// Edges and periods nearer than this, in samples, are the same.
+/// Edges nearer than this, in samples, are the same.
 const SAME: f64 = 1e-6;
 
 /// Samples without a gap, whose integrals are counted in values times samples.
+#[derive(Default)]
 pub(super) struct Course {
-    /// From the stream's first stamp, s.
+    /// Where they begin, in samples.
     pub begin: f64,
-    pub period: f64,
     pub sums: [Vec<f64>; 3],
 }
 
 impl Course {
-    fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.sums[0].len()
     }
 
     pub fn end(&self) -> f64 {
-        self.begin + self.len() as f64 * self.period
+        self.begin + self.len() as f64
     }
 
-    /// The integrals between two times, and how much of the error midway between edges they have, squared; none if
-    /// the times are not within.
+    /// The integrals between two places, and how much of the error midway between edges they have, squared; none if
+    /// the places are not within.
     pub fn between(&self, begin: f64, end: f64) -> Option<([f64; 3], f64)> {
-        let place = |time: f64| {
-            let place = (time - self.begin) / self.period;
+        let place = |place: f64| {
+            let place = place - self.begin;
             // Times are sums of many periods, which rounding leaves beside their edges.
             match (place - place.round()).abs() < SAME {
                 true => place.round(),
