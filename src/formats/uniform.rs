@@ -270,38 +270,29 @@ impl Counter {
             Some(first) if first >= 0.5 => late.collect(),
             _ => return 0.0,
         };
-        let distance = |missing: f64| -> f64 {
-            let each = late.iter().map(|late| (late - missing).abs().min(1.0));
-            each.sum()
-        };
-        let none = distance(0.0) - self.price;
-        let mut likeliest = (none, 0.0);
-        for late in late
-            .iter()
-            .map(|late| late.round())
-            .filter(|&late| late > 0.0)
-        {
-            let left = distance(late);
-            // Of two alike the fewer, whatever rounding says.
-            let fewer = if late < likeliest.1 { ALIKE } else { -ALIKE };
-            if left < likeliest.0 + fewer {
-                likeliest = (left, late);
+        let distance = |late: f64, missing: f64| (late - missing).abs().min(1.0);
+        let mut some: Vec<f64> = late.iter().map(|late| late.round()).collect();
+        some.retain(|&missing| missing > 0.0);
+        some.sort_by(f64::total_cmp);
+        some.dedup();
+        some.into_iter().fold(0.0, |likeliest, missing| {
+            let price = if likeliest == 0.0 { self.price } else { 0.0 };
+            let gains = late.iter().scan(0.0, |gain, &late| {
+                *gain += distance(late, likeliest) - distance(late, missing);
+                Some(*gain)
+            });
+            let gains: Vec<f64> = gains.collect();
+            // What only rows further on ask for is missing before those.
+            let from_here_on = gains.iter().all(|&gain| gain > -ALIKE);
+            match gains.last() {
+                Some(&gain) if from_here_on && gain > price + ALIKE => missing,
+                _ => likeliest,
             }
-        }
-        // Unless they are missing before a later one.
-        let (_, missing) = likeliest;
-        let from_here_on = late.iter().scan(0.0, |gain, &late| {
-            *gain += late.abs().min(1.0) - (late - missing).abs().min(1.0);
-            Some(*gain)
-        });
-        match from_here_on.into_iter().all(|gain| gain > 0.0) {
-            true => missing,
-            false => 0.0,
-        }
+        })
     }
 }
 
-/// Distances of stamps nearer than this are the same, in samples.
+/// Distances of stamps that differ by less are the same, whatever rounding says, in samples.
 const ALIKE: f64 = 1e-6;
 /// Rows that tell whether some are missing before them.
 const WITNESSES: usize = 32;
