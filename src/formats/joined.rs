@@ -132,6 +132,8 @@ impl Joined {
                 .filter(|remark| !remarks.contains(remark))
                 .collect::<Vec<_>>(),
         );
+        let uneven = accel.clock.uneven();
+        remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
         remarks.push(format!(
             "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
              gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
@@ -225,7 +227,11 @@ impl Track {
             }
             match stamps.look(&rows)? {
                 Stamp::Same if row == before => continue,
-                Stamp::Same => return Err(Stamps::same(&rows)),
+                Stamp::Same if stamps.is_count() => return Err(Stamps::same(&rows)),
+                Stamp::Same => {
+                    stamps.again(&rows);
+                    before = row;
+                }
                 Stamp::Later => before = row,
             }
             for (column, value) in columns.iter_mut().zip(row) {

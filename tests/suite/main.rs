@@ -9,6 +9,7 @@ mod campaign;
 mod certificate;
 mod check;
 mod cli;
+mod clocks;
 mod closed_form;
 mod compare;
 mod door;
