@@ -132,6 +132,22 @@ pub(super) struct Heading {
     pub units: Option<Vec<String>>,
 }
 
+/// The names of both rows together where the first, of groups, names several columns alike and both together do not.
+fn names_of_groups(groups: &[String], names: &[String]) -> Option<Vec<String>> {
+    let is_one = |names: &[String]| {
+        let mut sorted: Vec<&str> = names.iter().map(String::as_str).collect();
+        sorted.retain(|name| !name.is_empty());
+        sorted.sort_unstable();
+        sorted.windows(2).all(|pair| pair[0] != pair[1])
+    };
+    if groups.len() != names.len() || is_one(groups) {
+        return None;
+    }
+    let pairs = groups.iter().zip(names);
+    let both = pairs.map(|(group, name)| format!("{group} {name}").trim().to_owned());
+    Some(both.collect()).filter(|both: &Vec<String>| is_one(both))
+}
+
 /// Why lines cannot be read on.
 #[derive(Debug)]
 pub(super) enum Stop {
@@ -250,19 +266,34 @@ impl Lines {
             }));
         }
         self.pending = self.take()?;
-        let below = delimiter.fields(&String::from_utf8_lossy(&self.line));
-        // What is wrong with it is said where it is read.
-        let below = below.unwrap_or_default();
-        let is_units = below.len() > 1 && !below.iter().any(|field| is_number(field));
-        if is_units {
+        let mut below = self.words(delimiter);
+        // Names of groups, and what each of a group is.
+        if let Some(whole) = below
+            .as_ref()
+            .and_then(|below| names_of_groups(&names, below))
+        {
+            names = whole;
+            self.pending = self.take()?;
+            below = self.words(delimiter);
+        }
+        if below.is_some() {
             self.pending = self.take()?;
         }
         Ok(Some(Heading {
             delimiter,
             names,
             line,
-            units: is_units.then_some(below),
+            units: below,
         }))
+    }
+
+    /// The fields of the current line if they are words, not numbers.
+    fn words(&self, delimiter: Delimiter) -> Option<Vec<String>> {
+        // What is wrong with it is said where it is read.
+        let fields = delimiter.fields(&String::from_utf8_lossy(&self.line));
+        fields
+            .ok()
+            .filter(|fields| fields.len() > 1 && !fields.iter().any(|field| is_number(field)))
     }
 
     /// Whether the next row has numbers and texts in the same places, as rows have and names have not.

@@ -150,3 +150,29 @@ fn a_file_that_ends_within_a_row_is_told_from_one_that_is_whole() {
         assert!(note.map_or(said.is_none(), fits), "{content}: {said:?}");
     }
 }
+
+#[test]
+fn columns_that_share_a_name_have_that_of_the_row_below_too() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.csv");
+    let grouped = "sensor,left,left,right,right\naxis,gx,ax,gx,ax\n";
+    for (head, names, units) in [
+        (
+            format!("{grouped}s,dps,g,dps,g\n"),
+            "sensor axis|left gx|left ax|right gx|right ax",
+            true,
+        ),
+        (
+            grouped.to_owned(),
+            "sensor axis|left gx|left ax|right gx|right ax",
+            false,
+        ),
+        ("t,gx,,,gy\ns,dps,,,dps\n".to_owned(), "t|gx|||gy", true),
+    ] {
+        fs::write(&path, format!("{head}0,1,2,3,4\n1,1,2,3,4\n")).unwrap();
+        let mut csv = CsvFile::open(&path).unwrap();
+        assert_eq!(csv.header().join("|"), names);
+        assert_eq!(csv.units().is_some(), units);
+        assert!(csv.advance().unwrap() && csv.number(0).unwrap() == 0.0);
+    }
+}

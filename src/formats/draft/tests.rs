@@ -374,3 +374,26 @@ fn gyros_and_accelerometers_in_rows_of_their_own_are_two_streams_of_one_file() {
         ],
     );
 }
+
+#[test]
+fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
+    let triad = |of: &str| ["X", "Y", "Z"].map(|axis| format!("%float({of}{axis})"));
+    let names = ["RawCompass", "RawGyro", "RawAccel"].map(triad).concat();
+    let text = draft(&format!("Packet number,{}\n", names.join(",")), |k, v| {
+        let packet = 2 * k + usize::from(k % 3 == 1);
+        format!(
+            "{packet},-0.1,0.5,{},{}",
+            0.2 + 1e-3 * v[0],
+            joined(&v, ",")
+        )
+    });
+    has(
+        &text,
+        &[
+            "# sample_period_s =  # TODO",
+            "# TODO: a counter that other packets share is no time",
+            "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
+             accel = [\"%float(RawAccelX)\", ",
+        ],
+    );
+}
