@@ -25,6 +25,9 @@ use long::{LongLog, Sizes, Whole};
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
 
+/// So many rows at one time, a minute and more of any, are no burst: the time stands still.
+const MOST_AT_ONCE: usize = 1 << 16;
+
 /// Which moment of a sample its time stamp names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TimeStamp {
@@ -473,6 +476,7 @@ impl ImuLog<'_> {
         };
         let (mut blank, mut lacking, mut duplicates) = (0, 0, 0);
         let mut at_once = (0, 0);
+        let mut standing = 0;
         let mut held = Held::default();
         let mut long: Option<LongLog> = None;
         let mut before = [f64::NAN; 6];
@@ -500,7 +504,20 @@ impl ImuLog<'_> {
             for (value, &place) in row.iter_mut().zip(&places) {
                 *value = self.value(&csv, place)?;
             }
-            match stamps.look(&csv)? {
+            let stamp = stamps.look(&csv)?;
+            standing = if stamp == Stamp::Same {
+                standing + 1
+            } else {
+                0
+            };
+            if standing > MOST_AT_ONCE {
+                return Err(csv.error_here(
+                    format_args!("the same time in more than {MOST_AT_ONCE} rows"),
+                    "times that increase",
+                    "Name another time column, or leave it out and give sample_period_s.",
+                ));
+            }
+            match stamp {
                 Stamp::Same if row == before => {
                     held.duplicates.push((held.len(), csv.line()));
                     duplicates += 1;

@@ -64,6 +64,8 @@ pub struct Draft {
     rest: Option<Vector3<f64>>,
     /// Sections laid end to end, as far as gravity shows.
     cuts: usize,
+    /// The rows that were looked at where the log has more.
+    only: Option<usize>,
 }
 
 impl Draft {
@@ -135,6 +137,8 @@ impl Draft {
     }
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>) -> Self {
+        let rows = sheet.columns.first().map_or(0, Vec::len);
+        let only = sheet.goes_on.then_some(rows);
         let instance = match streams {
             Some(_) => None,
             None => columns::instance(&sheet),
@@ -209,6 +213,7 @@ impl Draft {
             quantities,
             offset,
             noise,
+            only,
         }
     }
 }

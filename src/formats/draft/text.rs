@@ -12,15 +12,20 @@ impl Draft {
     /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
     /// can be read; the others are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
-        let mut text = "# A draft made from the log alone. Complete each TODO and check the rest; `turncal check` \
-                        then says what the run holds.\n\
-                        format = \"turncal-run/1\"\n\n\
+        let of_it = match self.only {
+            Some(rows) => format!("the first {rows} rows of the log"),
+            None => "the log alone".to_owned(),
+        };
+        let mut text = format!(
+            "# A draft made from {of_it}. Complete each TODO and check the rest; `turncal check` then says what the \
+             run holds.\n"
+        );
+        text += "format = \"turncal-run/1\"\n\n\
                         # the place of the instrument\n\
                         [site]\n\
                         # latitude_deg =  # TODO: north positive; to 0.1° it is good enough\n\
                         # height_m =      # TODO: above the ellipsoid\n\
-                        # gravity_m_s2 =  # if it was measured; else normal gravity is taken\n"
-            .to_owned();
+                        # gravity_m_s2 =  # if it was measured; else normal gravity is taken\n";
         // Writing to a string cannot fail.
         let _ = write!(text, "\n[imu]\nfile = {}\n", quoted(file));
         if let Some(streams) = &self.streams {

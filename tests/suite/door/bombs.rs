@@ -36,8 +36,12 @@ fn bomb(path: &Path, begin: &str, same: &[u8]) {
 }
 
 fn in_little_room(here: &Path, arguments: &str) -> Output {
+    within(ROOM, here, arguments)
+}
+
+fn within(room: u32, here: &Path, arguments: &str) -> Output {
     let program = env!("CARGO_BIN_EXE_turncal");
-    let command = format!("ulimit -v {ROOM}; RAYON_NUM_THREADS=1 exec {program} {arguments}");
+    let command = format!("ulimit -v {room}; RAYON_NUM_THREADS=1 exec {program} {arguments}");
     let mut shell = Command::new("sh");
     shell.args(["-c", &command]).current_dir(here);
     shell.output().unwrap()
@@ -80,6 +84,26 @@ fn a_gigabyte_in_a_megabyte_is_refused_in_little_memory() {
             &["line 2:", "1024 KiB"],
         );
     }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_gigabyte_of_rows_at_one_time_is_refused_and_drafted_from_its_first() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = &run_with_log(directory.path(), "imu.csv.gz");
+    let names = "t,gx,gy,gz,ax,ay,az\n";
+    bomb(
+        &here.join("imu.csv.gz"),
+        names,
+        &b"0,0,0,0,0,0,0\n".repeat(100_000),
+    );
+    refused(here, "check run.toml", &["line 65539:", "same time"]);
+    // Columns that grow ask for twice what they hold.
+    let drafted = within(2 * ROOM, here, "init imu.csv.gz -o draft.toml");
+    let message = String::from_utf8_lossy(&drafted.stderr).into_owned();
+    assert!(drafted.status.success(), "{message}");
+    let draft = fs::read_to_string(here.join("draft.toml")).unwrap();
+    assert!(draft.contains("the first 898779 rows"), "{draft}");
 }
 
 #[test]
