@@ -167,12 +167,9 @@ impl Line {
         let mut errors: Vec<f64> = (0..trials).map(error).collect();
         // Most errors on a coarse grid are none; a tenth may be of other spikes.
         let (_, error, _) = errors.select_nth_unstable_by(trials * 9 / 10, f64::total_cmp);
-        let error = *error / TENTH;
-        Some(Self {
-            next,
-            slope,
-            error: error.max(grid),
-        })
+        // On a grid it is uncertain by a step of it.
+        let error = (*error / TENTH).hypot(grid);
+        Some(Self { next, slope, error })
     }
 }
 
