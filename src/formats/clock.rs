@@ -3,6 +3,7 @@
 use super::error::FileError;
 use super::fields::Fields;
 use super::rows::LogRows;
+use super::uniform::REACH;
 use crate::recording::nanoseconds;
 
 /// What the numbers of a time column are.
@@ -35,6 +36,8 @@ pub(super) struct Clock<'a> {
     pub unit: TimeUnit,
     /// s
     pub period: Option<f64>,
+    /// Whether nothing but these rows is told by their times, so that it does no harm if the clock is set.
+    pub alone: bool,
 }
 
 impl<'a> Clock<'a> {
@@ -63,6 +66,7 @@ impl<'a> Clock<'a> {
             nanoseconds,
             unit,
             period: period.map(|field| field.positive()).transpose()?,
+            alone: false,
         })
     }
 
@@ -73,9 +77,13 @@ impl<'a> Clock<'a> {
             nanoseconds: self.nanoseconds.map(|name| csv.column(name)).transpose()?,
             unit: self.unit,
             period: self.period.unwrap_or(1.0),
+            alone: self.alone,
             number: None,
-            unwrapped: 0.0,
+            first: None,
+            longest: 0.0,
+            ahead: 0.0,
             wraps_at: None,
+            set_back: Vec::new(),
             of_rows: Vec::new(),
             let_go: 0,
         })
@@ -96,12 +104,18 @@ pub(super) struct Stamps {
     unit: TimeUnit,
     /// s a count
     period: f64,
+    alone: bool,
     /// The number in the row before.
     number: Option<f64>,
-    /// What wraps of a counter add up to.
-    unwrapped: f64,
+    first: Option<f64>,
+    /// The longest step forward.
+    longest: f64,
+    /// By how much the time of a row is ahead of its number, which wrapped or was set back.
+    ahead: f64,
     /// The size of a counter that wrapped.
     wraps_at: Option<f64>,
+    /// Where the clock was set back, in a sentence each.
+    set_back: Vec<String>,
     /// Time in s and line of each row taken and not let go …
     pub of_rows: Vec<(f64, u64)>,
     /// … and how many were before them.
@@ -129,43 +143,58 @@ impl Stamps {
             return Ok(Stamp::Same);
         }
         if step < 0.0 {
-            let wrap = match self.unit {
-                TimeUnit::Count => wrap(step),
-                TimeUnit::PerSecond(_) => None,
-            };
-            let Some(wrap) = wrap else {
-                let of = |number: f64| match self.unit {
-                    TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
-                    TimeUnit::Count => format!("count {number}"),
-                };
-                return Err(csv.error_here(
-                    format_args!(
-                        "time going back from {} to {}",
-                        of(number - step),
-                        of(number)
-                    ),
-                    "times that increase",
-                    match self::wrap(step) {
-                        Some(size) => format!(
-                            "A counter of {size} that wraps? Add that to what follows, or say time_unit = \
-                             \"count\" if it counts samples. Else put the rows in order, or split the file \
-                             where the clock was set."
-                        ),
-                        None => "Put the rows in order, or split the file where the clock was set."
-                            .to_owned(),
-                    },
-                ));
-            };
-            self.unwrapped += wrap;
-            self.wraps_at = Some(wrap);
+            self.go_back(csv, number, step)?;
+        } else if step.is_finite() {
+            self.longest = self.longest.max(step);
         }
         self.number = Some(number);
+        self.first.get_or_insert(number);
         let time = match self.unit {
-            TimeUnit::PerSecond(many) => number / many,
-            TimeUnit::Count => (number + self.unwrapped) * self.period,
+            TimeUnit::PerSecond(many) => (number + self.ahead) / many,
+            TimeUnit::Count => (number + self.ahead) * self.period,
         };
         self.of_rows.push((time, csv.line()));
         Ok(Stamp::Later)
+    }
+
+    /// Goes on where numbers step back: a counter wrapped, or the clock was set.
+    fn go_back(&mut self, csv: &LogRows, number: f64, step: f64) -> Result<(), FileError> {
+        let (second, most) = match self.unit {
+            TimeUnit::Count => (self.period.recip(), None),
+            TimeUnit::PerSecond(many) => (many, Some(2.0 * self.longest)),
+        };
+        let wrap = match most {
+            None => wrap(step, COUNTERS, |size| 0.25 * size),
+            Some(most) => wrap(step, CLOCKS.map(|seconds| seconds * second), |_| most),
+        };
+        if let Some(size) = wrap {
+            self.ahead += size;
+            self.wraps_at = Some(size);
+            return Ok(());
+        }
+        let of = |number: f64| match self.unit {
+            TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
+            TimeUnit::Count => format!("count {number}"),
+        };
+        let (from, to) = (of(number - step), of(number));
+        let lasted = number - step + self.ahead - self.first.unwrap_or(0.0);
+        let usual = lasted / (self.let_go + self.of_rows.len()) as f64;
+        // Rows out of order are not that far from their place.
+        if !self.alone || -step <= REACH as f64 * usual {
+            return Err(csv.error_here(
+                format_args!("time going back from {from} to {to}"),
+                "times that increase",
+                "Put the rows in order, or split the file where the clock was set.",
+            ));
+        }
+        self.ahead += BREAK * second - step;
+        self.set_back.push(format!(
+            "Time goes back from {from} to {to} in line {}: the clock was set there, and nobody knows how long nothing \
+             was recorded. What follows begins anew; its times are taken {} s later.",
+            csv.line(),
+            nanoseconds(self.ahead / second)
+        ));
+        Ok(())
     }
 
     /// Takes the stamp of the row before for this one, too.
@@ -186,15 +215,24 @@ impl Stamps {
         self.let_go += rows;
     }
 
-    /// What a counter that wraps leaves open where so many samples lack their rows, in a sentence.
-    pub fn lost_count(&self, missing: usize) -> Option<String> {
-        let size = self.wraps_at.filter(|_| missing > 0)?;
-        Some(format!(
-            "Rows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing at \
-             each place, or several times as many, and all after it be as much too early. Give a time that does \
-             not wrap, or split the record there.",
-            nanoseconds(size * self.period)
-        ))
+    /// What was made of numbers that step back, and what that leaves open where so many samples lack their rows.
+    pub fn notes(&self, missing: usize) -> Vec<String> {
+        let mut notes = self.set_back.clone();
+        notes.extend(self.wraps_at.and_then(|size| match self.unit {
+            TimeUnit::PerSecond(many) => Some(format!(
+                "The time wraps every {} s and is taken to go on.",
+                nanoseconds(size / many)
+            )),
+            TimeUnit::Count => (missing > 0).then(|| {
+                format!(
+                    "Rows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing \
+                     at each place, or several times as many, and all after it be as much too early. Give a time that \
+                     does not wrap, or split the record there.",
+                    nanoseconds(size * self.period)
+                )
+            }),
+        }));
+        notes
     }
 
     /// The error of a row that has the stamp of the row before, but other values.
@@ -207,12 +245,25 @@ impl Stamps {
     }
 }
 
-/// The size of a counter that wrapped: the smallest that makes the step forward a small one.
-fn wrap(step: f64) -> Option<f64> {
-    let sizes = [8, 16, 24, 32].map(|bits| 2f64.powi(bits));
-    sizes
-        .into_iter()
-        .find(|size| (0.0..=0.25 * size).contains(&(size + step)) && step + size > 0.0)
+/// Sizes of counters of samples.
+const COUNTERS: [f64; 4] = [256.0, 65_536.0, 16_777_216.0, 4_294_967_296.0];
+/// After so many seconds clocks begin again: registers of milliseconds and microseconds, a day, a week of satellites.
+const CLOCKS: [f64; 7] = [
+    65.536,
+    16.777_216,
+    16_777.216,
+    4_294.967_296,
+    4_294_967.296,
+    86_400.0,
+    604_800.0,
+];
+/// How long nothing is taken to have been recorded where a clock was set back, s: more than is ever interpolated.
+const BREAK: f64 = 1.0;
+
+/// The first of these sizes of a counter that makes its step back one forward that is no longer than usual.
+fn wrap<const N: usize>(step: f64, sizes: [f64; N], longest: impl Fn(f64) -> f64) -> Option<f64> {
+    let forward = |size: &f64| step + size > 0.0 && step + size <= longest(*size);
+    sizes.into_iter().find(forward)
 }
 
 #[cfg(test)]
@@ -221,6 +272,7 @@ mod tests {
 
     #[test]
     fn a_counter_wraps_at_the_smallest_size_that_makes_a_small_step() {
+        let wrap = |step| wrap(step, COUNTERS, |size| 0.25 * size);
         assert_eq!(wrap(-255.0), Some(256.0));
         assert_eq!(wrap(-250.0), Some(256.0));
         assert_eq!(wrap(-65535.0), Some(65536.0));

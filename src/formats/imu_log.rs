@@ -212,7 +212,7 @@ impl ImuLog<'_> {
                 self.whole(layout, &stamps, held, clock)
             }
         };
-        notes.extend(stamps.lost_count(missing));
+        notes.extend(stamps.notes(missing));
         let error = self
             .axes
             .each(Vector3::from(integral_error))

@@ -97,6 +97,13 @@ impl<'a> InstrumentFields<'a> {
                 &format!("one instrument without `{column}`, as accel_from needs"),
             ));
         }
+        let clock = Clock {
+            alone: accel_from.is_none()
+                && ["turntable", "segments"]
+                    .iter()
+                    .all(|name| top.get(name).is_none()),
+            ..clock
+        };
         let follow = clock.period.is_some() && top.get("turntable").is_none();
         if clock.column.is_none() && !follow {
             return Err(columns.missing(

@@ -250,6 +250,7 @@ impl Track {
         }
         let mut remarks = rows.remarks().to_vec();
         remarks.extend(rows.cut_off("It is left out"));
+        remarks.extend(stamps.notes(0));
         let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)
             .map_err(|error| rows.placed(error))?;
         Ok(Self {
@@ -290,5 +291,6 @@ pub(super) fn clock(period: Option<f64>) -> Clock<'static> {
         nanoseconds: None,
         unit: TimeUnit::PerSecond(1.0),
         period,
+        alone: false,
     }
 }

@@ -257,6 +257,7 @@ impl<'a> TableLogFile<'a> {
             axes.extend(columns.axes(&csv)?);
         }
         notes.extend(csv.cut_off("It is left out"));
+        notes.extend(stamps.notes(0));
         attitude.shrink_to_fit();
         axes.shrink_to_fit();
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();

@@ -297,6 +297,7 @@ pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
                 nanoseconds: None,
                 unit: unit.map_or(TimeUnit::PerSecond(1.0), |&(_, unit)| unit),
                 period: None,
+                alone: false,
             },
             columns: triad.map(|column| &*found.stream.columns[column].name),
             further: &[],

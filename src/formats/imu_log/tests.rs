@@ -49,6 +49,7 @@ fn of_file(file: &std::path::Path) -> ImuLog<'static> {
             nanoseconds: None,
             unit: TimeUnit::PerSecond(1.0),
             period: Some(PERIOD),
+            alone: true,
         },
         accel_from: None,
         instance: None,
@@ -235,4 +236,57 @@ fn rows_that_come_late_or_in_bursts_are_counted() {
         assert_eq!(lost.len(), all.len() - kept.len());
         assert!(wrong <= 2 * open, "{wrong} of {}", lost.len());
     }
+}
+
+#[test]
+fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("imu.csv");
+    let microseconds = |k: usize| (4_250_000_000 + 10_000 * k as u64) % (1 << 32);
+    let of_day = |k: usize| (86_390_000 + 10 * k as u64) % 86_400_000;
+    let set_back = |k: usize| 10 * if k < 7000 { k as u64 } else { k as u64 - 6500 };
+    let read = |stamp: &dyn Fn(usize) -> u64, second, alone| {
+        let mut text = "t,a,b,c,d,e,f\n".to_owned();
+        for k in 0..10_000 {
+            let of = |column| course(1e-2 * (k + 1) as f64, column);
+            let [a, b, c, d, e, f] = [0, 1, 2, 3, 4, 5].map(of);
+            writeln!(text, "{},{a},{b},{c},{d},{e},{f}", stamp(k)).unwrap();
+        }
+        fs::write(&file, text).unwrap();
+        let mut log = of_file(&file);
+        log.clock.unit = TimeUnit::PerSecond(second);
+        log.clock.alone = alone;
+        let mut notes = Vec::new();
+        log.read(&mut notes).map(|imu| (imu, notes.join("\n")))
+    };
+    for (stamp, second, said) in [
+        (
+            &microseconds as &dyn Fn(usize) -> u64,
+            1e6,
+            "every 4294.967296 s",
+        ),
+        (&of_day, 1e3, "every 86400 s"),
+    ] {
+        for alone in [true, false] {
+            let (imu, notes) = read(stamp, second, alone).unwrap();
+            assert_eq!((imu.len(), imu.stretches.len()), (10_000, 1));
+            assert!(notes.contains(said), "{notes}");
+        }
+    }
+    let (imu, notes) = read(&set_back, 1e3, true).unwrap();
+    let samples: Vec<_> = imu.stretches.iter().map(|s| s.samples.clone()).collect();
+    assert_eq!(samples, [0..7000, 7099..10_099]);
+    assert!(
+        notes.contains("back from 69.99 s to 5 s in line 7002"),
+        "{notes}"
+    );
+    // Times of a table or of labels would be of nobody knows which part.
+    let refused = read(&set_back, 1e3, false).unwrap_err().to_string();
+    assert!(refused.contains("line 7002: found time going back from 69.99 s to 5 s"));
+    let swapped = |k: usize| 10 * (k as u64 ^ u64::from(k / 2 == 100));
+    let refused = read(&swapped, 1e3, true).unwrap_err().to_string();
+    assert!(
+        refused.contains("line 203: found time going back"),
+        "{refused}"
+    );
 }

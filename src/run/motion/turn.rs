@@ -125,7 +125,9 @@ pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
         true => between.collect(),
         false => labelled.collect(),
     };
-    let turns = all.into_iter().filter(|(_, samples)| !samples.is_empty());
+    // What was lost on the way may be any turn.
+    let known = |samples: &Range<usize>| !samples.is_empty() && !run.recording.imu.is_lost(samples);
+    let turns = all.into_iter().filter(|(_, samples)| known(samples));
     let turns = turns.map(|(from, samples)| {
         let zero = zero(run, rests, samples.start);
         Turn {
