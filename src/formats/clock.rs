@@ -83,7 +83,7 @@ impl<'a> Clock<'a> {
             longest: 0.0,
             ahead: 0.0,
             wraps_at: None,
-            set_back: Vec::new(),
+            begun_anew: Vec::new(),
             of_rows: Vec::new(),
             let_go: 0,
         })
@@ -110,12 +110,12 @@ pub(super) struct Stamps {
     first: Option<f64>,
     /// The longest step forward.
     longest: f64,
-    /// By how much the time of a row is ahead of its number, which wrapped or was set back.
+    /// By how much the time of a row is ahead of its number: counters wrap, clocks are set.
     ahead: f64,
     /// The size of a counter that wrapped.
     wraps_at: Option<f64>,
-    /// Where the clock was set back, in a sentence each.
-    set_back: Vec<String>,
+    /// Where the record begins anew, in some sentences each.
+    begun_anew: Vec<String>,
     /// Time in s and line of each row taken and not let go …
     pub of_rows: Vec<(f64, u64)>,
     /// … and how many were before them.
@@ -138,14 +138,17 @@ impl Stamps {
         if self.unit == TimeUnit::Count && number.fract() != 0.0 {
             return Err(csv.not(column, "a whole number of samples"));
         }
-        let step = number - self.number.unwrap_or(f64::NEG_INFINITY);
-        if step == 0.0 {
-            return Ok(Stamp::Same);
-        }
-        if step < 0.0 {
-            self.go_back(csv, number, step)?;
-        } else if step.is_finite() {
-            self.longest = self.longest.max(step);
+        if let Some(before) = self.number {
+            let step = number - before;
+            if step == 0.0 {
+                return Ok(Stamp::Same);
+            }
+            let is_back = step < 0.0 && !self.wraps(step);
+            if is_back || self.is_pause(step) {
+                self.begin_anew(csv, before, step)?;
+            } else {
+                self.longest = self.longest.max(step);
+            }
         }
         self.number = Some(number);
         self.first.get_or_insert(number);
@@ -157,42 +160,68 @@ impl Stamps {
         Ok(Stamp::Later)
     }
 
-    /// Goes on where numbers step back: a counter wrapped, or the clock was set.
-    fn go_back(&mut self, csv: &LogRows, number: f64, step: f64) -> Result<(), FileError> {
-        let (second, most) = match self.unit {
-            TimeUnit::Count => (self.period.recip(), None),
-            TimeUnit::PerSecond(many) => (many, Some(2.0 * self.longest)),
-        };
-        let wrap = match most {
-            None => wrap(step, COUNTERS, |size| 0.25 * size),
-            Some(most) => wrap(step, CLOCKS.map(|seconds| seconds * second), |_| most),
-        };
-        if let Some(size) = wrap {
-            self.ahead += size;
-            self.wraps_at = Some(size);
-            return Ok(());
+    /// What numbers go on by in a second.
+    fn a_second(&self) -> f64 {
+        match self.unit {
+            TimeUnit::PerSecond(many) => many,
+            TimeUnit::Count => self.period.recip(),
         }
+    }
+
+    /// How far numbers have gone on so far.
+    fn lasted(&self) -> f64 {
+        let ends = self.first.zip(self.number);
+        ends.map_or(0.0, |(first, last)| last + self.ahead - first)
+    }
+
+    /// Whether a counter of a known size wrapped at a step back, which is then made good.
+    fn wraps(&mut self, step: f64) -> bool {
+        let size = match self.unit {
+            TimeUnit::Count => wrap(step, COUNTERS, |size| 0.25 * size),
+            TimeUnit::PerSecond(many) => wrap(step, CLOCKS.map(|seconds| seconds * many), |_| {
+                2.0 * self.longest
+            }),
+        };
+        self.ahead += size.unwrap_or(0.0);
+        self.wraps_at = size.or(self.wraps_at);
+        size.is_some()
+    }
+
+    /// Whether nothing was recorded for longer than there is a record before it.
+    fn is_pause(&self, step: f64) -> bool {
+        let rows = self.let_go + self.of_rows.len();
+        self.alone && rows > REACH && step > self.lasted().max(BREAK * self.a_second())
+    }
+
+    /// Takes what follows for a part of its own, a little later.
+    fn begin_anew(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
         let of = |number: f64| match self.unit {
             TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
             TimeUnit::Count => format!("count {number}"),
         };
-        let (from, to) = (of(number - step), of(number));
-        let lasted = number - step + self.ahead - self.first.unwrap_or(0.0);
-        let usual = lasted / (self.let_go + self.of_rows.len()) as f64;
+        let (from, to) = (of(before), of(before + step));
+        let usual = self.lasted() / (self.let_go + self.of_rows.len()) as f64;
         // Rows out of order are not that far from their place.
-        if !self.alone || -step <= REACH as f64 * usual {
+        if step < 0.0 && (!self.alone || -step <= REACH as f64 * usual) {
             return Err(csv.error_here(
                 format_args!("time going back from {from} to {to}"),
                 "times that increase",
                 "Put the rows in order, or split the file where the clock was set.",
             ));
         }
+        let second = self.a_second();
         self.ahead += BREAK * second - step;
-        self.set_back.push(format!(
-            "Time goes back from {from} to {to} in line {}: the clock was set there, and nobody knows how long nothing \
-             was recorded. What follows begins anew; its times are taken {} s later.",
+        let what = match step < 0.0 {
+            true => {
+                "Time goes back: the clock was set, and nobody knows how long nothing was recorded"
+            }
+            false => "Nothing was recorded for longer than there is a record before it",
+        };
+        let by = nanoseconds(self.ahead.abs() / second);
+        self.begun_anew.push(format!(
+            "In line {} time goes from {from} to {to}. {what}. What follows begins anew; its times are taken {by} s {}.",
             csv.line(),
-            nanoseconds(self.ahead / second)
+            if self.ahead > 0.0 { "later" } else { "earlier" }
         ));
         Ok(())
     }
@@ -217,7 +246,7 @@ impl Stamps {
 
     /// What was made of numbers that step back, and what that leaves open where so many samples lack their rows.
     pub fn notes(&self, missing: usize) -> Vec<String> {
-        let mut notes = self.set_back.clone();
+        let mut notes = self.begun_anew.clone();
         notes.extend(self.wraps_at.and_then(|size| match self.unit {
             TimeUnit::PerSecond(many) => Some(format!(
                 "The time wraps every {} s and is taken to go on.",
@@ -257,7 +286,7 @@ const CLOCKS: [f64; 7] = [
     86_400.0,
     604_800.0,
 ];
-/// How long nothing is taken to have been recorded where a clock was set back, s: more than is ever interpolated.
+/// How long nothing is taken to have been recorded where nobody knows, or for long, s: more than is ever interpolated.
 const BREAK: f64 = 1.0;
 
 /// The first of these sizes of a counter that makes its step back one forward that is no longer than usual.

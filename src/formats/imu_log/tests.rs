@@ -273,14 +273,22 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
             assert!(notes.contains(said), "{notes}");
         }
     }
-    let (imu, notes) = read(&set_back, 1e3, true).unwrap();
-    let samples: Vec<_> = imu.stretches.iter().map(|s| s.samples.clone()).collect();
-    assert_eq!(samples, [0..7000, 7099..10_099]);
-    assert!(
-        notes.contains("back from 69.99 s to 5 s in line 7002"),
-        "{notes}"
-    );
+    let paused = |k: usize| 10 * k as u64 + if k < 3000 { 0 } else { 86_400_000 };
+    for (stamp, last, said) in [
+        (
+            &set_back as &dyn Fn(usize) -> u64,
+            7000,
+            "In line 7002 time goes from 69.99 s to 5 s.",
+        ),
+        (&paused, 3000, "times are taken 86399.01 s earlier."),
+    ] {
+        let (imu, notes) = read(stamp, 1e3, true).unwrap();
+        let samples: Vec<_> = imu.stretches.iter().map(|s| s.samples.clone()).collect();
+        assert_eq!(samples, [0..last, last + 99..10_099]);
+        assert!(notes.contains(said), "{notes}");
+    }
     // Times of a table or of labels would be of nobody knows which part.
+    assert!(read(&paused, 1e3, false).is_err());
     let refused = read(&set_back, 1e3, false).unwrap_err().to_string();
     assert!(refused.contains("line 7002: found time going back from 69.99 s to 5 s"));
     let swapped = |k: usize| 10 * (k as u64 ^ u64::from(k / 2 == 100));
