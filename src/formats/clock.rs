@@ -1,5 +1,7 @@
 //! The clock of a log: stamps in any unit, counters, or none.
 
+use std::path::Path;
+
 use super::error::FileError;
 use super::fields::Fields;
 use super::rows::LogRows;
@@ -84,17 +86,21 @@ impl<'a> Clock<'a> {
             ahead: 0.0,
             wraps_at: None,
             begun_anew: Vec::new(),
+            out_of_order: None,
+            behind: 0,
             of_rows: Vec::new(),
             let_go: 0,
         })
     }
 }
 
-/// A row's stamp against that of the row before.
+/// Where a row belongs by its stamp: behind so many of those that are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stamp {
-    Later,
-    Same,
+    /// No other has it, and it is taken.
+    New(usize),
+    /// The row before has it, too.
+    Again(usize),
 }
 
 /// The stamps of a file so far.
@@ -116,6 +122,10 @@ pub(super) struct Stamps {
     wraps_at: Option<f64>,
     /// Where the record begins anew, in some sentences each.
     begun_anew: Vec<String>,
+    /// Rows that were put before others, and the line of the first.
+    out_of_order: Option<(usize, u64)>,
+    /// Rows since the latest one that come behind it.
+    behind: usize,
     /// Time in s and line of each row taken and not let go …
     pub of_rows: Vec<(f64, u64)>,
     /// … and how many were before them.
@@ -123,13 +133,13 @@ pub(super) struct Stamps {
 }
 
 impl Stamps {
-    /// Looks at the stamp of the row, which must not be before that of the row before; a later one is
-    /// taken.
+    /// Looks at the stamp of the row, and takes it if it is new.
     pub fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
+        let end = self.of_rows.len();
         let Some(column) = self.column else {
-            let time = (self.let_go + self.of_rows.len()) as f64 * self.period;
+            let time = (self.let_go + end) as f64 * self.period;
             self.of_rows.push((time, csv.line()));
-            return Ok(Stamp::Later);
+            return Ok(Stamp::New(end));
         };
         let mut number = csv.number(column)?;
         if let Some(column) = self.nanoseconds {
@@ -141,23 +151,54 @@ impl Stamps {
         if let Some(before) = self.number {
             let step = number - before;
             if step == 0.0 {
-                return Ok(Stamp::Same);
+                return Ok(Stamp::Again(end));
             }
             let is_back = step < 0.0 && !self.wraps(step);
+            if is_back && let Some(place) = self.place(self.time(number)) {
+                self.behind += 1;
+                if self.behind > REACH {
+                    return Err(self.goes_back(csv, before, step));
+                }
+                return Ok(self.put(place, self.time(number), csv.line()));
+            }
             if is_back || self.is_pause(step) {
                 self.begin_anew(csv, before, step)?;
             } else {
                 self.longest = self.longest.max(step);
             }
         }
+        self.behind = 0;
         self.number = Some(number);
         self.first.get_or_insert(number);
-        let time = match self.unit {
+        self.of_rows.push((self.time(number), csv.line()));
+        Ok(Stamp::New(end))
+    }
+
+    /// s
+    fn time(&self, number: f64) -> f64 {
+        match self.unit {
             TimeUnit::PerSecond(many) => (number + self.ahead) / many,
             TimeUnit::Count => (number + self.ahead) * self.period,
-        };
-        self.of_rows.push((time, csv.line()));
-        Ok(Stamp::Later)
+        }
+    }
+
+    /// Behind which row one of this time belongs that comes late, if that is one of the last.
+    fn place(&self, time: f64) -> Option<usize> {
+        let last = self.of_rows.len().saturating_sub(REACH);
+        let place = last + self.of_rows[last..].partition_point(|(other, _)| *other <= time);
+        (place > last).then_some(place)
+    }
+
+    /// Puts a row that comes late in its place.
+    fn put(&mut self, place: usize, time: f64, line: u64) -> Stamp {
+        if self.of_rows[place - 1].0 == time {
+            return Stamp::Again(place);
+        }
+        let first = self.out_of_order.map_or(line, |(_, first)| first);
+        let count = self.out_of_order.map_or(0, |(count, _)| count);
+        self.out_of_order = Some((count + 1, first));
+        self.of_rows.insert(place, (time, line));
+        Stamp::New(place)
     }
 
     /// What numbers go on by in a second.
@@ -195,41 +236,47 @@ impl Stamps {
 
     /// Takes what follows for a part of its own, a little later.
     fn begin_anew(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
-        let of = |number: f64| match self.unit {
-            TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
-            TimeUnit::Count => format!("count {number}"),
-        };
-        let (from, to) = (of(before), of(before + step));
-        let usual = self.lasted() / (self.let_go + self.of_rows.len()) as f64;
-        // Rows out of order are not that far from their place.
-        if step < 0.0 && (!self.alone || -step <= REACH as f64 * usual) {
-            return Err(csv.error_here(
-                format_args!("time going back from {from} to {to}"),
-                "times that increase",
-                "Put the rows in order, or split the file where the clock was set.",
-            ));
+        // Where rows come behind later ones a time that steps back is of no clock.
+        if !self.alone || self.behind > 0 {
+            return Err(self.goes_back(csv, before, step));
         }
+        let (from, to) = (self.words(before), self.words(before + step));
         let second = self.a_second();
         self.ahead += BREAK * second - step;
         let what = match step < 0.0 {
-            true => {
-                "Time goes back: the clock was set, and nobody knows how long nothing was recorded"
-            }
-            false => "Nothing was recorded for longer than there is a record before it",
+            true => "the clock was set, and nobody knows how long nothing was recorded",
+            false => "nothing was recorded for longer than the record before lasts",
         };
         let by = nanoseconds(self.ahead.abs() / second);
+        let way = if self.ahead > 0.0 { "later" } else { "earlier" };
         self.begun_anew.push(format!(
-            "In line {} time goes from {from} to {to}. {what}. What follows begins anew; its times are taken {by} s {}.",
+            "line {}: time goes from {from} to {to}: {what}. What follows begins anew; its times are taken {by} s {way}.",
             csv.line(),
-            if self.ahead > 0.0 { "later" } else { "earlier" }
         ));
         Ok(())
     }
 
-    /// Takes the stamp of the row before for this one, too.
-    pub fn again(&mut self, csv: &LogRows) {
-        if let Some(&(time, _)) = self.of_rows.last() {
-            self.of_rows.push((time, csv.line()));
+    fn goes_back(&self, csv: &LogRows, before: f64, step: f64) -> FileError {
+        let (from, to) = (self.words(before), self.words(before + step));
+        csv.error_here(
+            format_args!("time going back from {from} to {to}"),
+            "times that increase",
+            "Put the rows in order, name another time column, or split the file where the clock was set.",
+        )
+    }
+
+    fn words(&self, number: f64) -> String {
+        match self.unit {
+            TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
+            TimeUnit::Count => format!("count {number}"),
+        }
+    }
+
+    /// Takes the row for another one at the time of the row before this place.
+    pub fn again(&mut self, place: usize, csv: &LogRows) {
+        let before = place.checked_sub(1).and_then(|row| self.of_rows.get(row));
+        if let Some(&(time, _)) = before {
+            self.of_rows.insert(place, (time, csv.line()));
         }
     }
 
@@ -245,11 +292,18 @@ impl Stamps {
     }
 
     /// What was made of numbers that step back, and what that leaves open where so many samples lack their rows.
-    pub fn notes(&self, missing: usize) -> Vec<String> {
-        let mut notes = self.begun_anew.clone();
+    pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
+        let file = file.display();
+        let anew = self.begun_anew.iter();
+        let mut notes: Vec<String> = anew.map(|what| format!("{file}, {what}")).collect();
+        notes.extend(self.out_of_order.map(|(count, line)| {
+            format!(
+                "{count} row(s) of {file} come behind later ones, the first in line {line}: they are put in their place."
+            )
+        }));
         notes.extend(self.wraps_at.and_then(|size| match self.unit {
             TimeUnit::PerSecond(many) => Some(format!(
-                "The time wraps every {} s and is taken to go on.",
+                "{file}: the time wraps every {} s and is taken to go on.",
                 nanoseconds(size / many)
             )),
             TimeUnit::Count => (missing > 0).then(|| {

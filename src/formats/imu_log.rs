@@ -1,17 +1,18 @@
 //! The instrument's samples.
 
+mod content;
 mod even;
 mod long;
 
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
-use super::clock::{Clock, Stamp, Stamps};
+use super::clock::{Clock, Stamps};
 use super::error::FileError;
 use super::joined::{self, Joined, Part};
 use super::rows::LogRows;
 use super::source::Source;
-use super::temperature::{TemperatureColumns, Temperatures};
+use super::temperature::TemperatureColumns;
 use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
@@ -19,14 +20,9 @@ use crate::recording::{
     Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
     stretches_between,
 };
+use content::{Content, Held, Samples};
 use even::{evened, place};
-use long::{LongLog, Sizes, Whole};
-
-/// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
-const FEWEST_SAMPLES: usize = 100;
-
-/// So many rows at one time, a minute and more of any, are no burst: the time stands still.
-const MOST_AT_ONCE: usize = 1 << 16;
+use long::{Sizes, Whole};
 
 /// Which moment of a sample its time stamp names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,30 +124,6 @@ fn pulse_of(error: [f64; 3]) -> f64 {
     12f64.sqrt() * Vector3::from(error).norm() / 3f64.sqrt()
 }
 
-/// Rows that are held, without duplicates.
-#[derive(Default)]
-struct Held {
-    columns: [Vec<f64>; 6],
-    /// Rows before each duplicate, and its line.
-    duplicates: Vec<(usize, u64)>,
-}
-
-impl Held {
-    fn len(&self) -> usize {
-        self.columns[0].len()
-    }
-
-    /// Lets go of the first rows.
-    fn let_go(&mut self, rows: usize) {
-        for column in &mut self.columns {
-            column.drain(..rows);
-            column.shrink_to(2 * column.len());
-        }
-        self.duplicates.retain(|&(row, _)| row > rows);
-        self.duplicates.iter_mut().for_each(|(row, _)| *row -= rows);
-    }
-}
-
 /// What was read besides samples.
 struct Read<'a> {
     layout: &'a Layout,
@@ -162,21 +134,6 @@ struct Read<'a> {
     bridges: Vec<Bridge>,
     /// RMS errors of integrals that samples put on an even clock have, in the columns' quantity times samples.
     error: PerSensor<[f64; 3]>,
-}
-
-/// What the file holds.
-struct Content {
-    layout: Layout,
-    stamps: Stamps,
-    samples: Samples,
-    temperature: Option<Temperatures>,
-    /// Of the integrals of the accelerometers' columns, in their unit times s.
-    integral_error: [f64; 3],
-}
-
-enum Samples {
-    Held(Box<(Held, Uniform)>),
-    Long(Box<Whole>),
 }
 
 impl ImuLog<'_> {
@@ -212,7 +169,7 @@ impl ImuLog<'_> {
                 self.whole(layout, &stamps, held, clock)
             }
         };
-        notes.extend(stamps.notes(missing));
+        notes.extend(stamps.notes(&self.source.file, missing));
         let error = self
             .axes
             .each(Vector3::from(integral_error))
@@ -449,184 +406,6 @@ impl ImuLog<'_> {
             places: std::array::from_fn(|k| places[k]),
             body_axes: std::array::from_fn(|k| self.axes.body_axis(k % 3)),
         })
-    }
-
-    /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
-    /// found to have.
-    fn content(
-        &self,
-        sizes: Sizes,
-        notes: &mut Vec<String>,
-        known: Option<&Uniform>,
-    ) -> Result<Content, FileError> {
-        let mut csv = self.open()?;
-        let clock = self.clock_of_rows();
-        let mut stamps = clock.start(&mut csv)?;
-        let layout = self.layout(&mut csv)?;
-        let places = layout.places;
-        let temperature = self
-            .temperature
-            .as_ref()
-            .map(|columns| columns.start(&mut csv));
-        let mut temperature = temperature.transpose()?;
-
-        let instance = match self.instance {
-            Some((name, number)) => Some((csv.column(name)?, number)),
-            None => None,
-        };
-        let (mut blank, mut lacking, mut duplicates) = (0, 0, 0);
-        let mut at_once = (0, 0);
-        let mut standing = 0;
-        let mut held = Held::default();
-        let mut long: Option<LongLog> = None;
-        let mut before = [f64::NAN; 6];
-        while csv.advance()? && !csv.may_be_cut() {
-            if let Some((place, number)) = instance
-                && csv.number(place)? != number
-            {
-                continue;
-            }
-            // Rows that another sensor wrote, or in which a sensor said nothing; a time tells that they are missing.
-            let empty = places.iter().filter(|&&place| csv.is_blank(place));
-            match empty.count() {
-                0 => {}
-                _ if clock.column.is_none() => {}
-                6 => {
-                    blank += 1;
-                    continue;
-                }
-                _ => {
-                    lacking += 1;
-                    continue;
-                }
-            }
-            let mut row = [0.0; 6];
-            for (value, &place) in row.iter_mut().zip(&places) {
-                *value = self.value(&csv, place)?;
-            }
-            let stamp = stamps.look(&csv)?;
-            standing = if stamp == Stamp::Same {
-                standing + 1
-            } else {
-                0
-            };
-            if standing > MOST_AT_ONCE {
-                return Err(csv.error_here(
-                    format_args!("the same time in more than {MOST_AT_ONCE} rows"),
-                    "times that increase",
-                    "Name another time column, or leave it out and give sample_period_s.",
-                ));
-            }
-            match stamp {
-                Stamp::Same if row == before => {
-                    held.duplicates.push((held.len(), csv.line()));
-                    duplicates += 1;
-                    continue;
-                }
-                Stamp::Same if stamps.is_count() => return Err(Stamps::same(&csv)),
-                Stamp::Same => {
-                    if at_once.0 == 0 {
-                        at_once.1 = csv.line();
-                    }
-                    at_once.0 += 1;
-                    stamps.again(&csv);
-                    before = row;
-                }
-                Stamp::Later => before = row,
-            }
-            for (column, value) in held.columns.iter_mut().zip(row) {
-                column.push(value);
-            }
-            if let (Some(temperature), Some(&(time, _))) = (&mut temperature, stamps.of_rows.last())
-            {
-                temperature.take(&csv, time);
-            }
-            match &mut long {
-                Some(long) if long.is_full(&held) => long
-                    .take(&mut held, &mut stamps, false)
-                    .map_err(|error| csv.placed(error))?,
-                None if held.len() == sizes.long => {
-                    csv.pack();
-                    let layout = layout.clone();
-                    let begun = LongLog::new(self, (layout, sizes), &held, &stamps, known);
-                    long = Some(begun.map_err(|error| csv.placed(error))?);
-                }
-                _ => {}
-            }
-        }
-        let samples = match long {
-            Some(mut long) => long
-                .take(&mut held, &mut stamps, true)
-                .map(|()| Samples::Long(Box::new(long.finish(duplicates)))),
-            None if held.len() < FEWEST_SAMPLES => {
-                let (found, advice) = match lacking {
-                    0 => (String::new(), "Record a run with dwells and turns."),
-                    _ => (
-                        format!(
-                            " and {lacking} rows that lack a value of the gyros or accelerometers"
-                        ),
-                        "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
-                    ),
-                };
-                return Err(csv.error(
-                    format_args!("{} samples{found}", held.len()),
-                    format_args!("at least {FEWEST_SAMPLES}"),
-                    advice,
-                ));
-            }
-            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
-                .map(|clock| Samples::Held(Box::new((held, clock)))),
-        };
-        let samples = samples.map_err(|error| csv.placed(error))?;
-        let clock = match &samples {
-            Samples::Long(whole) => &whole.clock,
-            Samples::Held(held) => &held.1,
-        };
-        if known.is_none() && clock.wander.is_some() && matches!(samples, Samples::Long(_)) {
-            return self.content(sizes, notes, Some(clock));
-        }
-        notes.extend(clock.uneven());
-        notes.extend(csv.cut_off("It is left out"));
-        notes.extend_from_slice(csv.remarks());
-        let (same, line) = at_once;
-        if same > 0 {
-            notes.push(format!(
-                "{same} row(s) of {} have the time of the row before and other values, the first in line {line}: each \
-                 counts as a sample.",
-                self.source.file.display()
-            ));
-        }
-        if blank > 0 {
-            notes.push(format!(
-                "{blank} row(s) of {} have nothing in the columns of both triads and are passed over.",
-                self.source.file.display()
-            ));
-        }
-        if lacking > 0 {
-            notes.push(format!(
-                "{lacking} row(s) of {} lack a value of the gyros or accelerometers and count as missing.",
-                self.source.file.display()
-            ));
-        }
-        Ok(Content {
-            samples,
-            integral_error: csv.integral_error(),
-            layout,
-            stamps,
-            temperature,
-        })
-    }
-
-    /// A number of a row as it stands.
-    fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
-        let value = csv.number(column)?;
-        if self.output == Output::Pulse && value.fract() != 0.0 {
-            return Err(csv.not(
-                column,
-                "a whole number of pulses, or output = \"increment\" in run.toml",
-            ));
-        }
-        Ok(value)
     }
 }
 

@@ -215,8 +215,7 @@ impl Track {
         let further: Vec<usize> = further.collect::<Result<_, FileError>>()?;
         let mut others = vec![Vec::new(); further.len()];
         let units = places.map(|k| rows.units().map_or(String::new(), |units| units[k].clone()));
-        let mut columns = [const { Vec::new() }; 3];
-        let mut before = [f64::NAN; 3];
+        let mut columns = [const { Vec::<f64>::new() }; 3];
         while rows.advance()? && !rows.may_be_cut() {
             if places.iter().any(|&place| rows.is_blank(place)) {
                 continue;
@@ -225,20 +224,24 @@ impl Track {
             for (value, &place) in row.iter_mut().zip(&places) {
                 *value = rows.number(place)?;
             }
-            match stamps.look(&rows)? {
-                Stamp::Same if row == before => continue,
-                Stamp::Same if stamps.is_count() => return Err(Stamps::same(&rows)),
-                Stamp::Same => {
-                    stamps.again(&rows);
-                    before = row;
+            let place = match stamps.look(&rows)? {
+                Stamp::New(place) => place,
+                Stamp::Again(place) => {
+                    if columns.each_ref().map(|column| column[place - 1]) == row {
+                        continue;
+                    }
+                    if stamps.is_count() {
+                        return Err(Stamps::same(&rows));
+                    }
+                    stamps.again(place, &rows);
+                    place
                 }
-                Stamp::Later => before = row,
-            }
+            };
             for (column, value) in columns.iter_mut().zip(row) {
-                column.push(value);
+                column.insert(place, value);
             }
-            for (column, &place) in others.iter_mut().zip(&further) {
-                column.push(rows.number(place).unwrap_or(f64::NAN));
+            for (column, &of) in others.iter_mut().zip(&further) {
+                column.insert(place, rows.number(of).unwrap_or(f64::NAN));
             }
         }
         if stamps.of_rows.len() < 2 {
@@ -250,7 +253,7 @@ impl Track {
         }
         let mut remarks = rows.remarks().to_vec();
         remarks.extend(rows.cut_off("It is left out"));
-        remarks.extend(stamps.notes(0));
+        remarks.extend(stamps.notes(rows.file(), 0));
         let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)
             .map_err(|error| rows.placed(error))?;
         Ok(Self {

@@ -223,7 +223,7 @@ impl LogRows {
         }
     }
 
-    fn file(&self) -> &Path {
+    pub fn file(&self) -> &Path {
         match &self.kind {
             Kind::Text(csv) => csv.path(),
             Kind::Stream(rows) => rows.file(),

@@ -250,14 +250,18 @@ impl<'a> TableLogFile<'a> {
             let reading = columns.reading(&csv)?;
             match stamps.look(&csv)? {
                 // A row twice says nothing new.
-                Stamp::Same if attitude.last() == Some(&reading) => continue,
-                Stamp::Same => return Err(Stamps::same(&csv)),
-                Stamp::Later => attitude.push(reading),
+                Stamp::Again(place) if attitude[place - 1] == reading => {}
+                Stamp::Again(_) => return Err(Stamps::same(&csv)),
+                Stamp::New(place) => {
+                    attitude.insert(place, reading);
+                    if let Some(angles) = columns.axes(&csv)? {
+                        axes.insert(place, angles);
+                    }
+                }
             }
-            axes.extend(columns.axes(&csv)?);
         }
         notes.extend(csv.cut_off("It is left out"));
-        notes.extend(stamps.notes(0));
+        notes.extend(stamps.notes(csv.file(), 0));
         attitude.shrink_to_fit();
         axes.shrink_to_fit();
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::content::Held;
 use super::even::{Even, reached};
-use super::{Held, ImuLog, Layout};
+use super::{ImuLog, Layout};
 use crate::formats::clock::Stamps;
 use crate::formats::error::FileError;
 use crate::formats::uniform::{Following, REACH, Uniform};
@@ -79,7 +80,9 @@ impl<'a> LongLog<'a> {
         stamps: &Stamps,
         known: Option<&'a Uniform>,
     ) -> Result<Self, FileError> {
-        let (clock, numbers) = Following::new(&log.source.file, &stamps.of_rows, log.clock.period)?;
+        // Rows further on may belong before the last ones.
+        let settled = &stamps.of_rows[..stamps.of_rows.len().saturating_sub(REACH)];
+        let (clock, numbers) = Following::new(&log.source.file, settled, log.clock.period)?;
         let step = |column: usize| match log.output {
             Output::Pulse => 1.0,
             Output::Increment | Output::Rate => finest_step(&held.columns[column]),

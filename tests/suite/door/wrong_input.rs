@@ -323,8 +323,8 @@ fn each_wrong_row_or_column_has_its_message() {
         (
             "imu.csv",
             "\n0.50,",
-            "\n0.35,",
-            "line 51 & going back from 0.49 s to 0.35 s",
+            "\n-3.5,",
+            "line 51 & going back from 0.49 s to -3.5 s",
         ),
         (
             "table.csv",
@@ -338,7 +338,7 @@ fn each_wrong_row_or_column_has_its_message() {
             "\n0.4,0,1,",
             "line 7 & duplicate",
         ),
-        ("table.csv", "\n0.5,", "\n0.1,", "line 7 & going back"),
+        ("table.csv", "\n0.5,", "\n-1,", "line 7 & going back"),
         ("table.csv", "qw,", "q0,", "line 1 & named `qw`"),
         (
             "segments.csv",

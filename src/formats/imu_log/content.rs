@@ -1,0 +1,309 @@
+//! The rows of a file: those that are samples, in order of time, all of them held or packed as they come.
+
+use super::long::{LongLog, Sizes, Whole};
+use super::{ImuLog, Layout};
+use crate::formats::clock::{Stamp, Stamps};
+use crate::formats::error::FileError;
+use crate::formats::rows::LogRows;
+use crate::formats::temperature::Temperatures;
+use crate::formats::uniform::{REACH, Uniform};
+use crate::imu::Output;
+
+/// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
+const FEWEST_SAMPLES: usize = 100;
+
+/// So many rows at one time, a minute and more of any, are no burst: the time stands still.
+const MOST_AT_ONCE: usize = 1 << 16;
+
+/// What the file holds.
+pub(super) struct Content {
+    pub layout: Layout,
+    pub stamps: Stamps,
+    pub samples: Samples,
+    pub temperature: Option<Temperatures>,
+    /// Of the integrals of the accelerometers' columns, in their unit times s.
+    pub integral_error: [f64; 3],
+}
+
+pub(super) enum Samples {
+    Held(Box<(Held, Uniform)>),
+    Long(Box<Whole>),
+}
+
+/// Rows that are held, without duplicates.
+#[derive(Default)]
+pub(super) struct Held {
+    pub columns: [Vec<f64>; 6],
+    /// Rows before each duplicate, and its line.
+    pub duplicates: Vec<(usize, u64)>,
+}
+
+impl Held {
+    pub fn len(&self) -> usize {
+        self.columns[0].len()
+    }
+
+    fn row(&self, row: usize) -> [f64; 6] {
+        self.columns.each_ref().map(|column| column[row])
+    }
+
+    fn insert(&mut self, place: usize, row: [f64; 6]) {
+        // Rows that come late belong behind one of the last.
+        let last = self.len().saturating_sub(REACH);
+        let behind = self.duplicates.iter_mut().rev();
+        for (row, _) in behind.take_while(|(row, _)| *row > last) {
+            *row += usize::from(*row > place);
+        }
+        for (column, value) in self.columns.iter_mut().zip(row) {
+            column.insert(place, value);
+        }
+    }
+
+    /// Lets go of the first rows.
+    pub fn let_go(&mut self, rows: usize) {
+        for column in &mut self.columns {
+            column.drain(..rows);
+            column.shrink_to(2 * column.len());
+        }
+        self.duplicates.retain(|&(row, _)| row > rows);
+        self.duplicates.iter_mut().for_each(|(row, _)| *row -= rows);
+    }
+}
+
+/// A file as far as it is read.
+struct Reading<'a> {
+    log: &'a ImuLog<'a>,
+    /// Of the values of a sample in a row.
+    places: [usize; 6],
+    /// The column that tells instruments apart, and what it says of this one.
+    instance: Option<(usize, f64)>,
+    stamps: Stamps,
+    temperature: Option<Temperatures>,
+    held: Held,
+    duplicates: usize,
+    /// Rows without any value.
+    blank: usize,
+    /// Rows without some.
+    lacking: usize,
+    /// Rows that have another's time but not its values, and the line of the first.
+    at_once: (usize, u64),
+    /// Rows that follow one another at one time.
+    standing: usize,
+}
+
+impl<'a> Reading<'a> {
+    fn begin(
+        log: &'a ImuLog<'a>,
+        csv: &mut LogRows,
+        places: [usize; 6],
+    ) -> Result<Self, FileError> {
+        let temperature = log.temperature.as_ref();
+        let temperature = temperature.map(|columns| columns.start(csv)).transpose()?;
+        let instance = match log.instance {
+            Some((name, number)) => Some((csv.column(name)?, number)),
+            None => None,
+        };
+        Ok(Self {
+            log,
+            places,
+            instance,
+            stamps: log.clock_of_rows().start(csv)?,
+            temperature,
+            held: Held::default(),
+            duplicates: 0,
+            blank: 0,
+            lacking: 0,
+            at_once: (0, 0),
+            standing: 0,
+        })
+    }
+
+    /// Takes the row if it is a sample.
+    fn take(&mut self, csv: &LogRows) -> Result<(), FileError> {
+        if let Some((place, number)) = self.instance
+            && csv.number(place)? != number
+        {
+            return Ok(());
+        }
+        // Rows that another sensor wrote, or in which a sensor said nothing; a time tells that they are missing.
+        let empty = self.places.iter().filter(|&&place| csv.is_blank(place));
+        match empty.count() {
+            0 => {}
+            _ if self.log.clock_of_rows().column.is_none() => {}
+            6 => {
+                self.blank += 1;
+                return Ok(());
+            }
+            _ => {
+                self.lacking += 1;
+                return Ok(());
+            }
+        }
+        let mut row = [0.0; 6];
+        for (value, &place) in row.iter_mut().zip(&self.places) {
+            *value = self.log.value(csv, place)?;
+        }
+        if let Some(place) = self.place(csv, row)? {
+            self.held.insert(place, row);
+            if let (Some(temperature), Some(&(time, _))) =
+                (&mut self.temperature, self.stamps.of_rows.get(place))
+            {
+                temperature.take(csv, time);
+            }
+        }
+        Ok(())
+    }
+
+    /// Behind how many of the rows that are held this one belongs; none where it is one of them again.
+    fn place(&mut self, csv: &LogRows, row: [f64; 6]) -> Result<Option<usize>, FileError> {
+        let place = match self.stamps.look(csv)? {
+            Stamp::New(place) => {
+                self.standing = 0;
+                return Ok(Some(place));
+            }
+            Stamp::Again(place) => place,
+        };
+        self.standing += 1;
+        if self.standing > MOST_AT_ONCE {
+            return Err(csv.error_here(
+                format_args!("the same time in more than {MOST_AT_ONCE} rows"),
+                "times that increase",
+                "Name another time column, or leave it out and give sample_period_s.",
+            ));
+        }
+        if self.held.row(place - 1) == row {
+            self.held.duplicates.push((place, csv.line()));
+            self.duplicates += 1;
+            return Ok(None);
+        }
+        if self.stamps.is_count() {
+            return Err(Stamps::same(csv));
+        }
+        if self.at_once.0 == 0 {
+            self.at_once.1 = csv.line();
+        }
+        self.at_once.0 += 1;
+        self.stamps.again(place, csv);
+        Ok(Some(place))
+    }
+
+    /// What was made of rows that are no samples, or too many, a sentence each.
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let file = self.log.source.file.display();
+        let (same, line) = self.at_once;
+        let at_once = (same > 0).then(|| {
+            format!(
+                "{same} row(s) of {file} have the time of the row before and other values, the first in line {line}: \
+                 each counts as a sample."
+            )
+        });
+        let blank = (self.blank > 0).then(|| {
+            format!(
+                "{} row(s) of {file} have nothing in the columns of both triads and are passed over.",
+                self.blank
+            )
+        });
+        let lacking = (self.lacking > 0).then(|| {
+            format!(
+                "{} row(s) of {file} lack a value of the gyros or accelerometers and count as missing.",
+                self.lacking
+            )
+        });
+        [at_once, blank, lacking].into_iter().flatten()
+    }
+
+    fn too_few(&self, csv: &LogRows) -> FileError {
+        let (found, advice) = match self.lacking {
+            0 => (String::new(), "Record a run with dwells and turns."),
+            lacking => (
+                format!(" and {lacking} rows that lack a value of the gyros or accelerometers"),
+                "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
+            ),
+        };
+        csv.error(
+            format_args!("{} samples{found}", self.held.len()),
+            format_args!("at least {FEWEST_SAMPLES}"),
+            advice,
+        )
+    }
+}
+
+impl ImuLog<'_> {
+    /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
+    /// found to have.
+    pub(super) fn content(
+        &self,
+        sizes: Sizes,
+        notes: &mut Vec<String>,
+        known: Option<&Uniform>,
+    ) -> Result<Content, FileError> {
+        let mut csv = self.open()?;
+        let layout = self.layout(&mut csv)?;
+        let mut reading = Reading::begin(self, &mut csv, layout.places)?;
+        let mut long: Option<LongLog> = None;
+        while csv.advance()? && !csv.may_be_cut() {
+            reading.take(&csv)?;
+            let Reading { held, stamps, .. } = &mut reading;
+            match &mut long {
+                Some(long) if long.is_full(held) => long
+                    .take(held, stamps, false)
+                    .map_err(|error| csv.placed(error))?,
+                None if held.len() == sizes.long => {
+                    csv.pack();
+                    let begun = LongLog::new(self, (layout.clone(), sizes), held, stamps, known);
+                    long = Some(begun.map_err(|error| csv.placed(error))?);
+                }
+                _ => {}
+            }
+        }
+        if long.is_none() && reading.held.len() < FEWEST_SAMPLES {
+            return Err(reading.too_few(&csv));
+        }
+        let of_rows = reading.notes().collect::<Vec<_>>();
+        let Reading {
+            mut held,
+            mut stamps,
+            temperature,
+            duplicates,
+            ..
+        } = reading;
+        let samples = match long {
+            Some(mut long) => long
+                .take(&mut held, &mut stamps, true)
+                .map(|()| Samples::Long(Box::new(long.finish(duplicates)))),
+            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
+                .map(|clock| Samples::Held(Box::new((held, clock)))),
+        };
+        let samples = samples.map_err(|error| csv.placed(error))?;
+        let clock = match &samples {
+            Samples::Long(whole) => &whole.clock,
+            Samples::Held(held) => &held.1,
+        };
+        if known.is_none() && clock.wander.is_some() && matches!(samples, Samples::Long(_)) {
+            return self.content(sizes, notes, Some(clock));
+        }
+        notes.extend(clock.uneven());
+        notes.extend(csv.cut_off("It is left out"));
+        notes.extend_from_slice(csv.remarks());
+        notes.extend(of_rows);
+        Ok(Content {
+            samples,
+            integral_error: csv.integral_error(),
+            layout,
+            stamps,
+            temperature,
+        })
+    }
+
+    /// A number of a row as it stands.
+    fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
+        let value = csv.number(column)?;
+        if self.output == Output::Pulse && value.fract() != 0.0 {
+            return Err(csv.not(
+                column,
+                "a whole number of pulses, or output = \"increment\" in run.toml",
+            ));
+        }
+        Ok(value)
+    }
+}
