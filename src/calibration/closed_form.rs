@@ -16,6 +16,7 @@ use super::finding::Finding;
 use super::parameters::parameter;
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
+use super::rounding::{by_rounding, rounded};
 use crate::earth::Site;
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
@@ -64,6 +65,11 @@ pub(super) fn six_position_by(
     let notes = notes.map(|note| Finding::Recording { note });
     closed_form.findings.splice(0..0, notes);
     closed_form.findings.extend(scatter_at_rest(problem));
+    let rounding = by_rounding(problem, &closed_form.estimate.triads);
+    let covariance = &mut closed_form.estimate.covariance;
+    *covariance += rounding;
+    let of_rounding = rounded(problem, &rounding, covariance);
+    closed_form.findings.extend(of_rounding);
     share_gravity(&mut closed_form.estimate, &problem.run().site);
     Ok(closed_form)
 }

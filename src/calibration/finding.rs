@@ -156,6 +156,17 @@ pub enum Finding {
         /// What their ratio stays within, for both triads at once, in 999 runs of 1000 if that is right.
         limits: (f64, f64),
     },
+    /// Rates that are rounded to steps wider than their noise; σ hold what that leaves open.
+    Rounded {
+        /// `gyro` or `accel`.
+        of: &'static str,
+        /// The widest step …
+        step: f64,
+        /// … in this unit.
+        unit: &'static str,
+        /// By how much the σ grew that grew most.
+        growth: f64,
+    },
     /// Residuals of the closed form that are larger than chance makes them; its σ were widened.
     ResidualsLarge {
         /// `gyro`, `accel` or `both triads`.
@@ -404,6 +415,17 @@ impl fmt::Display for Finding {
                  of it in 999 runs of 1000. It is seen over a tenth of a second, so a mount that shakes is \
                  in it; `turncal allan` tells more.",
                 found / stated
+            ),
+            Self::Rounded {
+                of,
+                step,
+                unit,
+                growth,
+            } => write!(
+                f,
+                "Rows of the {of} are rounded to steps of {step:.3e} {unit}, and their noise at rest does not reach \
+                 over one: no mean over a dwell tells where within a step it lies. σ hold that and are up to \
+                 {growth:.1} times as large for it. Log more digits."
             ),
             Self::LabelsContradicted { contradicted } => {
                 let each: Vec<String> =

@@ -22,6 +22,7 @@ use super::pass::{Gate, PassResult};
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
+use super::rounding::{by_rounding, rounded};
 use super::together::{self, Joint};
 use super::unexplained::unexplained;
 use crate::imu::Sensor;
@@ -108,6 +109,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
     }
+    let covariance_by_rounding = by_rounding(problem, &estimate.triads);
+    estimate.covariance += covariance_by_rounding;
     let model = &problem.model;
     let mut outcome = Outcome {
         form_test,
@@ -120,6 +123,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         estimate,
         covariance_by_noise,
         covariance_by_headings: by_headings,
+        covariance_by_rounding,
         covariance_by_error_terms: ParameterMatrix::zeros(),
         covariance_by_variation: ParameterMatrix::zeros(),
         prior_sigma: stated.model.prior_sigma,
@@ -218,6 +222,12 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         });
     }
     findings.extend(scatter_at_rest(problem));
+    let covariance = &outcome.estimate.covariance;
+    findings.extend(rounded(
+        problem,
+        &outcome.covariance_by_rounding,
+        covariance,
+    ));
     findings.extend(far_from_prior(&problem.model, &outcome.estimate));
     let form = outcome.estimate.form();
     let unobserved = outcome.unobserved();

@@ -43,6 +43,8 @@ pub struct Innovation {
     pub accepted: bool,
     /// Number of the dwell in which it was made.
     pub dwell: usize,
+    /// Whether what the move before that dwell has done is in it: nothing goes on where rows are lost.
+    pub after_move: bool,
 }
 
 impl Innovation {
@@ -93,7 +95,7 @@ pub struct Nis {
 pub enum Look {
     /// All that were let in.
     All,
-    /// The first of each dwell but the first dwell, let in or not: it carries what the move before has done.
+    /// The first of each dwell after a move, let in or not: it carries what that has done.
     AfterMoves,
     /// Sums over each dwell, each over its σ: they carry what lasts.
     OverDwells,
@@ -131,9 +133,9 @@ impl Look {
         match self {
             Self::All => accepted().flat_map(|i| i.whitened.map(|w| w * w)).collect(),
             Self::AfterMoves => {
-                let later = dwells().filter(|dwell| dwell.iter().all(|i| i.dwell > 0));
-                later
-                    .filter_map(|dwell| dwell.first())
+                let first = dwells().filter_map(|dwell| dwell.first());
+                first
+                    .filter(|innovation| innovation.after_move)
                     .flat_map(|i| i.whitened.map(|w| w * w))
                     .collect()
             }
@@ -271,6 +273,7 @@ mod tests {
                 whitened: [whitened; 3],
                 accepted: true,
                 dwell,
+                after_move: dwell > 0,
             };
             let dwells = (0..20).flat_map(|k| dwell.map(|whitened| of_dwell(k, whitened)));
             dwells.collect()

@@ -50,6 +50,7 @@ mod record;
 mod residuals;
 mod rest_scatter;
 pub mod result;
+mod rounding;
 mod scatter;
 mod schedule;
 mod solution;

@@ -32,6 +32,8 @@ pub struct Outcome {
     pub covariance_by_noise: ParameterMatrix,
     /// What of that comes from headings that the data do not tell apart; zero where Earth rate or a table does.
     pub covariance_by_headings: ParameterMatrix,
+    /// What rates leave open that are rounded to steps wider than their noise, beside that.
+    pub covariance_by_rounding: ParameterMatrix,
     /// What error terms that the data show, and that are not estimated, add to the covariance of the
     /// estimate; see [`crate::calibration::Solution::assess`].
     pub covariance_by_error_terms: ParameterMatrix,

@@ -316,6 +316,15 @@ impl<'a> Stretch<'a> {
         Some(AttitudePrior::of_reading(&self.run.table, reading))
     }
 
+    /// From where this one ends to where another of the same recording begins, s.
+    pub fn time_until(&self, next: &Self) -> f64 {
+        let imu = &self.run.recording.imu;
+        let ends = self.dwells.last().map(|dwell| dwell.samples.end);
+        let begins = next.dwells.first().map(|dwell| dwell.samples.start);
+        let pair = ends.zip(begins);
+        pair.map_or(0.0, |(end, begin)| imu.time(begin) - imu.time(end))
+    }
+
     /// Uncertainty at its first sample of errors referred to a point where the attitude is `at`.
     pub fn start(&self, prior: &AttitudePrior, at: &Matrix3<f64>) -> Start {
         Start {

@@ -37,6 +37,7 @@ mod tests {
                 whitened: [factor; 3],
                 accepted: true,
                 dwell: 0,
+                after_move: false,
             })
             .collect();
         unexplained(&consistency(&innovations).all, &innovations).is_some()

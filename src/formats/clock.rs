@@ -28,6 +28,17 @@ impl TimeUnit {
     ];
 }
 
+/// What times of rows may do but go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Breaks {
+    /// Nothing: rows of another file are put beside these.
+    None,
+    /// Pause for as long as they like.
+    Pauses,
+    /// Begin anew where the clock was set: nothing else is told by them.
+    Settings,
+}
+
 /// What `run.toml` says of a log's time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock<'a> {
@@ -38,8 +49,7 @@ pub(super) struct Clock<'a> {
     pub unit: TimeUnit,
     /// s
     pub period: Option<f64>,
-    /// Whether nothing but these rows is told by their times, so that it does no harm if the clock is set.
-    pub alone: bool,
+    pub breaks: Breaks,
 }
 
 impl<'a> Clock<'a> {
@@ -68,7 +78,7 @@ impl<'a> Clock<'a> {
             nanoseconds,
             unit,
             period: period.map(|field| field.positive()).transpose()?,
-            alone: false,
+            breaks: Breaks::None,
         })
     }
 
@@ -79,13 +89,15 @@ impl<'a> Clock<'a> {
             nanoseconds: self.nanoseconds.map(|name| csv.column(name)).transpose()?,
             unit: self.unit,
             period: self.period.unwrap_or(1.0),
-            alone: self.alone,
+            breaks: self.breaks,
             number: None,
             first: None,
             longest: 0.0,
+            without_rows: 0.0,
             ahead: 0.0,
             wraps_at: None,
-            begun_anew: Vec::new(),
+            pauses: Vec::new(),
+            set: Vec::new(),
             out_of_order: None,
             behind: 0,
             of_rows: Vec::new(),
@@ -103,6 +115,15 @@ pub(super) enum Stamp {
     Again(usize),
 }
 
+/// Where nothing was recorded for so long that the rest of it is left out.
+struct Pause {
+    /// Time of the row behind it, the pauses being short, s.
+    until: f64,
+    /// By how much these are too short up to here, s.
+    left_out: f64,
+    line: u64,
+}
+
 /// The stamps of a file so far.
 pub(super) struct Stamps {
     column: Option<usize>,
@@ -110,18 +131,22 @@ pub(super) struct Stamps {
     unit: TimeUnit,
     /// s a count
     period: f64,
-    alone: bool,
+    breaks: Breaks,
     /// The number in the row before.
     number: Option<f64>,
     first: Option<f64>,
     /// The longest step forward.
     longest: f64,
-    /// By how much the time of a row is ahead of its number: counters wrap, clocks are set.
+    /// How far numbers have gone on without rows, in steps longer than BREAK.
+    without_rows: f64,
+    /// By how much the time of a row is ahead of its number: counters wrap, clocks are set, pauses are cut short.
     ahead: f64,
     /// The size of a counter that wrapped.
     wraps_at: Option<f64>,
-    /// Where the record begins anew, in some sentences each.
-    begun_anew: Vec<String>,
+    /// Pauses that are cut short.
+    pauses: Vec<Pause>,
+    /// Where the clock was set, in some sentences each.
+    set: Vec<String>,
     /// Rows that were put before others, and the line of the first.
     out_of_order: Option<(usize, u64)>,
     /// Rows since the latest one that come behind it.
@@ -161,10 +186,15 @@ impl Stamps {
                 }
                 return Ok(self.put(place, self.time(number), csv.line()));
             }
-            if is_back || self.is_pause(step) {
-                self.begin_anew(csv, before, step)?;
+            if is_back {
+                self.is_set(csv, before, step)?;
+            } else if self.is_pause(step) {
+                self.pause(csv, number, step);
             } else {
                 self.longest = self.longest.max(step);
+                if step > self.cut_to() {
+                    self.without_rows += step;
+                }
             }
         }
         self.behind = 0;
@@ -228,29 +258,52 @@ impl Stamps {
         size.is_some()
     }
 
-    /// Whether nothing was recorded for longer than there is a record before it.
+    /// How long a pause is that was cut short, or of which nobody knows how long it was.
+    fn cut_to(&self) -> f64 {
+        BREAK * self.a_second()
+    }
+
+    /// Whether with this step forward nothing was recorded for longer than something was.
     fn is_pause(&self, step: f64) -> bool {
         let rows = self.let_go + self.of_rows.len();
-        self.alone && rows > REACH && step > self.lasted().max(BREAK * self.a_second())
+        let pauses = self.breaks >= Breaks::Pauses && rows > REACH && step > self.cut_to();
+        pauses && step + 2.0 * self.without_rows > self.lasted()
+    }
+
+    /// Cuts a pause short: samples of nothing would take room.
+    fn pause(&mut self, csv: &LogRows, number: f64, step: f64) {
+        self.ahead += self.cut_to() - step;
+        self.without_rows += self.cut_to();
+        let before = self.pauses.last().map_or(0.0, |pause| pause.left_out);
+        self.pauses.push(Pause {
+            until: self.time(number),
+            left_out: before + (step - self.cut_to()) / self.a_second(),
+            line: csv.line(),
+        });
+    }
+
+    /// The time at which samples are that were given this one, the pauses being short.
+    pub fn told(&self, time: f64) -> f64 {
+        // Samples begin about where their stamps are.
+        let behind = |pause: &Pause| pause.until - 0.5 * BREAK <= time;
+        let behind = self.pauses.partition_point(behind);
+        let pause = self.pauses[..behind].last();
+        time + pause.map_or(0.0, |pause| pause.left_out)
     }
 
     /// Takes what follows for a part of its own, a little later.
-    fn begin_anew(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
+    fn is_set(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
         // Where rows come behind later ones a time that steps back is of no clock.
-        if !self.alone || self.behind > 0 {
+        if self.breaks < Breaks::Settings || self.behind > 0 {
             return Err(self.goes_back(csv, before, step));
         }
         let (from, to) = (self.words(before), self.words(before + step));
-        let second = self.a_second();
-        self.ahead += BREAK * second - step;
-        let what = match step < 0.0 {
-            true => "the clock was set, and nobody knows how long nothing was recorded",
-            false => "nothing was recorded for longer than the record before lasts",
-        };
-        let by = nanoseconds(self.ahead.abs() / second);
-        let way = if self.ahead > 0.0 { "later" } else { "earlier" };
-        self.begun_anew.push(format!(
-            "line {}: time goes from {from} to {to}: {what}. What follows begins anew; its times are taken {by} s {way}.",
+        self.ahead += self.cut_to() - step;
+        self.without_rows += self.cut_to();
+        let later = nanoseconds(BREAK - step / self.a_second());
+        self.set.push(format!(
+            "line {}: time goes from {from} to {to}: the clock was set, and nobody knows how long nothing was \
+             recorded. What follows begins anew; its times are taken {later} s later.",
             csv.line(),
         ));
         Ok(())
@@ -294,8 +347,18 @@ impl Stamps {
     /// What was made of numbers that step back, and what that leaves open where so many samples lack their rows.
     pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
         let file = file.display();
-        let anew = self.begun_anew.iter();
-        let mut notes: Vec<String> = anew.map(|what| format!("{file}, {what}")).collect();
+        let set = self.set.iter();
+        let mut notes: Vec<String> = set.map(|what| format!("{file}, {what}")).collect();
+        let ends = self.pauses.first().zip(self.pauses.last());
+        notes.extend(ends.map(|(first, last)| {
+            format!(
+                "{file}: nothing was recorded in {} pause(s), the first before line {}, for longer in all than \
+                 something was. {BREAK} s of each counts as missing rows, {} s more do not.",
+                self.pauses.len(),
+                first.line,
+                nanoseconds(last.left_out)
+            )
+        }));
         notes.extend(self.out_of_order.map(|(count, line)| {
             format!(
                 "{count} row(s) of {file} come behind later ones, the first in line {line}: they are put in their place."
@@ -340,7 +403,8 @@ const CLOCKS: [f64; 7] = [
     86_400.0,
     604_800.0,
 ];
-/// How long nothing is taken to have been recorded where nobody knows, or for long, s: more than is ever interpolated.
+/// How long nothing is taken to have been recorded where nobody knows, and what is left of a long pause, s: more than
+/// is ever interpolated.
 const BREAK: f64 = 1.0;
 
 /// The first of these sizes of a counter that makes its step back one forward that is no longer than usual.

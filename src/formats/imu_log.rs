@@ -169,6 +169,9 @@ impl ImuLog<'_> {
                 self.whole(layout, &stamps, held, clock)
             }
         };
+        for stretch in &mut imu.stretches {
+            stretch.start = stamps.told(stretch.start);
+        }
         notes.extend(stamps.notes(&self.source.file, missing));
         let error = self
             .axes
@@ -338,6 +341,7 @@ impl ImuLog<'_> {
             temperature: None,
             log: Some(LogFacts {
                 rows,
+                output: self.output,
                 jitter_rms: clock.jitter_rms,
                 jitter_max: clock.jitter_max,
                 off_stated_period: clock.off_given,

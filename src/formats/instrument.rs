@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
-use super::clock::Clock;
+use super::clock::{Breaks, Clock};
 use super::error::FileError;
 use super::fields::{Field, Fields};
 use super::imu_log::{ImuLog, TimeStamp};
@@ -97,13 +97,13 @@ impl<'a> InstrumentFields<'a> {
                 &format!("one instrument without `{column}`, as accel_from needs"),
             ));
         }
-        let clock = Clock {
-            alone: accel_from.is_none()
-                && ["turntable", "segments"]
-                    .iter()
-                    .all(|name| top.get(name).is_none()),
-            ..clock
+        let told = ["turntable", "segments"];
+        let breaks = match told.iter().any(|name| top.get(name).is_some()) {
+            _ if accel_from.is_some() => Breaks::None,
+            true => Breaks::Pauses,
+            false => Breaks::Settings,
         };
+        let clock = Clock { breaks, ..clock };
         let follow = clock.period.is_some() && top.get("turntable").is_none();
         if clock.column.is_none() && !follow {
             return Err(columns.missing(

@@ -7,7 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::clock::{Clock, Stamp, Stamps, TimeUnit};
+use super::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit};
 use super::course::Course;
 use super::error::{FileError, Place};
 use super::source::Source;
@@ -294,6 +294,6 @@ pub(super) fn clock(period: Option<f64>) -> Clock<'static> {
         nanoseconds: None,
         unit: TimeUnit::PerSecond(1.0),
         period,
-        alone: false,
+        breaks: Breaks::None,
     }
 }

@@ -91,7 +91,7 @@ impl Uniform {
         let count = self.numbers.len() as f64;
         let drift = (self.period - period).abs() * last;
         let sigma = self.jitter_rms * (12.0 / count).sqrt();
-        drift > self.jitter_max.max(BY_CHANCE * sigma)
+        drift > self.jitter_max.max(BY_CHANCE * sigma).max(EXACT)
     }
 
     /// The clock that stamps tell best, rows missing where they say so or none at all. Each place where rows are

@@ -1,12 +1,14 @@
 //! What a log looks like, before anything is made of it.
 
-use crate::imu::{AxisOrder, PerSensor, Sensor};
+use crate::imu::{AxisOrder, Output, PerSensor, Sensor};
 
 /// The instrument's file in figures, in its own units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogFacts {
     /// Rows in the file.
     pub rows: usize,
+    /// What they hold.
+    pub output: Output,
     /// RMS of stamps against the uniform clock, s.
     pub jitter_rms: f64,
     /// The largest of these differences, s.

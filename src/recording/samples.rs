@@ -179,13 +179,18 @@ impl ImuSamples {
             })
     }
 
-    /// The sample edge nearest below a time, as a real number of samples from the first one.
+    /// A time as a real number of samples from the first one. Stretches may be further apart in time than their samples:
+    /// what is later than all lost samples between two is at the last of these.
     pub fn edge(&self, time: f64) -> f64 {
         let begun = self.stretches.partition_point(|s| s.start <= time);
         let stretch = self.stretches.get(begun.saturating_sub(1));
-        stretch.map_or(0.0, |s| {
+        let number = stretch.map_or(0.0, |s| {
             s.samples.start as f64 + (time - s.start) / self.period
-        })
+        });
+        match self.stretches.get(begun) {
+            Some(next) if number > next.samples.start as f64 => next.samples.start as f64 - 1.0,
+            _ => number,
+        }
     }
 
     /// Whether these samples follow one another without a break.
@@ -201,10 +206,13 @@ impl ImuSamples {
         stretch.is_none_or(|stretch| samples.end > stretch.samples.end)
     }
 
-    /// The samples between stretches, of which nothing is known.
+    /// The samples before, between and after stretches, of which nothing is known.
     pub fn missing(&self) -> impl Iterator<Item = Range<usize>> {
-        let pairs = self.stretches.windows(2);
-        pairs.map(|pair| pair[0].samples.end..pair[1].samples.start)
+        let ends = self.stretches.iter().map(|stretch| stretch.samples.end);
+        let starts = self.stretches.iter().map(|stretch| stretch.samples.start);
+        let all = [0].into_iter().chain(ends).zip(starts.chain([self.len()]));
+        all.map(|(end, start)| end..start)
+            .filter(|missing| !missing.is_empty())
     }
 
     /// Time that the samples last, s.

@@ -132,6 +132,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
                 whitened,
                 accepted: k % 19 != 0,
                 dwell: number,
+                after_move: number > 0,
             }));
         }
     }
@@ -161,6 +162,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         covariance_by_noise: ParameterMatrix::zeros(),
         covariance_by_headings: ParameterMatrix::zeros(),
         covariance_by_error_terms: ParameterMatrix::zeros(),
+        covariance_by_rounding: ParameterMatrix::zeros(),
         covariance_by_variation: ParameterMatrix::zeros(),
         model: Model::new(&run, &Options::default().installation(form)),
         noise: NoiseReport {

@@ -386,6 +386,24 @@ mod tests {
     }
 
     #[test]
+    fn where_begin_and_end_of_a_record_are_lost_nothing_rests() {
+        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        let imu = &mut run.recording.imu;
+        let second = (1.0 / imu.period) as usize;
+        let known = 3 * second..imu.len() - 3 * second;
+        imu.stretches = vec![Stretch {
+            samples: known.clone(),
+            start: imu.time(known.start),
+        }];
+        for aiding in [Aiding::Table, Aiding::Velocity] {
+            let dwells = run.dwells(aiding);
+            assert!(dwells.len() > 3);
+            assert_eq!(dwells[0].samples.start, known.start);
+            assert!(dwells[dwells.len() - 1].samples.end <= known.end);
+        }
+    }
+
+    #[test]
     fn a_slow_turn_between_dense_readings_is_no_standstill() {
         let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
         let time: Vec<f64> = (0..60_000).map(|k| f64::from(k) * 1e-3).collect();

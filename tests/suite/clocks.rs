@@ -28,9 +28,9 @@ enum Clock {
 }
 
 /// Begin and rates of a row.
-type Row = (f64, Vector6<f64>);
+pub type Row = (f64, Vector6<f64>);
 
-fn rows(run: &Run) -> Vec<Row> {
+pub fn rows(run: &Run) -> Vec<Row> {
     let imu = &run.recording.imu;
     let (gyro, accel) = (imu.of(Sensor::Gyro), imu.of(Sensor::Accel));
     let pairs = gyro.iter().zip(accel.iter()).enumerate();
@@ -91,14 +91,12 @@ fn stamped(rows: Vec<Row>, period: f64, clock: Clock, stream: u64) -> Vec<Row> {
     }
 }
 
-fn trial(clock: Clock, stream: u64) -> Trial {
-    let scenario = Scenario::load("mems").unwrap();
-    let made = scenario.simulate(SEED, stream).unwrap();
+/// The run as it is read where a logger wrote these rows.
+pub fn as_logged(made: Simulated, rows: &[Row]) -> Simulated {
     let directory = tempfile::tempdir().unwrap();
     write_run(directory.path(), &made.run, made.output, None).unwrap();
     let mut text = "t,gx,gy,gz,ax,ay,az\n".to_owned();
-    let period = made.run.recording.imu.period;
-    for (time, rates) in stamped(rows(&made.run), period, clock, stream) {
+    for (time, rates) in rows {
         write!(text, "{time:.6}").unwrap();
         rates
             .iter()
@@ -114,7 +112,15 @@ fn trial(clock: Clock, stream: u64) -> Trial {
     let toml = toml.replace("imu.csv.gz", "imu.csv");
     fs::write(&path, toml.replace(period.unwrap(), "")).unwrap();
     let run = Run::read(&path).unwrap_or_else(|error| panic!("{error}"));
-    Trial::new(&Simulated { run, ..made })
+    Simulated { run, ..made }
+}
+
+fn trial(clock: Clock, stream: u64) -> Trial {
+    let scenario = Scenario::load("mems").unwrap();
+    let made = scenario.simulate(SEED, stream).unwrap();
+    let period = made.run.recording.imu.period;
+    let rows = stamped(rows(&made.run), period, clock, stream);
+    Trial::new(&as_logged(made, &rows))
 }
 
 #[test]

@@ -34,6 +34,7 @@ mod navigation;
 mod observability;
 mod outliers;
 mod recorded;
+mod rows;
 mod shared;
 mod simulated;
 mod stretches;

@@ -66,12 +66,14 @@ impl Budget {
         let bent = curvature(&outcome.estimate.triads, &filter);
         let left_off = outcome.covariance_by_error_terms;
         let variation = outcome.covariance_by_variation;
-        let beside = outcome.covariance_by_noise + left_off + variation;
+        let rounding = outcome.covariance_by_rounding;
+        let beside = outcome.covariance_by_noise + rounding + left_off + variation;
         let scatter = outcome.estimate.covariance - beside;
         let parts = by_source.into_iter().chain([
             (BudgetSource::Curvature, bent),
             (BudgetSource::Headings, outcome.covariance_by_headings),
             (BudgetSource::DwellScatter, scatter),
+            (BudgetSource::Rounding, rounding),
             (BudgetSource::ErrorTermsLeftOff, left_off),
             (BudgetSource::UnseenVariation, variation),
         ]);

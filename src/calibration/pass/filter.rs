@@ -48,6 +48,15 @@ pub(in crate::calibration) struct Filter {
     tape: Option<Vec<Operation>>,
 }
 
+/// What a stretch begins after.
+#[derive(Debug)]
+pub(in crate::calibration) enum Since<'a> {
+    /// So much time of the same recording, s, of which nothing is known.
+    Lost(f64),
+    /// Nothing of its recording: where it is linearised what is of that alone, and what its mounting does.
+    Anew(&'a Difference, Option<&'a Turned>),
+}
+
 impl Filter {
     /// Before the first stretch begins, with the means of what is constant.
     pub fn new(model: &Model, errors: &PriorErrors) -> Self {
@@ -105,15 +114,9 @@ impl Filter {
 
     /// A stretch begins: navigation errors and the table's position start anew. In another recording the
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, and what is of the recording: `anew` tells where it is linearised; `gravity` is its
-    /// 1σ at another site.
-    pub fn begin(
-        &mut self,
-        start: &Start,
-        table_sigma: f64,
-        anew: Option<(&Difference, Option<Turned>)>,
-        gravity: Option<f64>,
-    ) {
+    /// 4th ed., §3.8) does, too, and what is of the recording; in the same one it has gone on meanwhile. `gravity` is
+    /// its 1σ at another site.
+    pub fn begin(&mut self, start: &Start, table_sigma: f64, since: Since, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude();
         for axis in 0..3 {
             for (first, mean, sigma) in [
@@ -141,14 +144,17 @@ impl Filter {
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
             self.redraw(state, 0.0, sigma);
         }
-        if let Some((at, turned)) = anew {
-            self.turned = turned;
-            for k in 0..self.varying.len() {
-                let (state, sigma, _) = self.varying[k];
-                self.redraw(state, 0.0, sigma);
-            }
-            for (state, own) in self.layout.own().collect::<Vec<_>>() {
-                self.redraw(state, -at.get(own), self.day_to_day.of(own));
+        match since {
+            Since::Lost(duration) => self.vary(duration),
+            Since::Anew(at, turned) => {
+                self.turned = turned.cloned();
+                for k in 0..self.varying.len() {
+                    let (state, sigma, _) = self.varying[k];
+                    self.redraw(state, 0.0, sigma);
+                }
+                for (state, own) in self.layout.own().collect::<Vec<_>>() {
+                    self.redraw(state, -at.get(own), self.day_to_day.of(own));
+                }
             }
         }
     }

@@ -36,6 +36,7 @@ pub(super) struct Judge<'a> {
     /// Squared whitened innovation beyond which an observation is an outlier.
     pub limit: f64,
     pub dwell: usize,
+    pub after_move: bool,
     pub memory: &'a mut Memory,
     pub innovations: &'a mut Vec<Innovation>,
     pub cost: &'a mut f64,
@@ -118,6 +119,7 @@ impl Observer for Judge<'_> {
             whitened: whitened.into(),
             accepted,
             dwell: self.dwell,
+            after_move: self.after_move,
         });
         if accepted {
             return Verdict::Accepted;

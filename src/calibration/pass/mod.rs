@@ -22,8 +22,8 @@ use super::model::Model;
 use super::problem::{Problem, Stretch};
 use earlier::Earlier;
 pub(super) use filter::{
-    Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Taken,
-    Told, Verdict,
+    Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Since,
+    Taken, Told, Verdict,
 };
 pub(super) use measurement::{Measurement, ScalarInnovation};
 pub(super) use mode::{Gate, Mode};
@@ -116,11 +116,13 @@ pub(super) fn begin(
     start: &Start,
     at: &Linearisation,
 ) {
-    let anew = before.is_none_or(|before| before.recording != stretch.recording);
     let own = at.own(stretch.recording);
     let turned = (model.day_to_day.mounting > 0.0).then(|| own.response(&at.triads));
-    let anew = anew.then_some((&own, turned));
+    let since = match before.filter(|before| before.recording == stretch.recording) {
+        Some(before) => Since::Lost(before.time_until(stretch)),
+        None => Since::Anew(&own, turned.as_ref()),
+    };
     let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
     let gravity = moved.then_some(stretch.run.site.gravity_sigma);
-    filter.begin(start, model.position_sigma, anew, gravity);
+    filter.begin(start, model.position_sigma, since, gravity);
 }

@@ -225,6 +225,7 @@ impl<'a> OneStretch<'a> {
             mode: self.mode,
             limit: self.limit,
             dwell: sums.posteriors.dwells(),
+            after_move: new_position,
             memory: &mut self.gate,
             innovations: &mut sums.innovations,
             cost: &mut sums.cost,

@@ -7,7 +7,7 @@ use super::columns::Columns;
 use super::name::Name;
 use super::text::{line, quoted};
 use super::{FEWEST_ROWS, time};
-use crate::formats::clock::{Clock, TimeUnit};
+use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::LogRows;
 use crate::formats::source::Source;
@@ -297,7 +297,7 @@ pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
                 nanoseconds: None,
                 unit: unit.map_or(TimeUnit::PerSecond(1.0), |&(_, unit)| unit),
                 period: None,
-                alone: false,
+                breaks: Breaks::None,
             },
             columns: triad.map(|column| &*found.stream.columns[column].name),
             further: &[],

@@ -148,7 +148,7 @@ impl<'a> Reading<'a> {
             if let (Some(temperature), Some(&(time, _))) =
                 (&mut self.temperature, self.stamps.of_rows.get(place))
             {
-                temperature.take(csv, time);
+                temperature.take(csv, self.stamps.told(time));
             }
         }
         Ok(())

@@ -2,7 +2,7 @@ use std::fmt::Write;
 use std::fs;
 
 use super::*;
-use crate::formats::clock::TimeUnit;
+use crate::formats::clock::{Breaks, TimeUnit};
 use crate::recording::FaultKind;
 
 const ROWS: usize = 50_000;
@@ -49,7 +49,7 @@ fn of_file(file: &std::path::Path) -> ImuLog<'static> {
             nanoseconds: None,
             unit: TimeUnit::PerSecond(1.0),
             period: Some(PERIOD),
-            alone: true,
+            breaks: Breaks::Settings,
         },
         accel_from: None,
         instance: None,
@@ -245,7 +245,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     let microseconds = |k: usize| (4_250_000_000 + 10_000 * k as u64) % (1 << 32);
     let of_day = |k: usize| (86_390_000 + 10 * k as u64) % 86_400_000;
     let set_back = |k: usize| 10 * if k < 7000 { k as u64 } else { k as u64 - 6500 };
-    let read = |stamp: &dyn Fn(usize) -> u64, second, alone| {
+    let read = |stamp: &dyn Fn(usize) -> u64, second, breaks| {
         let mut text = "t,a,b,c,d,e,f\n".to_owned();
         for k in 0..10_000 {
             let of = |column| course(1e-2 * (k + 1) as f64, column);
@@ -255,7 +255,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
         fs::write(&file, text).unwrap();
         let mut log = of_file(&file);
         log.clock.unit = TimeUnit::PerSecond(second);
-        log.clock.alone = alone;
+        log.clock.breaks = breaks;
         let mut notes = Vec::new();
         log.read(&mut notes).map(|imu| (imu, notes.join("\n")))
     };
@@ -267,32 +267,37 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
         ),
         (&of_day, 1e3, "every 86400 s"),
     ] {
-        for alone in [true, false] {
-            let (imu, notes) = read(stamp, second, alone).unwrap();
+        for breaks in [Breaks::None, Breaks::Settings] {
+            let (imu, notes) = read(stamp, second, breaks).unwrap();
             assert_eq!((imu.len(), imu.stretches.len()), (10_000, 1));
             assert!(notes.contains(said), "{notes}");
         }
     }
-    let paused = |k: usize| 10 * k as u64 + if k < 3000 { 0 } else { 86_400_000 };
-    for (stamp, last, said) in [
-        (
-            &set_back as &dyn Fn(usize) -> u64,
-            7000,
-            "imu.csv, line 7002: time goes from 69.99 s to 5 s: the clock was set",
-        ),
-        (&paused, 3000, "times are taken 86399.01 s earlier."),
-    ] {
-        let (imu, notes) = read(stamp, 1e3, true).unwrap();
-        let samples: Vec<_> = imu.stretches.iter().map(|s| s.samples.clone()).collect();
-        assert_eq!(samples, [0..last, last + 99..10_099]);
-        assert!(notes.contains(said), "{notes}");
+    let (imu, notes) = read(&set_back, 1e3, Breaks::Settings).unwrap();
+    let samples: Vec<_> = imu.stretches.iter().map(|s| s.samples.clone()).collect();
+    assert_eq!(samples, [0..7000, 7099..10_099]);
+    let said = "imu.csv, line 7002: time goes from 69.99 s to 5 s: the clock was set";
+    assert!(notes.contains(said), "{notes}");
+    // However often nothing is recorded for however long, a stretch begins when it does.
+    let paused = |k: usize| 10 * k as u64 + 600_000 * (k / 500) as u64;
+    for breaks in [Breaks::Pauses, Breaks::Settings] {
+        let (imu, notes) = read(&paused, 1e3, breaks).unwrap();
+        assert!(notes.contains("in 19 pause(s)"), "{notes}");
+        assert_eq!(imu.len(), 10_000 + 19 * 99);
+        for (number, stretch) in imu.stretches.iter().enumerate() {
+            let begin = 599 * number;
+            assert_eq!(stretch.samples, begin..begin + 500);
+            assert!((imu.time(begin) - imu.start() - 605.0 * number as f64).abs() < 1e-6);
+            assert!(number == 0 || imu.edge(stretch.start - 100.0) == begin as f64 - 1.0);
+        }
     }
     // Milliseconds of a second are no time.
     let of_second = |k: usize| 10 * (k % 100) as u64;
-    assert!(read(&of_second, 1e3, true).is_err());
+    assert!(read(&of_second, 1e3, Breaks::Settings).is_err());
     // Times of a table or of labels would be of nobody knows which part.
-    assert!(read(&paused, 1e3, false).is_err());
-    let refused = read(&set_back, 1e3, false).unwrap_err().to_string();
+    let refused = read(&set_back, 1e3, Breaks::Pauses)
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("line 7002: found time going back from 69.99 s to 5 s"));
 }
 

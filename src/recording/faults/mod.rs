@@ -1,6 +1,7 @@
 //! What is wrong with a log's rows, and what was done about it.
 
 mod chance;
+mod held;
 mod impossible;
 mod interpolation;
 mod notes;
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
+use held::held;
 pub(crate) use notes::notes;
 pub(crate) use repair::{Repaired, Rows};
 use spikes::spikes;
@@ -170,15 +172,16 @@ fn find(
         &steps,
         limit,
     );
+    let repeats: [stuck::Column; 6] = std::array::from_fn(|k| stuck::Column {
+        values: &columns[k],
+        step: steps[k],
+        pulses,
+    });
     let of_column = |column: usize| {
         let (values, facts) = (&columns[column], &facts[column]);
         let spikes = &spikes[column];
-        let repeats = stuck::Column {
-            values,
-            step: steps[column],
-            pulses,
-        };
-        let stuck = repeats.stuck(limit);
+        let stuck = repeats[column].stuck(limit);
+        let triad = std::array::from_fn(|axis| &repeats[column - column % 3 + axis]);
         let range = saturated::Column {
             values,
             smallest: facts.smallest,
@@ -187,6 +190,7 @@ fn find(
             full_scale: full_scale[column],
             spikes,
             stuck: &stuck,
+            held: held(triad, column % 3, limit),
         };
         let saturated = range.saturated();
         // The row before a run has its value.

@@ -22,6 +22,8 @@ pub(super) struct Column<'a> {
     pub spikes: &'a [usize],
     /// Rows that repeat the one before them.
     pub stuck: &'a [Range<usize>],
+    /// σ of the noise of an axis that the smallest value holds at rest, and the largest.
+    pub held: [Option<f64>; 2],
 }
 
 impl Column<'_> {
@@ -48,8 +50,12 @@ impl Column<'_> {
     /// The ends of the range, if rows are there that only an end explains.
     fn ends(&self) -> Vec<f64> {
         let extremes = [self.smallest, self.largest];
-        let sure = extremes.map(|end| {
-            self.is_register_end(end) || self.is_reached_by_spikes(end) || self.stops_motion(end)
+        let sure: [bool; 2] = std::array::from_fn(|k| {
+            let end = extremes[k];
+            self.held[k].is_some()
+                || self.is_register_end(end)
+                || self.is_reached_by_spikes(end)
+                || self.stops_motion(end)
         });
         // The range is symmetric, but for a step.
         let slack = 1.5 * self.step.unwrap_or(0.0) + 1e-9 * self.largest.abs();
@@ -110,21 +116,44 @@ impl Column<'_> {
             .any(|run| !is_level(self.values, run, self.step.unwrap_or(0.0)))
     }
 
+    /// Rows at an end. Where it is one that holds the axis at rest, with the rows between that noise takes from
+    /// beyond it into the range, for their mean is off; and without those that noise takes to it from within.
     fn rows(&self, is_end: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
-        let mut rows: Vec<Range<usize>> = Vec::new();
+        let noise = self.held.into_iter().flatten().reduce(f64::max);
+        let is_cut = |rows: Range<usize>| {
+            let end = self.values[rows.end];
+            let near = |value: &f64| noise.is_some_and(|sigma| (value - end).abs() <= FAR * sigma);
+            rows.len() <= APART && self.values[rows].iter().all(near)
+        };
+        let mut rows: Vec<(Range<usize>, usize)> = Vec::new();
         for (k, _) in self.values.iter().enumerate().filter(|(_, v)| is_end(**v)) {
             match rows.last_mut() {
-                Some(last) if last.end == k => last.end += 1,
-                _ => rows.push(k..k + 1),
+                Some((last, at_end)) if is_cut(last.end..k) => {
+                    last.end = k + 1;
+                    *at_end += 1;
+                }
+                _ => rows.push((k..k + 1, 1)),
             }
         }
-        rows
+        if noise.is_some() {
+            rows.retain(|(rows, at_end)| *at_end > 1 && SELDOM * at_end >= rows.len());
+        }
+        rows.into_iter().map(|(rows, _)| rows).collect()
     }
 
     fn median(&self) -> Option<f64> {
         median(&mut self.values.to_vec())
     }
 }
+
+/// σ of noise that takes no row so far from where the truth is.
+const FAR: f64 = 5.0;
+/// Noise that takes one row in so many to an end takes the mean from the truth by less than the hundredth part of its
+/// σ, where it is cut off there.
+const SELDOM: usize = 64;
+/// Rows between two at an end. Were it fewer, chance would part rows that are SELDOM apart on average, and what is left
+/// of noise would be chosen by its sign.
+const APART: usize = 8 * SELDOM;
 
 /// Rows beside a run whose mean is compared with it.
 const BESIDE: usize = 16;
@@ -162,6 +191,7 @@ mod tests {
         let column = Column {
             spikes: &spikes,
             stuck: &[],
+            held: [None; 2],
             values,
             smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
             largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),

@@ -8,6 +8,7 @@ use statrs::function::erf::erf;
 use super::chance::Limit;
 
 /// What repeats of a column are judged by.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Column<'a> {
     pub values: &'a [f64],
     /// What values differ by at least; zero if they are all the same.
@@ -41,7 +42,8 @@ impl Column<'_> {
         if self.step <= 0.0 {
             return Vec::new();
         }
-        let by_noise = limit.nats / self.repeat_probability().recip().ln();
+        let probability = self.repeat_probability(self.noise_at_rest(self.blocks()));
+        let by_noise = limit.nats / probability.recip().ln();
         let mut stuck = runs(self.values);
         stuck.retain(|run| {
             run.len() as f64 > by_noise
@@ -53,7 +55,7 @@ impl Column<'_> {
 }
 
 /// Stretches of rows each equal to the one before.
-fn runs(column: &[f64]) -> Vec<Range<usize>> {
+pub(super) fn runs(column: &[f64]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut start = 1;
     for k in 1..=column.len() {
@@ -68,13 +70,18 @@ fn runs(column: &[f64]) -> Vec<Range<usize>> {
 }
 
 impl Column<'_> {
-    /// The largest probability that a sample repeats the one before, wherever the true value lies.
+    /// Rows in which noise is measured.
+    pub fn blocks(&self) -> impl Iterator<Item = &[f64]> {
+        self.values.chunks_exact(BLOCK)
+    }
+
+    /// The largest probability that a sample repeats the one before, wherever the true value lies, with white
+    /// noise of this variance, steps².
     ///
     /// By the noise at rest a value stays within its step most probably if the truth is in the middle
     /// of it (Anderson's inequality). Noise that is correlated stays longer; it shows in how often
     /// repeats are repeated.
-    fn repeat_probability(&self) -> f64 {
-        let variance = self.noise_at_rest();
+    pub fn repeat_probability(&self, variance: f64) -> f64 {
         let white = erf((8.0 * variance).sqrt().recip());
         // Pulses count an angle that walks: it stays between two edges of a step with the largest
         // eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
@@ -89,7 +96,7 @@ impl Column<'_> {
 
     /// Variance of white noise that the axis always has, steps², not more than it is: what the grid can
     /// make of a slow motion without noise is taken off.
-    fn noise_at_rest(&self) -> f64 {
+    pub fn noise_at_rest<'b>(&self, blocks: impl Iterator<Item = &'b [f64]>) -> f64 {
         let origin = self.values[0];
         let of_block = |block: &[f64]| {
             let (mean, slope, variance) = line(block);
@@ -100,7 +107,7 @@ impl Column<'_> {
             let fraction = 0.5 - nearest.max(0.0);
             variance / self.step.powi(2) - self.of_grid().max(fraction * (1.0 - fraction))
         };
-        let mut variances: Vec<f64> = self.values.chunks_exact(BLOCK).map(of_block).collect();
+        let mut variances: Vec<f64> = blocks.map(of_block).collect();
         if variances.is_empty() {
             return 0.0;
         }

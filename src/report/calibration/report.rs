@@ -74,7 +74,7 @@ impl Report<'_> {
     /// Begin and end of the record, s.
     pub(super) fn time_span(&self) -> (f64, f64) {
         let imu = &self.run.recording.imu;
-        (imu.start(), imu.start() + imu.duration())
+        (imu.start(), imu.end())
     }
 
     /// Both methods that ran, the closed form first.

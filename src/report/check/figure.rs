@@ -54,7 +54,7 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
         .iter()
         .fold(0.0, |low: f64, sample| low.min(sample.min()));
     let foot = lowest / imu.period / unit;
-    let x = Axis::linear("time, s").between(imu.start(), imu.start() + imu.duration());
+    let x = Axis::linear("time, s").between(imu.start(), imu.end());
     let y = Axis::linear("").including([0.0]).room(0.1, 0.3);
     Panel::new(title, x, y)
         .shaded(&dwells)

@@ -145,7 +145,7 @@ impl Filter {
     }
 
     /// Varying biases forget as time goes by, and are driven.
-    fn vary(&mut self, duration: f64) {
+    pub(super) fn vary(&mut self, duration: f64) {
         for &(state, sigma, correlation_time) in &self.varying {
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;

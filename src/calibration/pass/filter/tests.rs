@@ -40,7 +40,12 @@ fn filter() -> Filter {
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, Some((&Difference::default(), None)), None);
+    filter.begin(
+        &start,
+        5e-6,
+        Since::Anew(&Difference::default(), None),
+        None,
+    );
     assert_eq!(filter.layout.size(), STATES);
     filter
 }
@@ -170,7 +175,12 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
         velocity_sigma: 1e-3,
         position_sigma: 1.0,
     };
-    filter.begin(&start, 5e-6, Some((&Difference::default(), None)), None);
+    filter.begin(
+        &start,
+        5e-6,
+        Since::Anew(&Difference::default(), None),
+        None,
+    );
     let varying: Vec<usize> = filter.layout.varying_biases().map(|(s, ..)| s).collect();
     assert_eq!(varying.len(), 6);
     for k in 0..5 {
@@ -190,6 +200,16 @@ fn a_varying_bias_does_what_the_constant_one_does_and_forgets() {
     }
     // Without observations of it a stationary process stays as uncertain as it was.
     assert!(filter.p[(varying[0], varying[0])] <= sigma.powi(2));
+
+    // While nothing is known it goes on.
+    let state = varying[0];
+    let (constant, _) = filter.layout.parameters().next().unwrap();
+    let (before, across) = (filter.p[(state, state)], filter.p[(state, constant)]);
+    filter.begin(&start, 5e-6, Since::Lost(2.0 * CORRELATION_TIME), None);
+    let keep = (-2.0f64).exp();
+    let expected = before * keep.powi(2) + sigma.powi(2) * (1.0 - keep.powi(2));
+    assert_relative_eq!(filter.p[(state, state)], expected, max_relative = 1e-12);
+    assert_relative_eq!(filter.p[(state, constant)], across * keep);
 }
 
 #[test]
@@ -410,7 +430,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         filter.begin(
             &start,
             model.position_sigma,
-            Some((&Difference::default(), None)),
+            Since::Anew(&Difference::default(), None),
             None,
         );
         let at = State::at_rest(Matrix3::identity());
