@@ -199,34 +199,29 @@ impl Calibrate {
         // What was found in the files may be why.
         let mut solution = solve(problem, self.estimation.method.into(), &activity)
             .inspect_err(|_| say(&run.recording.notes))?;
-        let Calibrated {
-            calibration,
-            document,
-            converged,
-        } = Calibrated::new(
-            (problem, name),
-            &mut solution,
-            self.estimation.method,
-            truth.as_ref(),
-        )?
-        .of_files(path);
+        let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path);
         activity.next("writing");
-        if let Some(directory) = directory {
+        // Standard output alone, as JSON, takes no report.
+        let document = (directory.is_some() || !self.json).then(|| {
+            let method = self.estimation.method;
+            calibrated.document((problem, name), &solution, method, truth.as_ref())
+        });
+        let calibration = calibrated.calibration;
+        if let (Some(directory), Some(document)) = (directory, &document) {
             calibration.write(&directory.path().join("calibration.json"), false)?;
-            write_report(&document, &directory.path().join("report"))?;
+            write_report(document, &directory.path().join("report"))?;
             directory.commit()?;
         }
         drop(activity);
-        if self.json {
-            print(&calibration.to_json(Path::new("standard output"))?)?;
-        } else {
-            show(&document, false)?;
+        match &document {
+            Some(document) if !self.json => show(document, false)?,
+            _ => print(&calibration.to_json(Path::new("standard output"))?)?,
         }
         if let Some(target) = target.filter(|_| !self.json) {
             let page = target.join("report").join("index.html");
             eprintln!("\nreport: {}", printable(&page.display().to_string()));
         }
-        if !converged {
+        if !solution.converged() {
             bail!("{name}: not converged; values and σ may not be used, see the findings");
         }
         if !solution.is_usable() {

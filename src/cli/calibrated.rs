@@ -8,7 +8,8 @@ use anyhow::{Context, bail};
 use rayon::prelude::*;
 use turncal::calibration::result::{InputFile, TermRecord};
 use turncal::calibration::{
-    Calibration, ClosedForm, Estimate, Problem, Reference, Solution, in_body_frame, triads_of,
+    Assessment, Calibration, ClosedForm, Estimate, Problem, Reference, Solution, in_body_frame,
+    triads_of,
 };
 use turncal::formats::input_digests;
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
@@ -25,31 +26,45 @@ pub struct Truth {
     terms: BTreeMap<String, TermRecord>,
 }
 
-/// A calibration and its report.
+/// A calibration with what was said of it.
 pub struct Calibrated {
     pub calibration: Calibration,
-    pub document: Document,
-    pub converged: bool,
+    assessment: Assessment,
 }
 
 impl Calibrated {
     /// Judges a solution and says what it is worth.
-    pub fn new(
+    pub fn new(problem: &Problem, solution: &mut Solution) -> anyhow::Result<Self> {
+        let assessment = solution.assess(problem)?;
+        Ok(Self {
+            calibration: solution.calibration(problem, &assessment),
+            assessment,
+        })
+    }
+
+    /// With the files that a run.toml or campaign.toml names.
+    pub fn of_files(mut self, path: &Path) -> Self {
+        stamp(&mut self.calibration, path);
+        self
+    }
+
+    /// The report on it.
+    pub fn document(
+        &self,
         (problem, name): (&Problem, &str),
-        solution: &mut Solution,
+        solution: &Solution,
         method: Method,
         truth: Option<&Truth>,
-    ) -> anyhow::Result<Self> {
+    ) -> Document {
         let run = problem.run();
         let method = match method {
             Method::Ekf => "EKF",
             Method::SixPosition => "closed form",
         };
+        let assessment = &self.assessment;
         let triads = truth.map(|truth| &truth.triads);
-        let assessment = solution.assess(problem)?;
         let navigation = navigate(run, &[(method, solution.estimate())], triads);
-        let calibration = solution.calibration(problem, &assessment);
-        let findings = solution.findings(&assessment);
+        let findings = solution.findings(assessment);
         let note = solution.closed_form().map(note).unwrap_or_default();
         let dwells = dwell_times(problem);
         let form = solution.estimate().form();
@@ -60,7 +75,7 @@ impl Calibrated {
             title: name,
             run,
             aiding: problem.model.aiding,
-            body_frame: calibration.body_frame,
+            body_frame: self.calibration.body_frame,
             outcome: solution.outcome(),
             findings: &findings,
             effects: &assessment.error_terms,
@@ -77,19 +92,7 @@ impl Calibrated {
             dwells: &dwells,
             navigation: navigation.as_deref(),
         };
-        Ok(Self {
-            document: report.document(),
-            converged: solution.converged(),
-            calibration,
-        })
-    }
-}
-
-impl Calibrated {
-    /// With the files that a run.toml or campaign.toml names.
-    pub fn of_files(mut self, path: &Path) -> Self {
-        stamp(&mut self.calibration, path);
-        self
+        report.document()
     }
 }
 

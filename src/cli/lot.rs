@@ -134,12 +134,10 @@ impl Request<'_> {
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
         let mut solution = problem.solve(method.into(), &|_| {})?;
-        let Calibrated {
-            calibration,
-            document,
-            ..
-        } = Calibrated::new((&problem, &run.recording.name), &mut solution, method, None)?
-            .of_files(path);
+        let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path);
+        let document =
+            calibrated.document((&problem, &run.recording.name), &solution, method, None);
+        let calibration = calibrated.calibration;
         // What cannot be written is no calibration.
         calibration.to_json(path)?;
         let dwells: Vec<_> = problem

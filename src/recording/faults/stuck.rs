@@ -240,6 +240,29 @@ impl Column<'_> {
         let after = run.end..run.end + points;
         self.values.get(after.clone())?;
         let in_steps = |k: usize| (self.values[k] - value) / self.step;
+        let (count, length) = (points as f64, run.len() as f64);
+        // Each side by itself must lead away from the run's value, to where the cubic is. Few sides of a sound
+        // axis do, and a line costs least.
+        let apart = 0.5 * (count + length);
+        let led = |rows: Range<usize>, forth: f64| {
+            let values: Vec<f64> = rows.map(in_steps).collect();
+            let (mean, slope, variance) = line(&values);
+            let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
+            let lost = length * (mean + forth * slope * apart);
+            (lost, variance.max(self.of_grid()) * spread)
+        };
+        let led = [led(before.clone(), 1.0), led(after.clone(), -1.0)];
+        // In steps, what rounding and what the lines and the cubic leave over allow.
+        let is_lost = |lost: f64, variance: f64, noise: f64| {
+            lost > 2.0 + limit.sigmas * (variance * length * length + noise * length).sqrt()
+        };
+        let sign = led[0].0.signum();
+        if !led
+            .iter()
+            .all(|&(lost, variance)| is_lost(lost * sign, variance, 0.0))
+        {
+            return Some(false);
+        }
         let middle = 0.5 * (run.start + run.end) as f64;
         let scale = (points as f64 + 0.5 * run.len() as f64).recip();
         let time = |k: usize| (k as f64 - middle) * scale;
@@ -273,26 +296,8 @@ impl Column<'_> {
             + fit(&after.clone().collect::<Vec<_>>(), starts, in_steps)?.1;
         let ratio = points as f64 * (stopped.max(rounding) / crossed).ln();
         let noise = crossed / sides.len() as f64;
-        // In steps, what rounding and what the cubic leaves over allow.
-        let length = run.len() as f64;
-        let is_lost = |lost: f64, variance: f64| {
-            lost > 2.0 + limit.sigmas * (variance * length * length + noise * length).sqrt()
-        };
-        // Each side by itself must lead away from the run's value, to where the cubic is.
-        let count = points as f64;
-        let apart = 0.5 * (count + length);
-        let leads = |values: Vec<f64>, forth: f64| {
-            let (mean, slope, variance) = line(&values);
-            let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
-            let lost = length * (mean + forth * slope * apart) * lost.signum();
-            is_lost(lost, variance.max(self.of_grid()) * spread)
-        };
-        Some(
-            ratio > limit.nats
-                && is_lost(lost.abs(), 0.0)
-                && leads(before.map(in_steps).collect(), 1.0)
-                && leads(after.map(in_steps).collect(), -1.0),
-        )
+        let mut all = led.into_iter().chain([(lost, 0.0)]);
+        Some(ratio > limit.nats && all.all(|(lost, of)| is_lost(lost * sign, of, noise)))
     }
 }
 
