@@ -17,13 +17,13 @@ use super::error_term::ErrorTerm;
 use super::finding::Finding;
 use super::group::Group;
 use super::outcome::Outcome;
-use super::parameters::{PARAMETERS, ParameterVector};
+use super::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
 use super::pass::PassResult;
 use super::problem::Problem;
 use evidence::ln_survival;
-use joint::{Fit, Joint, once_more};
+use joint::{Explanation, Fit, Joint, once_more};
 pub use left_off::LeftOff;
-pub use seen::seen_and_left_off;
+use seen::seen_and_left_off;
 pub use unseen::unseen_variation;
 
 /// An error term against the same calibration without it.
@@ -103,7 +103,8 @@ impl ErrorTermTest {
     }
 }
 
-/// The effect of every error term that the runs of a problem can hold.
+/// The effect of every error term that the runs of a problem can hold, and what the covariance of the estimate lacks
+/// for those that are not estimated and for which the data speak.
 ///
 /// Where the noise was learnt, terms are tried with the stated noise, too: errors that are not modelled
 /// look like noise to a fit of noise alone. One that explains more than the learnt noise does is the cause.
@@ -117,15 +118,18 @@ impl ErrorTermTest {
 pub fn test_error_terms(
     problem: &Problem,
     outcome: &Outcome,
-) -> Result<Vec<ErrorTermTest>, CalibrationError> {
+) -> Result<(Vec<ErrorTermTest>, Option<ParameterMatrix>), CalibrationError> {
+    let of_record = Tested::new(&outcome.with_noise(problem), outcome)?;
     if outcome.noise.learnt {
-        let stated = tests(problem, outcome)?;
-        let likeliest = stated.iter().find(|test| test.role == Role::Likeliest);
+        let stated = Tested::new(problem, outcome)?;
+        let likeliest = stated.tests.iter().find(|t| t.role == Role::Likeliest);
         if likeliest.is_some_and(|test| test.significance > significance_of_noise(outcome)) {
-            return Ok(stated);
+            let left_off = of_record.left_off(&stated);
+            return Ok((stated.tests, left_off));
         }
     }
-    tests(&outcome.with_noise(problem), outcome)
+    let left_off = of_record.left_off(&of_record);
+    Ok((of_record.tests, left_off))
 }
 
 /// −2 ln of the chance that stated noise which is right gives as much to the learnt one.
@@ -135,79 +139,134 @@ fn significance_of_noise(outcome: &Outcome) -> f64 {
     -2.0 * ln_survival(noise.sources.len().max(1) as f64, ratio)
 }
 
-fn tests(problem: &Problem, outcome: &Outcome) -> Result<Vec<ErrorTermTest>, CalibrationError> {
-    let model = &problem.model;
-    let scalars = 3.0 * outcome.innovations.len() as f64;
-    let varying = ErrorTerm::GaussMarkovBias;
-    let mut otherwise = model.clone();
-    if model.has(varying) {
-        otherwise.switch_off(varying);
-    } else {
-        otherwise.switch_on(varying);
-    }
-    let (joint, otherwise) = rayon::join(
-        || Joint::new(problem, outcome),
-        || once_more(&problem.with_model(otherwise), outcome, &[]),
-    );
-    let (joint, otherwise) = (joint?, otherwise?);
-    let tried = ErrorTerm::ALL
-        .into_iter()
-        .filter(|&term| model.can_have(term));
-    let tried: Vec<ErrorTerm> = tried.collect();
-    let off = tried.iter().filter(|&&term| !model.has(term)).count();
-    let chance = FALSE_ALARM / off.max(1) as f64;
-    let test = |term: ErrorTerm, with: &Fit, without: &Fit| ErrorTermTest {
-        term,
-        on: model.has(term),
-        sigma_factors: sigma_factors(&with.variance, &without.variance),
-        gain: without.cost - with.cost,
-        limit: f64::INFINITY,
-        significance: 0.0,
-        role: Role::None,
-        without: without.cost / scalars,
-        with: with.cost / scalars,
-        left_off: None,
-    };
-    let own = Fit::of(&joint.own);
-    let of_constant = |term: ErrorTerm| {
-        let (with, without, evidence) = if model.has(term) {
-            let (without, evidence) = joint.without(term)?;
-            (Fit::of(&joint.own), without, evidence)
+/// All terms with one noise.
+struct Tested {
+    tests: Vec<ErrorTermTest>,
+    joint: Joint,
+    /// Biases that vary, where they are off.
+    varying: Option<Explanation>,
+}
+
+impl Tested {
+    fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
+        let model = &problem.model;
+        let scalars = 3.0 * outcome.innovations.len() as f64;
+        let varying = ErrorTerm::GaussMarkovBias;
+        let mut otherwise = model.clone();
+        if model.has(varying) {
+            otherwise.switch_off(varying);
         } else {
-            let evidence = joint.evidence(term, &[])?;
-            (joint.with(&[term])?, Fit::of(&joint.own), evidence)
-        };
-        Some(ErrorTermTest {
-            limit: evidence.limit(chance),
-            significance: evidence.significance(),
-            left_off: joint.left_off(term).filter(|_| !model.has(term)),
-            ..test(term, &with, &without)
-        })
-    };
-    let of_varying = || {
-        let deviance = |result: &PassResult| result.cost + result.log_determinant;
-        let change = deviance(&joint.own) - deviance(&otherwise);
-        let otherwise = Fit::of(&otherwise);
-        let (with, without, gain) = match model.has(varying) {
-            true => (&own, &otherwise, -change),
-            false => (&otherwise, &own, change),
-        };
-        ErrorTermTest {
-            gain,
-            limit: -2.0 * chance.ln(),
-            significance: gain,
-            ..test(varying, with, without)
+            otherwise.switch_on(varying);
         }
-    };
-    let mut tests: Vec<ErrorTermTest> = tried
-        .into_iter()
-        .filter_map(|term| match term {
-            ErrorTerm::GaussMarkovBias => Some(of_varying()),
-            _ => of_constant(term),
+        let (joint, otherwise) = rayon::join(
+            || Joint::new(problem, outcome),
+            || once_more(&problem.with_model(otherwise), outcome, &[]),
+        );
+        let (joint, otherwise) = (joint?, otherwise?);
+        let tried = ErrorTerm::ALL
+            .into_iter()
+            .filter(|&term| model.can_have(term));
+        let tried: Vec<ErrorTerm> = tried.collect();
+        let off = tried.iter().filter(|&&term| !model.has(term)).count();
+        let chance = FALSE_ALARM / off.max(1) as f64;
+        let test = |term: ErrorTerm, with: &Fit, without: &Fit| ErrorTermTest {
+            term,
+            on: model.has(term),
+            sigma_factors: sigma_factors(&with.variance, &without.variance),
+            gain: without.cost - with.cost,
+            limit: f64::INFINITY,
+            significance: 0.0,
+            role: Role::None,
+            without: without.cost / scalars,
+            with: with.cost / scalars,
+            left_off: None,
+        };
+        let own = Fit::of(&joint.own);
+        let deviance = |result: &PassResult| result.cost + result.log_determinant;
+        let deviance_falls = deviance(&joint.own) - deviance(&otherwise);
+        let of_constant = |term: ErrorTerm| {
+            let (with, without, evidence) = if model.has(term) {
+                let (without, evidence) = joint.without(term)?;
+                (Fit::of(&joint.own), without, evidence)
+            } else {
+                let evidence = joint.evidence(term, &[])?;
+                (joint.with(&[term])?, Fit::of(&joint.own), evidence)
+            };
+            Some(ErrorTermTest {
+                limit: evidence.limit(chance),
+                significance: evidence.significance(),
+                left_off: joint.left_off(term).filter(|_| !model.has(term)),
+                ..test(term, &with, &without)
+            })
+        };
+        let of_varying = || {
+            let otherwise = Fit::of(&otherwise);
+            let (with, without, gain) = match model.has(varying) {
+                true => (&own, &otherwise, -deviance_falls),
+                false => (&otherwise, &own, deviance_falls),
+            };
+            ErrorTermTest {
+                gain,
+                limit: -2.0 * chance.ln(),
+                significance: gain,
+                ..test(varying, with, without)
+            }
+        };
+        let mut tests: Vec<ErrorTermTest> = tried
+            .into_iter()
+            .filter_map(|term| match term {
+                ErrorTerm::GaussMarkovBias => Some(of_varying()),
+                _ => of_constant(term),
+            })
+            .collect();
+        decide(&mut tests, &joint, chance);
+        let varying = (!model.has(varying)).then(|| {
+            let gain = 0.5 * deviance_falls;
+            Explanation {
+                ln_likelihood_ratio: gain,
+                of_term: gain,
+                added: otherwise.added_to(&joint.own),
+            }
+        });
+        Ok(Self {
+            tests,
+            joint,
+            varying,
         })
-        .collect();
-    decide(&mut tests, &joint, chance);
-    Ok(tests)
+    }
+
+    /// What the covariance of the estimate lacks for terms that are off. How likely each is, and what is there
+    /// beside it, may be told by a test with another noise.
+    fn left_off(&self, told_by: &Self) -> Option<ParameterMatrix> {
+        let off = told_by.tests.iter().filter(|test| !test.on);
+        let off: Vec<ErrorTerm> = off.map(|test| test.term).collect();
+        let further = told_by
+            .tests
+            .iter()
+            .filter(|test| test.role == Role::Further);
+        let further: Vec<ErrorTerm> = further.map(|test| test.term).collect();
+        let explanations = off.iter().filter_map(|&term| {
+            let beside: Vec<ErrorTerm> = further.iter().copied().filter(|&f| f != term).collect();
+            let told = told_by.explanation(term, &beside)?;
+            let added = self.explanation(term, &beside)?.added;
+            Some(Explanation { added, ..told })
+        });
+        let explanations: Vec<Explanation> = explanations.collect();
+        seen_and_left_off(&explanations, off.len())
+    }
+
+    fn explanation(&self, term: ErrorTerm, beside: &[ErrorTerm]) -> Option<Explanation> {
+        match term {
+            ErrorTerm::GaussMarkovBias => {
+                let varying = self.varying.as_ref()?;
+                Some(Explanation {
+                    added: varying.added + self.joint.effect(beside)?,
+                    ..*varying
+                })
+            }
+            _ => self.joint.explanation(term, beside),
+        }
+    }
 }
 
 /// Gives each test its role: the likeliest explanation first, then what is left once it is on, and so on
@@ -273,7 +332,7 @@ mod tests {
         let run = scenario.simulate(23, 0).unwrap().run;
         let problem = Problem::new(&run, &Options::default());
         let outcome = estimate(&problem, &|_| {}).unwrap();
-        let tests = test_error_terms(&problem, &outcome).unwrap();
+        let (tests, _) = test_error_terms(&problem, &outcome).unwrap();
         let with = Fit::of(&once_more(&problem, &outcome, &[]).unwrap());
         for term in [
             order,

@@ -1,13 +1,16 @@
 //! The estimator: coarse start, with a table a pass with feedback, and Gauss–Newton iterations with the
 //! linearisation held until nothing moves.
 
+use std::collections::BTreeMap;
+
 use super::alone::Alone;
 use super::attempt::{Attempt, Progress, from_coarse_start};
 use super::auxiliary::auxiliary_name;
+use super::budget::BudgetSource;
 use super::curvature::curvature;
 use super::dwell_scatter::DwellScores;
 use super::error::CalibrationError;
-use super::estimate::{Estimate, largest_growth};
+use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
 use super::innovation::{consistency, inconsistencies};
@@ -77,6 +80,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             converged,
         },
         report,
+        of_other_noise,
     } = match is_no_noise {
         true => Learnt::stated(problem, iterated),
         false => {
@@ -95,22 +99,16 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
     let by_scatter = scores.as_ref().and_then(DwellScores::widened);
-    let covariance_by_noise = estimated(&held).covariance + by_headings;
-    if let Some(widened) = &by_scatter {
-        held.widen(&Layout::new(&problem.model), widened);
-    }
-    let mut estimate = estimated(&held);
-    estimate.covariance += by_headings;
-    let growth = by_scatter.map(|_| {
-        let variances = [&covariance_by_noise, &estimate.covariance].map(|c| c.diagonal());
-        largest_growth(variances[0].as_slice(), variances[1].as_slice())
+    let estimate = estimated(&held);
+    let scattered = by_scatter.map(|widened| {
+        held.widen(&Layout::new(&problem.model), &widened);
+        estimated(&held).covariance - estimate.covariance
     });
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {
         return Err(singular(&estimate.triads));
     }
-    let covariance_by_rounding = by_rounding(problem, &estimate.triads);
-    estimate.covariance += covariance_by_rounding;
+    let rounding = by_rounding(problem, &estimate.triads);
     let model = &problem.model;
     let mut outcome = Outcome {
         form_test,
@@ -120,12 +118,9 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             &stated.model.prior_sigma,
             &held.attitude_covariance,
         ),
+        covariance_by_noise: estimate.covariance,
         estimate,
-        covariance_by_noise,
-        covariance_by_headings: by_headings,
-        covariance_by_rounding,
-        covariance_by_error_terms: ParameterMatrix::zeros(),
-        covariance_by_variation: ParameterMatrix::zeros(),
+        beside: BTreeMap::new(),
         prior_sigma: stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: priors,
@@ -156,9 +151,18 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         passes,
         findings: Vec::new(),
     };
+    outcome.set_part(BudgetSource::Headings, by_headings);
+    if let Some(scattered) = scattered {
+        outcome.set_part(BudgetSource::DwellScatter, scattered);
+    }
+    let growth = outcome.growth_by(BudgetSource::DwellScatter);
+    outcome.set_part(BudgetSource::Rounding, rounding);
+    if let Some(of_other_noise) = of_other_noise {
+        outcome.set_part(BudgetSource::LearntNoise, of_other_noise);
+    }
     outcome.findings = findings(stated, &outcome);
     outcome.findings.extend(of_recordings);
-    if let Some((scatter, growth)) = outcome.dwell_scatter.zip(growth) {
+    if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
         outcome.findings.push(Finding::DwellsScatter {
             mean: scatter.mean,
             limit: scatter.limit,
@@ -225,7 +229,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     let covariance = &outcome.estimate.covariance;
     findings.extend(rounded(
         problem,
-        &outcome.covariance_by_rounding,
+        &outcome.part(BudgetSource::Rounding),
         covariance,
     ));
     findings.extend(far_from_prior(&problem.model, &outcome.estimate));

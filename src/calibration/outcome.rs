@@ -1,9 +1,12 @@
 //! What the filter says of a run: an estimate with its covariance, and how it was reached.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 
 use super::alone::Alone;
 use super::auxiliary::Auxiliary;
+use super::budget::BudgetSource;
 use super::dwell_scatter::DwellScatter;
 use super::estimate::{Estimate, largest_growth};
 use super::finding::Finding;
@@ -27,19 +30,11 @@ const HEADING_SEEN: f64 = 6.0;
 pub struct Outcome {
     /// The estimate after the last pass.
     pub estimate: Estimate,
-    /// Covariance of the parameters by noise, prior and headings alone; that of the estimate is larger where dwells
-    /// scatter more.
+    /// Covariance of the parameters by noise and prior alone, as the last pass has it.
     pub covariance_by_noise: ParameterMatrix,
-    /// What of that comes from headings that the data do not tell apart; zero where Earth rate or a table does.
-    pub covariance_by_headings: ParameterMatrix,
-    /// What rates leave open that are rounded to steps wider than their noise, beside that.
-    pub covariance_by_rounding: ParameterMatrix,
-    /// What error terms that the data show, and that are not estimated, add to the covariance of the
-    /// estimate; see [`crate::calibration::Solution::assess`].
-    pub covariance_by_error_terms: ParameterMatrix,
-    /// What biases add to it that may vary though the noise learnt from the record does not hold that; see
-    /// [`crate::calibration::Solution::assess`].
-    pub covariance_by_variation: ParameterMatrix,
+    /// What the covariance of the estimate has beside that, each part by what it is of; see
+    /// [`crate::calibration::Solution::assess`] for those that come later.
+    pub beside: BTreeMap<BudgetSource, ParameterMatrix>,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
@@ -123,22 +118,21 @@ impl Outcome {
         problem.with_model(problem.model.with_noise_of(&self.model))
     }
 
-    /// Adds to the covariance of the estimate what error terms do that are left off.
-    pub(super) fn widen(&mut self, by_error_terms: ParameterMatrix) {
-        self.estimate.covariance += by_error_terms - self.covariance_by_error_terms;
-        self.covariance_by_error_terms = by_error_terms;
+    /// A part of the covariance of the estimate that no pass knows of; zero where there is none of it.
+    pub fn part(&self, source: BudgetSource) -> ParameterMatrix {
+        self.beside.get(&source).copied().unwrap_or_default()
     }
 
-    /// Adds to the covariance of the estimate what biases do that may vary unseen.
-    pub(super) fn widen_by_variation(&mut self, by_variation: ParameterMatrix) {
-        self.estimate.covariance += by_variation - self.covariance_by_variation;
-        self.covariance_by_variation = by_variation;
+    /// Adds such a part to the covariance of the estimate, in the place of what it had of it.
+    pub(super) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
+        self.estimate.covariance += part - self.part(source);
+        self.beside.insert(source, part);
     }
 
-    /// How many times larger the σ of a parameter are, at most, for this part of their covariance.
-    pub(super) fn growth_by(&self, part: &ParameterMatrix) -> f64 {
+    /// How many times larger the σ of a parameter are, at most, for such a part.
+    pub(super) fn growth_by(&self, source: BudgetSource) -> f64 {
         let with = self.estimate.covariance;
-        let without = with - part;
+        let without = with - self.part(source);
         let variances = [without, with].map(|covariance| covariance.diagonal());
         largest_growth(variances[0].as_slice(), variances[1].as_slice())
     }

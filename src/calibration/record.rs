@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::at_rest::AtRest;
 use super::auxiliary::{Auxiliary, auxiliary_name};
-use super::budget::Budget;
+use super::budget::{Budget, BudgetSource};
 use super::closed_form::ClosedForm;
 use super::error_term_test::ErrorTermTest;
 use super::estimate::Estimate;
@@ -40,10 +40,10 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 impl Outcome {
     /// Its findings with those that come of the tests of error terms and of what these add to its covariance.
     pub(super) fn findings_with(&self, tests: &[ErrorTermTest]) -> Vec<Finding> {
-        let growth = self.growth_by(&self.covariance_by_variation);
+        let growth = self.growth_by(BudgetSource::UnseenVariation);
         // What rounds to once as large says nothing.
         let may_vary = (growth >= 1.05).then_some(Finding::BiasesMayVary { growth });
-        let left_off = self.growth_by(&self.covariance_by_error_terms);
+        let left_off = self.growth_by(BudgetSource::ErrorTermsLeftOff);
         let shown = ErrorTermTest::most_significant(tests, Some(left_off));
         let findings = self.findings.iter().cloned();
         findings.chain(may_vary).chain(shown).collect()

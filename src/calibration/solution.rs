@@ -4,9 +4,7 @@ use super::attempt::Progress;
 use super::budget::{Budget, BudgetSource};
 use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
-use super::error_term_test::{
-    ErrorTermTest, seen_and_left_off, test_error_terms, unseen_variation,
-};
+use super::error_term_test::{ErrorTermTest, test_error_terms, unseen_variation};
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::gauss_newton::estimate;
@@ -145,20 +143,21 @@ impl Solution {
                     || test_error_terms(problem, outcome),
                     || (outcome.quality(problem), Budget::new(problem, outcome)),
                 );
-                let error_terms = match error_terms {
+                let (error_terms, left_off) = match error_terms {
                     // Where the iterations ended without convergence there may be nothing to test.
-                    Err(_) if !outcome.converged => Vec::new(),
+                    Err(_) if !outcome.converged => (Vec::new(), None),
                     tests => tests?,
                 };
                 // A calibration is one without its budget, too.
                 let mut budget = budget.ok();
-                if let Some(left_off) = seen_and_left_off(problem, outcome, &error_terms)? {
-                    outcome.widen(left_off);
-                    budget = budget.map(|b| b.and(BudgetSource::ErrorTermsLeftOff, left_off));
-                }
-                if let Some(variation) = unseen_variation(problem, outcome, &error_terms)? {
-                    outcome.widen_by_variation(variation);
-                    budget = budget.map(|b| b.and(BudgetSource::UnseenVariation, variation));
+                let variation = unseen_variation(problem, outcome, &error_terms)?;
+                for (source, part) in [
+                    (BudgetSource::ErrorTermsLeftOff, left_off),
+                    (BudgetSource::UnseenVariation, variation),
+                ] {
+                    let Some(part) = part else { continue };
+                    outcome.set_part(source, part);
+                    budget = budget.map(|budget| budget.and(source, part));
                 }
                 Ok(Assessment {
                     error_terms,

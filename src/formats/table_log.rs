@@ -21,33 +21,40 @@ const NORM_TOLERANCE: f64 = 1e-4;
 /// No clocks of one run are further apart, ms.
 const MINUTE_MS: f64 = 60_000.0;
 
+/// What axes are called by which a table turns when all its angles are zero.
+pub(super) const LETTERS: [(&str, Vector3<f64>); 3] = [
+    ("x", Vector3::new(1.0, 0.0, 0.0)),
+    ("y", Vector3::new(0.0, 1.0, 0.0)),
+    ("z", Vector3::new(0.0, 0.0, 1.0)),
+];
 /// Keys of the 1σ of errors of the axes, in the order of [`AxisError::ALL`].
-const AXIS_KEYS: [&str; AxisError::ALL.len()] = [
+pub(super) const AXIS_KEYS: [&str; AxisError::ALL.len()] = [
     "nonorthogonality_sigma_arcsec",
     "wobble_sigma_arcsec",
     "encoder_sigma_arcsec",
 ];
 
-/// How a row gives `C_b_n`; `C` is a column's name or its index.
-pub(super) enum AttitudeColumns<C> {
+/// How a row gives `C_b_n`, and where the table's axes stand; `C` is a column's name or its index.
+pub(super) struct AttitudeColumns<C> {
     /// `[w, x, y, z]`, body right-front-up to East-North-Up.
-    Quaternion([C; 4]),
-    /// Angles in degrees about the axes of the table, outermost first:
+    quaternion: Option<[C; 4]>,
+    /// Angles in degrees about the axes of the table, outermost first. Without a quaternion the attitude is
     /// `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃, inner)`.
-    Angles(Vec<(C, Vector3<f64>)>),
+    angles: Vec<(C, Vector3<f64>)>,
 }
 
 impl<'a> AttitudeColumns<&'a str> {
     fn of_fields(table: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, FileError> {
         let axes = table.get("axes").or_else(|| columns.get("axes"));
-        match (columns.get("quaternion"), columns.get("angles"), axes) {
-            (Some(quaternion), None, None) => {
-                let names = quaternion.texts()?.try_into().map_err(|_| {
-                    quaternion.error("four columns, in the order w, x, y, z", "Name all four.")
-                })?;
-                Ok(Self::Quaternion(names))
-            }
-            (None, Some(angles), Some(axes)) => {
+        let quaternion = columns.get("quaternion").map(|quaternion| {
+            let names = quaternion.texts()?.try_into();
+            names.map_err(|_| {
+                quaternion.error("four columns, in the order w, x, y, z", "Name all four.")
+            })
+        });
+        let quaternion = quaternion.transpose()?;
+        let angles = match (columns.get("angles"), axes) {
+            (Some(angles), Some(axes)) => {
                 let names = angles.texts()?;
                 let letters = axes.texts()?;
                 if names.is_empty() || names.len() != letters.len() {
@@ -60,90 +67,83 @@ impl<'a> AttitudeColumns<&'a str> {
                     ));
                 }
                 let pairs = names.into_iter().zip(letters).map(|(name, letter)| {
-                    let axis = match letter {
-                        "x" => Vector3::x(),
-                        "y" => Vector3::y(),
-                        "z" => Vector3::z(),
-                        _ => {
-                            return Err(axes.error(
+                    let axis = LETTERS.iter().find(|(known, _)| *known == letter);
+                    let (_, axis) = axis.ok_or_else(|| {
+                        axes.error(
                             "`x`, `y` or `z` for each axis",
                             "Name the axis about which the table turns when all angles are zero.",
-                        ));
-                        }
-                    };
-                    Ok((name, axis))
+                        )
+                    })?;
+                    Ok((name, *axis))
                 });
-                Ok(Self::Angles(pairs.collect::<Result<_, FileError>>()?))
+                pairs.collect::<Result<_, FileError>>()?
             }
-            (None, Some(_), None) => Err(table.missing("axes", "the axes of the angles")),
-            (Some(quaternion), _, _) => Err(quaternion.error(
-                "either a quaternion or angles with their axes",
-                "Remove one of them.",
-            )),
-            (None, None, _) => {
-                Err(columns.missing("quaternion", "the columns of a quaternion or of `angles`"))
+            (Some(_), None) => return Err(table.missing("axes", "the axes of the angles")),
+            (None, Some(axes)) => {
+                return Err(axes.error(
+                    "it beside the columns of `angles`",
+                    "Name the columns of the angles, or remove the axes.",
+                ));
             }
-        }
+            (None, None) if quaternion.is_none() => {
+                return Err(
+                    columns.missing("quaternion", "the columns of a quaternion or of `angles`")
+                );
+            }
+            (None, None) => Vec::new(),
+        };
+        Ok(Self { quaternion, angles })
     }
 
     fn find(&self, csv: &mut LogRows) -> Result<AttitudeColumns<usize>, FileError> {
-        Ok(match self {
-            Self::Quaternion([w, x, y, z]) => AttitudeColumns::Quaternion([
-                csv.column(w)?,
-                csv.column(x)?,
-                csv.column(y)?,
-                csv.column(z)?,
-            ]),
-            Self::Angles(angles) => AttitudeColumns::Angles(
-                angles
-                    .iter()
-                    .map(|&(name, axis)| Ok((csv.column(name)?, axis)))
-                    .collect::<Result<_, FileError>>()?,
-            ),
+        let quaternion = self.quaternion.map(|names| {
+            let [w, x, y, z] = names.map(|name| csv.column(name));
+            Ok::<_, FileError>([w?, x?, y?, z?])
+        });
+        let angles = self.angles.iter();
+        Ok(AttitudeColumns {
+            quaternion: quaternion.transpose()?,
+            angles: angles
+                .map(|&(name, axis)| Ok((csv.column(name)?, axis)))
+                .collect::<Result<_, FileError>>()?,
         })
     }
 }
 
 impl AttitudeColumns<usize> {
     fn reading(&self, csv: &LogRows) -> Result<UnitQuaternion<f64>, FileError> {
-        match self {
-            &Self::Quaternion([w, x, y, z]) => {
-                let quaternion = Quaternion::new(
-                    csv.number(w)?,
-                    csv.number(x)?,
-                    csv.number(y)?,
-                    csv.number(z)?,
-                );
-                let norm = quaternion.norm();
-                if (norm - 1.0).abs() > NORM_TOLERANCE {
-                    return Err(csv.error_here(
-                        format_args!("a quaternion of norm {norm:.6}"),
-                        format_args!("1 within {NORM_TOLERANCE}"),
-                        "Correct the row, or the order of columns in run.toml: w, x, y, z.",
-                    ));
-                }
-                Ok(UnitQuaternion::from_quaternion(quaternion))
+        let Some([w, x, y, z]) = self.quaternion else {
+            let mut c_b_n = Matrix3::identity();
+            for &(column, axis) in &self.angles {
+                c_b_n *= attitude::exp(axis * (csv.number(column)? * DEGREE));
             }
-            Self::Angles(angles) => {
-                let mut c_b_n = Matrix3::identity();
-                for &(column, axis) in angles {
-                    c_b_n *= attitude::exp(axis * (csv.number(column)? * DEGREE));
-                }
-                Ok(attitude::quaternion(&c_b_n))
-            }
+            return Ok(attitude::quaternion(&c_b_n));
+        };
+        let quaternion = Quaternion::new(
+            csv.number(w)?,
+            csv.number(x)?,
+            csv.number(y)?,
+            csv.number(z)?,
+        );
+        let norm = quaternion.norm();
+        if (norm - 1.0).abs() > NORM_TOLERANCE {
+            return Err(csv.error_here(
+                format_args!("a quaternion of norm {norm:.6}"),
+                format_args!("1 within {NORM_TOLERANCE}"),
+                "Correct the row, or the order of columns in run.toml: w, x, y, z.",
+            ));
         }
+        Ok(UnitQuaternion::from_quaternion(quaternion))
     }
 
-    /// The angles of the axes; none for a quaternion.
+    /// The angles of the axes; none where a quaternion stands alone.
     fn axes(&self, csv: &LogRows) -> Result<Option<AxisAngles>, FileError> {
-        let Self::Angles(angles) = self else {
-            return Ok(None);
-        };
-        let axes: Result<Vec<_>, FileError> = angles
+        let axes: Result<Vec<_>, FileError> = self
+            .angles
             .iter()
             .map(|&(column, axis)| Ok((axis, csv.number(column)? * DEGREE)))
             .collect();
-        Ok(Some(axis_angles(axes?)))
+        Ok(Some(axes?).filter(|axes| !axes.is_empty()).map(axis_angles))
     }
 }
 
@@ -204,17 +204,15 @@ impl<'a> TableLogFile<'a> {
         };
         let mut axes = TableGeometry::default().axes;
         for (kind, key) in AxisError::ALL.into_iter().zip(AXIS_KEYS) {
-            match (&attitude, fields.get(key)) {
-                (AttitudeColumns::Angles(angles), Some(_)) => {
-                    axes += kind.of_table(angles.len(), optional(key)?);
-                }
-                (AttitudeColumns::Quaternion(_), Some(field)) => {
+            match fields.get(key) {
+                Some(field) if attitude.angles.is_empty() => {
                     return Err(field.error(
                         "it with `angles` only, for a quaternion does not tell the axes apart",
-                        "Remove it, or give the angles of the table's axes.",
+                        "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
                     ));
                 }
-                (_, None) => (),
+                Some(_) => axes += kind.of_table(attitude.angles.len(), optional(key)?),
+                None => (),
             }
         }
         let level = optional("level_sigma_arcsec")?;

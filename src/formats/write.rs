@@ -11,12 +11,17 @@ use nalgebra::Vector3;
 use super::error::{FileError, Place, list, suggestion};
 use super::quantity::{OUTPUTS, units};
 use super::read::{FORMAT, META};
+use super::table_log::{AXIS_KEYS, LETTERS};
 use crate::calibration::Calibration;
 use crate::imu::{MotionNoise, NoiseKeys};
 use crate::imu::{Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
+use crate::turntable::AxisError;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, MILLIGAL, PPM};
+
+/// Columns of the angles of a table's axes, outermost first.
+const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
 
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
 /// `segments.csv`, `truth.json`.
@@ -74,7 +79,7 @@ pub fn write_run(
     write("run.toml", &|file| file.write_all(toml.as_bytes()))?;
     write("imu.csv.gz", &|file| imu_rows(file, run, output))?;
     if let Some(table) = &run.recording.table {
-        write("table.csv.gz", &|file| table_rows(file, table))?;
+        write("table.csv.gz", &|file| table_rows(file, run, table))?;
     }
     if !run.recording.segments.is_empty() {
         write("segments.csv", &|file| {
@@ -147,13 +152,49 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
     Ok(())
 }
 
-fn table_rows(file: &mut dyn Write, table: &TableLog) -> io::Result<()> {
-    writeln!(file, "t,qw,qx,qy,qz")?;
-    for (&time, q) in table.time.iter().zip(&table.attitude) {
+fn table_rows(file: &mut dyn Write, run: &Run, table: &TableLog) -> io::Result<()> {
+    let axes = axis_letters(run).map_or(0, |letters| letters.len());
+    let angles: String = ANGLES[..axes]
+        .iter()
+        .map(|name| format!(",{name}"))
+        .collect();
+    writeln!(file, "t,qw,qx,qy,qz{angles}")?;
+    for (row, (&time, q)) in table.time.iter().zip(&table.attitude).enumerate() {
         let time = nanoseconds(time);
-        writeln!(file, "{time},{:e},{:e},{:e},{:e}", q.w, q.i, q.j, q.k)?;
+        write!(file, "{time},{:e},{:e},{:e},{:e}", q.w, q.i, q.j, q.k)?;
+        for (_, angle) in table
+            .axes
+            .get(row)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .take(axes)
+        {
+            write!(file, ",{:e}", angle / DEGREE)?;
+        }
+        writeln!(file)?;
     }
     Ok(())
+}
+
+/// The axes of a table of which errors are stated, as files name them; none where nothing is stated, or they stand
+/// otherwise.
+fn axis_letters(run: &Run) -> Option<Vec<&'static str>> {
+    let stated = AxisError::ALL
+        .iter()
+        .any(|&kind| run.table.geometry.has(kind));
+    let axes = run
+        .recording
+        .table
+        .as_ref()?
+        .axes
+        .first()
+        .filter(|_| stated)?;
+    let letter = |(direction, _): &(Vector3<f64>, f64)| {
+        let known = LETTERS.iter().find(|(_, known)| known == direction);
+        known.map(|(letter, _)| *letter)
+    };
+    axes.iter().flatten().map(letter).collect()
 }
 
 fn segment_rows(file: &mut dyn Write, segments: &[Segment]) -> io::Result<()> {
@@ -278,27 +319,35 @@ velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
         sections.push(format!("turning_deg_per_sqrt_s = {turning:?}\n"));
     }
     if run.recording.table.is_some() {
+        let letters = axis_letters(run);
         sections.push(format!(
             r#"
 # attitude of the table's mounting face, body right-front-up to East-North-Up
 [turntable]
 file = "table.csv.gz"
-columns = {{ time = "t", quaternion = ["qw", "qx", "qy", "qz"] }}
+columns = {{ time = "t", quaternion = ["qw", "qx", "qy", "qz"]{angles} }}
 position_sigma_arcsec = {position:?}    # constant while the table stands, new at every position
 reading_sigma_arcsec = {reading:?}    # white, each reading
 "#,
+            angles = letters.as_ref().map_or_else(String::new, |letters| format!(
+                ", angles = {:?}, axes = {letters:?}",
+                &ANGLES[..letters.len()]
+            )),
             position = short(run.table.position_sigma / ARCSEC),
             reading = short(run.table.reading_sigma / ARCSEC),
         ));
-        // The quaternion does not tell the axes apart, so their errors cannot be had from the file.
-        let base = run.table.geometry.base;
-        for (name, sigma) in [("level", base.x), ("north", base.z)] {
-            if sigma > 0.0 {
-                sections.push(format!(
-                    "{name}_sigma_arcsec = {:?}\n",
-                    short(sigma / ARCSEC)
-                ));
-            }
+        let geometry = &run.table.geometry;
+        let of_base = [
+            ("level_sigma_arcsec", geometry.base.x),
+            ("north_sigma_arcsec", geometry.base.z),
+        ];
+        let of_axes = AXIS_KEYS.into_iter().zip(AxisError::ALL);
+        let of_axes = of_axes.filter(|_| letters.is_some());
+        let of_axes =
+            of_axes.map(|(key, kind)| (key, geometry.axes.rows_range(kind.range()).max()));
+        let stated = of_base.into_iter().chain(of_axes);
+        for (key, sigma) in stated.filter(|&(_, sigma)| sigma > 0.0) {
+            sections.push(format!("{key} = {:?}\n", short(sigma / ARCSEC)));
         }
     }
     if !run.recording.segments.is_empty() {

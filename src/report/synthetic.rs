@@ -160,10 +160,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         form_test: None,
         dwell_scatter: None,
         covariance_by_noise: ParameterMatrix::zeros(),
-        covariance_by_headings: ParameterMatrix::zeros(),
-        covariance_by_error_terms: ParameterMatrix::zeros(),
-        covariance_by_rounding: ParameterMatrix::zeros(),
-        covariance_by_variation: ParameterMatrix::zeros(),
+        beside: BTreeMap::new(),
         model: Model::new(&run, &Options::default().installation(form)),
         noise: NoiseReport {
             policy: Default::default(),

@@ -21,7 +21,7 @@ const ORDER: ErrorTerm = ErrorTerm::Instrument(Term::AccelSecondOrder);
 
 fn calibrated(problem: &Problem) -> (Outcome, Vec<ErrorTermTest>) {
     let outcome = estimate(problem, &|_| {}).unwrap();
-    let tests = test_error_terms(problem, &outcome).unwrap();
+    let (tests, _) = test_error_terms(problem, &outcome).unwrap();
     (outcome, tests)
 }
 

@@ -64,19 +64,11 @@ impl Budget {
         let by_source: Vec<_> = held.forward(AT_ONCE)?.back()?.covariances().collect();
         let filter: ParameterMatrix = by_source.iter().map(|(_, covariance)| covariance).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
-        let left_off = outcome.covariance_by_error_terms;
-        let variation = outcome.covariance_by_variation;
-        let rounding = outcome.covariance_by_rounding;
-        let beside = outcome.covariance_by_noise + rounding + left_off + variation;
-        let scatter = outcome.estimate.covariance - beside;
-        let parts = by_source.into_iter().chain([
-            (BudgetSource::Curvature, bent),
-            (BudgetSource::Headings, outcome.covariance_by_headings),
-            (BudgetSource::DwellScatter, scatter),
-            (BudgetSource::Rounding, rounding),
-            (BudgetSource::ErrorTermsLeftOff, left_off),
-            (BudgetSource::UnseenVariation, variation),
-        ]);
+        let beside = outcome.beside.iter().map(|(&source, &part)| (source, part));
+        let filter = by_source
+            .into_iter()
+            .chain([(BudgetSource::Curvature, bent)]);
+        let parts = filter.chain(beside);
         let variance = outcome.estimate.covariance.diagonal();
         let counts = |part: &ParameterMatrix| {
             let own = part.diagonal();

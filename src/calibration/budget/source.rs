@@ -91,6 +91,8 @@ pub enum BudgetSource {
     Headings,
     /// By how much dwells scatter more than all noise says.
     DwellScatter,
+    /// Noise that is learnt and could as well be another.
+    LearntNoise,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
     /// What error terms do that the data show and that are not estimated.
@@ -140,6 +142,7 @@ impl BudgetSource {
             Self::Curvature => "second order of unknown angles",
             Self::Headings => "headings that cannot be told apart",
             Self::DwellScatter => "scatter of dwells",
+            Self::LearntNoise => "learnt noise",
             Self::Rounding => "rounding of rates",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",
             Self::UnseenVariation => "biases that may vary unseen",

@@ -13,6 +13,19 @@ use super::super::problem::Problem;
 use super::evidence::Evidence;
 use super::left_off::LeftOff;
 
+/// ln of the steps in which the size of a term is tried: two in a decade.
+const PART_OF_DECADE: f64 = 0.5 * std::f64::consts::LN_10;
+
+/// A term as an explanation of what a record shows.
+pub(super) struct Explanation {
+    /// ln of the likelihood with it, and with others that are on, over that without any.
+    pub ln_likelihood_ratio: f64,
+    /// The same over that with the others alone.
+    pub of_term: f64,
+    /// Mean square by which all of them change the parameters.
+    pub added: ParameterMatrix,
+}
+
 /// How well a calibration fits, and variance of the parameters of both triads.
 pub(super) struct Fit {
     pub cost: f64,
@@ -95,11 +108,11 @@ impl Joint {
             return Some(fit);
         }
         let tried = self.tried.as_ref()?;
-        let (gain, covariance) = self.estimate(tried, &numbers)?;
-        fit.cost -= gain;
+        let estimated = self.estimate(tried, &numbers)?;
+        fit.cost -= estimated.gain;
         for p in 0..PARAMETERS {
             let by = DVector::from_fn(numbers.len(), |i, _| tried.of_parameters[(p, numbers[i])]);
-            fit.variance[p] += by.dot(&(&covariance * &by));
+            fit.variance[p] += by.dot(&(&estimated.covariance * &by));
         }
         Some(fit)
     }
@@ -129,13 +142,7 @@ impl Joint {
         let Some(tried) = self.tried.as_ref().filter(|_| !numbers.is_empty()) else {
             return Some(ParameterMatrix::zeros());
         };
-        let effect = effect(tried, &numbers);
-        let (_, covariance) = self.estimate(tried, &numbers)?;
-        let score = DVector::from_fn(numbers.len(), |i, _| tried.score[numbers[i]]);
-        let mean = &covariance * score;
-        let mean_square = covariance + &mean * mean.transpose();
-        let of_parameters = &effect * mean_square * effect.transpose();
-        Some(ParameterMatrix::from_fn(|i, j| of_parameters[(i, j)]))
+        Some(self.estimate(tried, &numbers)?.added(tried, &numbers))
     }
 
     /// What a term explains where these others are on.
@@ -147,31 +154,60 @@ impl Joint {
         }
         let without = match before.is_empty() {
             true => 0.0,
-            false => self.estimate(tried, &before)?.0,
+            false => self.estimate(tried, &before)?.gain,
         };
         let n = of.len();
         let sigma: Vec<f64> = of.iter().map(|&k| self.prior_sigma[k]).collect();
         let all: Vec<usize> = of.into_iter().chain(before).collect();
-        let (gain, covariance) = self.estimate(tried, &all)?;
-        let covariance = covariance.view((0, 0), (n, n)).into_owned();
-        Some(Evidence::new(gain - without, &covariance, &sigma))
+        let estimated = self.estimate(tried, &all)?;
+        let covariance = estimated.covariance.view((0, 0), (n, n)).into_owned();
+        Some(Evidence::new(estimated.gain - without, &covariance, &sigma))
     }
 
-    /// By how much the cost falls with parameters on that are tried, and their covariance.
-    fn estimate(&self, tried: &Tried, numbers: &[usize]) -> Option<(f64, DMatrix<f64>)> {
-        let n = numbers.len();
-        let sigma = |i: usize| self.prior_sigma[numbers[i]];
-        let information = DMatrix::from_fn(n, n, |i, j| {
-            let of_prior = f64::from(u8::from(i == j));
-            let of_data = tried.information[(numbers[i], numbers[j])];
-            of_prior + of_data * sigma(i) * sigma(j)
+    /// Parameters on that are tried, each with its usual σ before the data.
+    fn estimate(&self, tried: &Tried, numbers: &[usize]) -> Option<Estimated> {
+        let sigma: Vec<f64> = numbers.iter().map(|&k| self.prior_sigma[k]).collect();
+        Estimated::new(tried, numbers, &sigma)
+    }
+
+    /// What the data say of a term of any size where these others are on; none where they show nothing of it.
+    ///
+    /// How large the term is in an instrument nobody says: it is as likely before the data in each part of a
+    /// decade, from its usual σ down to the one of which the data would show no more than they leave open.
+    pub fn explanation(&self, term: ErrorTerm, on: &[ErrorTerm]) -> Option<Explanation> {
+        let tried = self.tried.as_ref()?;
+        let (of, others) = (self.numbers(&[term]), self.numbers(on));
+        let sigma = |numbers: &[usize]| -> Vec<f64> {
+            numbers.iter().map(|&k| self.prior_sigma[k]).collect()
+        };
+        let (of_term, of_others) = (sigma(&of), sigma(&others));
+        let shown = scaled(tried, &of, &of_term).symmetric_eigenvalues();
+        let shown = shown.iter().copied().fold(0.0, f64::max).sqrt();
+        if shown <= 1.0 {
+            return None;
+        }
+        let sizes = (shown.ln() / PART_OF_DECADE) as usize + 1;
+        let all = [of, others.clone()].concat();
+        let models = (0..sizes).map(|smaller| {
+            let size = (-(smaller as f64) * PART_OF_DECADE).exp();
+            let of_term = of_term.iter().map(|sigma| sigma * size);
+            let sigma: Vec<f64> = of_term.chain(of_others.iter().copied()).collect();
+            let estimated = Estimated::new(tried, &all, &sigma)?;
+            let added = estimated.added(tried, &all);
+            Some((estimated.ln_likelihood_ratio(), added))
         });
-        let score = DVector::from_fn(n, |i, _| tried.score[numbers[i]] * sigma(i));
-        let factor: Cholesky<f64, Dyn> = information.cholesky()?;
-        let gain = score.dot(&factor.solve(&score));
-        let inverse = factor.inverse();
-        let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * sigma(i) * sigma(j));
-        Some((gain, covariance))
+        let models: Vec<(f64, ParameterMatrix)> = models.collect::<Option<_>>()?;
+        let before = self.estimate(tried, &others)?.ln_likelihood_ratio();
+        let best = models.iter().map(|model| model.0).fold(before, f64::max);
+        let weight = |model: &(f64, ParameterMatrix)| (model.0 - best).exp();
+        let sum: f64 = models.iter().map(weight).sum();
+        let added: ParameterMatrix = models.iter().map(|model| model.1 * weight(model)).sum();
+        let ln_likelihood_ratio = best + (sum / sizes as f64).ln();
+        Some(Explanation {
+            ln_likelihood_ratio,
+            of_term: ln_likelihood_ratio - before,
+            added: added / sum,
+        })
     }
 
     /// The calibration without a term that is on, and what the term explains. `None` if that is singular.
@@ -197,6 +233,55 @@ impl Joint {
         }
         Some((fit, Evidence::new(gain, &covariance, &sigma)))
     }
+}
+
+/// Parameters that are tried, after the data.
+struct Estimated {
+    /// By how much the cost falls with them.
+    gain: f64,
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Logarithm of the determinant of their covariance before the data over that after them.
+    log_determinant: f64,
+}
+
+impl Estimated {
+    /// With these σ before the data. `None` if that is singular.
+    fn new(tried: &Tried, numbers: &[usize], sigma: &[f64]) -> Option<Self> {
+        let n = numbers.len();
+        let information = scaled(tried, numbers, sigma) + DMatrix::identity(n, n);
+        let score = DVector::from_fn(n, |i, _| tried.score[numbers[i]] * sigma[i]);
+        let factor: Cholesky<f64, Dyn> = information.cholesky()?;
+        let scaled = factor.solve(&score);
+        let inverse = factor.inverse();
+        Some(Self {
+            gain: score.dot(&scaled),
+            mean: DVector::from_fn(n, |i, _| scaled[i] * sigma[i]),
+            covariance: DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * sigma[i] * sigma[j]),
+            log_determinant: 2.0 * factor.l().diagonal().map(f64::ln).sum(),
+        })
+    }
+
+    /// ln of the likelihood with them over that without, whatever their values are.
+    fn ln_likelihood_ratio(&self) -> f64 {
+        0.5 * (self.gain - self.log_determinant)
+    }
+
+    /// Mean square by which they change the parameters of both triads.
+    fn added(&self, tried: &Tried, numbers: &[usize]) -> ParameterMatrix {
+        let effect = effect(tried, numbers);
+        let mean_square = &self.covariance + &self.mean * self.mean.transpose();
+        let of_parameters = &effect * mean_square * effect.transpose();
+        ParameterMatrix::from_fn(|i, j| of_parameters[(i, j)])
+    }
+}
+
+/// Information of parameters that are tried, each in units of its σ.
+fn scaled(tried: &Tried, numbers: &[usize], sigma: &[f64]) -> DMatrix<f64> {
+    let n = numbers.len();
+    DMatrix::from_fn(n, n, |i, j| {
+        tried.information[(numbers[i], numbers[j])] * sigma[i] * sigma[j]
+    })
 }
 
 /// What one of each parameter that is tried changes the parameters of both triads by.

@@ -11,7 +11,6 @@ use super::super::parameters::ParameterMatrix;
 use super::super::pass::PassResult;
 use super::super::problem::Problem;
 use super::joint::once_more;
-use super::seen::between;
 use super::{ErrorTermTest, Role};
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
@@ -30,7 +29,7 @@ const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 /// of anybody's that biases are constant: that those of a triad vary is then as likely as not before the
 /// data, with σ and correlation time lognormal about the usual ones, as any stated figure is about its own.
 /// The mean square error of the estimate is that of all these models, each as likely as the data leave it
-/// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::seen_and_left_off`]).
+/// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::test_error_terms`]).
 ///
 /// # Errors
 /// [`CalibrationError`] where the problem is not the one of the outcome.
@@ -92,7 +91,7 @@ fn of_one(
         let weight = ratio * density(sigma) * density(time) / all;
         if weight.is_finite() {
             weights += weight;
-            sum += between(&with, own) * weight;
+            sum += with.added_to(own) * weight;
         }
     }
     sum / weights
@@ -101,7 +100,7 @@ fn of_one(
 #[cfg(test)]
 mod tests {
     use super::super::super::parameters::parameter;
-    use super::super::super::{Method, NoisePolicy, Options};
+    use super::super::super::{BudgetSource, Method, NoisePolicy, Options};
     use super::*;
     use crate::run::Run;
     use crate::simulation::Scenario;
@@ -129,7 +128,7 @@ mod tests {
             (Aiding::Table, NoisePolicy::Learnt),
         ] {
             let outcome = solved(&run, aiding, noise);
-            assert_eq!(outcome.covariance_by_variation.amax(), 0.0);
+            assert_eq!(outcome.part(BudgetSource::UnseenVariation).amax(), 0.0);
         }
     }
 
@@ -141,7 +140,7 @@ mod tests {
             .unwrap()
             .run;
         let outcome = solved(&run, Aiding::Velocity, NoisePolicy::Learnt);
-        let of = outcome.covariance_by_variation;
+        let of = outcome.part(BudgetSource::UnseenVariation);
         let variance = outcome.estimate.covariance.diagonal();
         let without = variance - of.diagonal();
         for sensor in Sensor::ALL {

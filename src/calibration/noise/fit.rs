@@ -212,12 +212,21 @@ impl Likelihood<'_> {
         factors: &Factors,
         sources: &[usize],
     ) -> Result<Vec<Option<f64>>, CalibrationError> {
+        let covariance = self.covariance(factors, sources)?;
+        Ok((0..sources.len())
+            .map(|i| Some(covariance.as_ref()?[(i, i)].sqrt()))
+            .collect())
+    }
+
+    /// Their covariance after the data; none where these do not show all of them.
+    pub fn covariance(
+        &self,
+        factors: &Factors,
+        sources: &[usize],
+    ) -> Result<Option<DMatrix<f64>>, CalibrationError> {
         let slope = self.slope(factors, sources)?;
         let (_, information) = self.posterior(&slope, factors, sources);
-        let inverse = information.cholesky().map(|factor| factor.inverse());
-        Ok((0..sources.len())
-            .map(|i| Some(inverse.as_ref()?[(i, i)].sqrt()))
-            .collect())
+        Ok(information.cholesky().map(|factor| factor.inverse()))
     }
 }
 

@@ -6,6 +6,7 @@ use super::super::iterations::{Iterated, iterate};
 use super::super::linearisation::AttitudePrior;
 use super::super::model::Model;
 use super::super::outcome::Pass;
+use super::super::parameters::ParameterMatrix;
 use super::super::pass::Gate;
 use super::super::problem::Problem;
 use super::super::schedule::Step;
@@ -43,6 +44,8 @@ pub(in crate::calibration) struct Learnt {
     pub model: Model,
     pub iterated: Iterated,
     pub report: NoiseReport,
+    /// Mean square by which the parameters would be others with other noise, as likely; none where it is stated.
+    pub of_other_noise: Option<ParameterMatrix>,
 }
 
 impl Learnt {
@@ -52,6 +55,7 @@ impl Learnt {
             model: problem.model.clone(),
             iterated,
             report: NoiseReport::stated(problem.options.noise, None),
+            of_other_noise: None,
         }
     }
 }
@@ -69,6 +73,7 @@ pub(in crate::calibration) fn learn(
         model: problem.model.clone(),
         iterated,
         report: NoiseReport::stated(policy, test),
+        of_other_noise: None,
     };
     if policy == NoisePolicy::Stated {
         return Ok(Learnt::stated(problem, stated));
@@ -127,11 +132,13 @@ pub(in crate::calibration) fn learn(
         let now = likelihood.replay(&fit.factors)?.deviance();
         let moved = before.is_none_or(|before: f64| (now - before).abs() > SETTLED);
         if (!changed && !moved) || round == ROUNDS {
-            let report = likelihood.report(policy, test, &fit.factors)?;
+            let of_other_noise =
+                likelihood.moves_parameters_by(&fit.factors, problem, priors, &iterated)?;
             return Ok(Learnt {
                 model,
+                report: likelihood.report(policy, test, &fit.factors)?,
                 iterated,
-                report,
+                of_other_noise: Some(of_other_noise),
             });
         }
         before = Some(now);

@@ -16,6 +16,7 @@ mod report;
 mod run_toml;
 mod selection;
 mod source;
+mod uncertainty;
 
 pub(super) use events::{Event, Events};
 pub(super) use fit::LOG_SIGMA;

@@ -187,6 +187,13 @@ impl Sums {
 }
 
 impl PassResult {
+    /// What the covariance of another pass lacks if this one's model is right: the mean square error of what that
+    /// one finds is the covariance here and the square of what is between them.
+    pub fn added_to(&self, other: &Self) -> ParameterMatrix {
+        let change = to_vector(&self.estimate.triads) - to_vector(&other.estimate.triads);
+        self.covariance - other.covariance + change * change.transpose()
+    }
+
     /// Takes another covariance of the constants, each in units of the σ that it has.
     pub fn widen(&mut self, layout: &Layout, widened: &DMatrix<f64>) {
         let states: Vec<usize> = layout.constants().collect();

@@ -106,7 +106,10 @@ impl AccuracyStudy {
         }
         let outcome = estimate(&problem, &|_| {});
         let effects = match &outcome {
-            Ok(outcome) if run == 0 => test_error_terms(&problem, outcome).unwrap_or_default(),
+            Ok(outcome) if run == 0 => {
+                let (tests, _) = test_error_terms(&problem, outcome).unwrap_or_default();
+                tests
+            }
             _ => Vec::new(),
         };
         let auxiliary = auxiliary_vector(&simulated.geometry, &simulated.terms);

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use approx::assert_relative_eq;
 use nalgebra::Vector3;
 use turncal::calibration::result::{
     Calibration, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
@@ -9,6 +10,7 @@ use turncal::calibration::result::{
 use turncal::formats::write_run;
 use turncal::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor};
 use turncal::run::Aiding;
+use turncal::simulation::{Scenario, Simulated};
 use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
 
 use super::made::{assert_same, made_run};
@@ -154,4 +156,27 @@ fn a_calibration_comes_back_as_it_went() {
         .unwrap_err();
     assert!(error.to_string().contains("gyro"), "{error}");
     assert!(!directory.path().join("other.json").exists());
+}
+
+#[test]
+fn errors_of_a_tables_axes_come_back_with_the_angles_that_tell_them_apart() {
+    let simulated = Scenario::load("real-table").unwrap().simulate(3, 0);
+    let Simulated { run, output, .. } = simulated.unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    write_run(directory.path(), &run, output, None).unwrap();
+    let back = read(directory.path());
+    let stated = [&run, &back].map(|run| run.table.geometry.vector());
+    assert!(stated[0].rows(3, 4).min() > 0.0);
+    assert_relative_eq!(stated[0], stated[1], max_relative = 1e-12);
+    let angles = [&run, &back].map(|run| {
+        let axes = &run.recording.table.as_ref().unwrap().axes;
+        let of_all = axes.iter().flat_map(|axes| axes.iter().flatten());
+        of_all
+            .map(|(axis, angle)| axis * *angle)
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(angles[0].len(), angles[1].len());
+    for (one, other) in angles[0].iter().zip(&angles[1]) {
+        assert_relative_eq!(one, other, epsilon = 1e-12);
+    }
 }
