@@ -24,7 +24,7 @@ impl Course {
     }
 
     /// The integrals between two places, and how much of the error midway between edges they have, squared; none if
-    /// the places are not within.
+    /// the places are not within, or not in this order.
     pub fn between(&self, begin: f64, end: f64) -> Option<([f64; 3], f64)> {
         let place = |place: f64| {
             let place = place - self.begin;
@@ -36,7 +36,7 @@ impl Course {
         };
         let (from, to) = (place(begin), place(end));
         let last = self.len() as f64;
-        if from < 0.0 || to > last {
+        if !(0.0 <= from && from <= to && to <= last) {
             return None;
         }
         let (first, behind) = (self.edge(from), self.edge(to));

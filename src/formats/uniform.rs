@@ -72,7 +72,17 @@ impl Uniform {
         }
         let clock = |about, given| {
             let gap = |row: usize| gap(file, stamps[row - 1].0, stamps[row]);
-            Self::likeliest(stamps, about, given).map_err(gap)
+            let (clock, counting) = Self::likeliest(stamps, about, given).map_err(gap)?;
+            match clock.wander.as_ref().and_then(Wander::stops) {
+                Some(number) => {
+                    let row = clock.numbers.partition_point(|&of_row| of_row < number);
+                    let line = stamps
+                        .get(row)
+                        .map_or(Place::File, |stamp| Place::Line(stamp.1));
+                    Err(not_forward(file, line))
+                }
+                None => Ok((clock, counting)),
+            }
         };
         if let Some(period) = given
             && let Ok((free, counting)) = clock(found, false)
@@ -339,6 +349,16 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
         format_args!("a gap in time from {before} s to {time} s"),
         "fewer rows missing than there are",
         "Correct the clock, or split the record there.",
+    )
+}
+
+fn not_forward(file: &Path, place: Place) -> FileError {
+    FileError::new(
+        file,
+        place,
+        "times that do not go on from here",
+        "times that increase from row to row",
+        "Correct the time column or leave out the rows, or name another time column in run.toml.",
     )
 }
 

@@ -270,7 +270,7 @@ impl ImuLog<'_> {
         let samples = match long {
             Some(mut long) => long
                 .take(&mut held, &mut stamps, true)
-                .map(|()| Samples::Long(Box::new(long.finish(duplicates)))),
+                .and_then(|()| Ok(Samples::Long(Box::new(long.finish(duplicates)?)))),
             None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
                 .map(|clock| Samples::Held(Box::new((held, clock)))),
         };

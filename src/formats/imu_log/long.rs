@@ -232,8 +232,8 @@ impl<'a> LongLog<'a> {
     }
 
     /// What the log is, all of its rows being taken.
-    pub fn finish(mut self, duplicates: usize) -> Whole {
-        let clock = self.clock.finish();
+    pub fn finish(mut self, duplicates: usize) -> Result<Whole, FileError> {
+        let clock = self.clock.finish()?;
         let units = self.layout.units(self.log, clock.period);
         let mut facts = self.facts.unwrap_or_default();
         for (facts, unit) in facts.iter_mut().zip(units) {
@@ -286,7 +286,7 @@ impl<'a> LongLog<'a> {
             Some(_) => packed.gyro.len(),
             None => self.next,
         };
-        Whole {
+        Ok(Whole {
             clock,
             facts,
             packed,
@@ -296,6 +296,6 @@ impl<'a> LongLog<'a> {
             rows: self.rows + duplicates,
             missing: self.next - self.rows,
             error,
-        }
+        })
     }
 }

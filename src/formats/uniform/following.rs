@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{BY_CHANCE, Counter, EXACT, Knots, Uniform, gap, price, punctual};
-use crate::formats::error::FileError;
+use super::{BY_CHANCE, Counter, EXACT, Knots, Uniform, Wander, gap, not_forward, price, punctual};
+use crate::formats::error::{FileError, Place};
 
 /// Rows of which the earliest and the latest stamp are kept.
 const BUCKET: usize = 4096;
@@ -146,8 +146,16 @@ impl Following {
     }
 
     /// The clock that all stamps shared, as [`Uniform::new`] finds it.
-    pub fn finish(mut self) -> Uniform {
+    pub fn finish(mut self) -> Result<Uniform, FileError> {
         self.knots = self.knots.finish();
+        let clock = self.clock();
+        match clock.wander.as_ref().and_then(Wander::stops) {
+            Some(_) => Err(not_forward(&self.file, Place::File)),
+            None => Ok(clock),
+        }
+    }
+
+    fn clock(&self) -> Uniform {
         let free = self.fit(self.about, false);
         let Some(given) = self.given else {
             return free;
@@ -235,7 +243,7 @@ mod tests {
                 Following::new(file, &stamps[..20_000], given).unwrap();
             let rest = &stamps[20_000..];
             numbers.extend(following.numbers(rest, rest.len()).unwrap());
-            let followed = following.finish();
+            let followed = following.finish().unwrap();
             assert_eq!(numbers, at_once.numbers);
             assert_eq!(followed.off_given.is_some(), at_once.off_given.is_some());
             assert!((followed.first - at_once.first).abs() < 1e-9);
@@ -256,7 +264,7 @@ mod tests {
         let (mut following, mut numbers) = Following::new(file, &stamps[..20_000], None).unwrap();
         let rest = &stamps[20_000..];
         numbers.extend(following.numbers(rest, rest.len()).unwrap());
-        let followed = following.finish();
+        let followed = following.finish().unwrap();
         assert_eq!(numbers, at_once.numbers);
         for clock in [&followed, &at_once] {
             for number in [1e3, 3e4, 39_000.0, 41_000.0, 5e4, 59_000.0] {

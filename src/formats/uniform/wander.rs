@@ -105,6 +105,14 @@ impl Wander {
         self.between(behind, |(knot, off)| (knot + off, knot), time)
     }
 
+    /// The sample from which on the clock does not go forward any more; none of one that does.
+    pub fn stops(&self) -> Option<usize> {
+        let time = |(number, off): (f64, f64)| number + off;
+        let forward = |pair: &[(f64, f64)]| time(pair[1]) > time(pair[0]);
+        let stops = self.knots.windows(2).find(|pair| !forward(pair));
+        stops.map(|pair| pair[0].0 as usize)
+    }
+
     /// The most by which a sample is off, in samples.
     pub fn largest(&self) -> f64 {
         let offs = self.knots.iter().map(|(_, off)| off.abs());
