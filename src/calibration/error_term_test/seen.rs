@@ -3,25 +3,19 @@
 use super::super::parameters::ParameterMatrix;
 use super::joint::Explanation;
 
-/// A term that makes the data less than so many times as likely is "not worth more than a bare mention" (Kass and
-/// Raftery 1995, "Bayes factors", Journal of the American Statistical Association 90(430), §3.2).
-const BARE_MENTION: f64 = 3.0;
-
 /// What the covariance of an estimate lacks for error terms that are not estimated and for which the data speak;
 /// none where they speak for none of `tried`.
 ///
 /// With a term the estimate would be `θ + Δ`, with the covariance `P + P_b`; so the mean square error of `θ` is
 /// `P + P_b + Δ Δᵀ`. Explanations, and that there is none, count as much as each is likely (Hoeting, Madigan,
 /// Raftery, Volinsky 1999, "Bayesian model averaging: a tutorial", Statistical Science 14(4)). Before the data it
-/// is as likely that there is a term as that there is none, and one term as likely as another. A term for which the
-/// data hardly speak, or against which they do, counts as none.
+/// is as likely that there is a term as that there is none, and one term as likely as another. A term that
+/// the data make less likely than it was counts as none.
 pub(super) fn seen_and_left_off(
     explanations: &[Explanation],
     tried: usize,
 ) -> Option<ParameterMatrix> {
-    let spoken_for = explanations
-        .iter()
-        .filter(|of| of.of_term > BARE_MENTION.ln());
+    let spoken_for = explanations.iter().filter(|of| of.of_term > 0.0);
     let spoken_for: Vec<&Explanation> = spoken_for.collect();
     let none = (tried as f64).ln();
     let ratios = spoken_for.iter().map(|of| of.ln_likelihood_ratio);
@@ -42,7 +36,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// One parameter misses by 3 with a term for which the data speak, and by 100 with one for which they hardly do.
+    /// One parameter misses by 3 with a term for which the data speak, and by 100 with one against which they do.
     #[test]
     fn explanations_count_as_much_as_each_is_likely() {
         let of = |ratio: f64, squared: f64| Explanation {
@@ -50,7 +44,7 @@ mod tests {
             of_term: ratio.ln(),
             added: ParameterMatrix::from_diagonal_element(squared),
         };
-        let added = seen_and_left_off(&[of(10.0, 9.0), of(2.0, 1e4)], 5);
+        let added = seen_and_left_off(&[of(10.0, 9.0), of(0.5, 1e4)], 5);
         assert_relative_eq!(
             added.unwrap()[(0, 0)],
             9.0 * 10.0 / 15.0,
@@ -59,6 +53,6 @@ mod tests {
         // Where one is beyond doubt what it does is all that counts.
         let added = seen_and_left_off(&[of(1e300, 9.0), of(10.0, 1e4)], 5);
         assert_relative_eq!(added.unwrap()[(0, 0)], 9.0, max_relative = 1e-12);
-        assert_eq!(seen_and_left_off(&[of(2.0, 1e4)], 5), None);
+        assert_eq!(seen_and_left_off(&[of(0.5, 1e4)], 5), None);
     }
 }
