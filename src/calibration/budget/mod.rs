@@ -6,6 +6,7 @@
 //! the covariance, and the parts of all sources are the covariance, whatever the gains of the filter are.
 
 mod follow;
+mod freedom;
 mod record;
 mod source;
 mod sums;
