@@ -378,9 +378,9 @@ fn of_ellipsoid(dimensions: usize) -> f64 {
     square.map_or(1.0, f64::sqrt)
 }
 
-/// Name and version of the program that made the calibration.
+/// Name and release of the program that made the calibration; PTB's rules want a letter before a release's numbers.
 fn program(certificate: &Certificate) -> (String, String) {
     let program = &certificate.provenance.program;
-    let (name, release) = program.split_once(' ').unwrap_or((program, "unknown"));
-    (name.to_owned(), release.to_owned())
+    let (name, release) = program.split_once(' ').unwrap_or((program, "0"));
+    (name.to_owned(), format!("v{release}"))
 }

@@ -114,6 +114,13 @@ fn results_are_those_of_the_calibration_in_si_with_their_own_coverage_factor() {
 }
 
 #[test]
+fn releases_begin_with_a_letter_as_ptbs_rules_want() {
+    let xml = dcc::write(&certificate());
+    // PTB's Schematron: ^[a-zA-Z]( )?(\d{1,3}\.){0,3}\d{1,3}$
+    assert_eq!(xml.matches("<dcc:release>v0.0.0</dcc:release>").count(), 2);
+}
+
+#[test]
 fn what_was_found_differs_by_what_has_changed() {
     let certificate = certificate();
     let changes = &certificate.as_found.as_ref().unwrap().changes;
