@@ -7,7 +7,9 @@ use std::fmt::Write;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{Certificate, Condition, Contact, Decided, Measured, temperature_words};
+use super::{
+    Certificate, Condition, Contact, Decided, Measured, temperature_words, to_twelve_digits,
+};
 
 /// Coverage probability of every uncertainty.
 const PROBABILITY: f64 = 0.9545;
@@ -305,15 +307,15 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
 /// What the values are.
 fn description(certificate: &Certificate) -> String {
     let nominal = &certificate.provenance.nominal;
+    let [for_gyros, for_accels] = [nominal.gyro, nominal.accel]
+        .map(|of| of.map(|scale| number(to_twelve_digits(scale))).join(", "));
     let unit = certificate.calibration.unit.as_ref();
     let unit = unit.map(|unit| (unit.gyro.as_str(), unit.accel.as_str()));
     let (gyro, accel) = unit.unwrap_or_default();
     let mut text = format!(
         "Scale factors over their nominal value minus one, entries of the installation matrix in rad, biases in rad/s \
-         and m/s². Nominal: gyros {:?} {gyro} per second for 1 rad/s, accelerometers {:?} {accel} per second for \
-         1 m/s². Body frame: {}.",
-        nominal.gyro,
-        nominal.accel,
+         and m/s². Nominal: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers {for_accels} {accel} per \
+         second for 1 m/s². Body frame: {}.",
         certificate.body_frame().words(),
     );
     if let Some(temperature) = &certificate.calibration.temperature {

@@ -15,7 +15,7 @@ use crate::lot::Specification;
 pub use as_found::{AsFound, Change};
 pub use conformity::{Conformity, Decided, Decision};
 pub use laboratory::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
-pub use results::{Measured, Quantity, temperature_words};
+pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
 
 /// Why there can be no certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

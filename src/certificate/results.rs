@@ -171,3 +171,8 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
         triads.join("; ")
     )
 }
+
+/// A number to twelve digits: behind them stands the rounding of arithmetic alone.
+pub fn to_twelve_digits(x: f64) -> f64 {
+    format!("{x:.11e}").parse().unwrap_or(x)
+}

@@ -198,6 +198,19 @@ fn a_budget_is_spoken_of_only_where_there_is_one() {
 }
 
 #[test]
+fn nominal_scales_have_no_digits_of_arithmetic() {
+    let mut calibration = calibration();
+    let provenance = calibration.provenance.as_mut().unwrap();
+    provenance.nominal.accel = [100000.00000000001; 3];
+    let (text, xml) = said(calibration);
+    assert!(
+        text.contains(r"accelerometers 100\u{202f}000, 100\u{202f}000"),
+        "{text}"
+    );
+    assert!(xml.contains("accelerometers 100000, 100000"));
+}
+
+#[test]
 fn releases_begin_with_a_letter_as_ptbs_rules_want() {
     let xml = dcc::write(&certificate());
     // PTB's Schematron: ^[a-zA-Z]( )?(\d{1,3}\.){0,3}\d{1,3}$

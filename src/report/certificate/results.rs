@@ -1,9 +1,9 @@
 //! The table of results.
 
 use super::super::document::{NONE, Table, cells};
-use super::super::number::{sigma, value};
+use super::super::number::{plain, sigma, value};
 use crate::calibration::Group;
-use crate::certificate::{Certificate, Measured, Quantity};
+use crate::certificate::{Certificate, Measured, Quantity, to_twelve_digits};
 use crate::imu::{Sensor, Term};
 
 /// A parameter's name with the model's letter.
@@ -53,7 +53,7 @@ pub(super) fn results(certificate: &Certificate) -> Table {
         let of = provenance
             .nominal
             .get(sensor)
-            .map(|scale| scale.to_string());
+            .map(|scale| plain(to_twelve_digits(scale)));
         // What is no rate is told per second.
         let per = match unit.contains('/') || unit == "g" {
             true => "",
