@@ -61,6 +61,7 @@ impl Outcome {
         Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::Ekf),
+            provenance: Some(problem.provenance()),
             blocks: tests.iter().map(BlockRecord::from).collect(),
             aiding: Some(problem.model.aiding),
             terms: self.auxiliary.records(),
@@ -133,6 +134,7 @@ impl ClosedForm {
         Calibration {
             quality: Some(quality_record(quality)),
             method: Some(Method::SixPosition),
+            provenance: Some(problem.provenance()),
             gravity: Some(GravityRecord {
                 m_s2: problem.run().site.gravity,
                 sigma_m_s2: problem.run().site.gravity_sigma,

@@ -183,7 +183,7 @@ impl Solution {
 
     /// The calibration, in the file's quantity.
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
-        let mut record = match self {
+        match self {
             Self::Filter(outcome) => {
                 let Assessment {
                     error_terms,
@@ -197,8 +197,6 @@ impl Solution {
                 record
             }
             Self::ClosedForm(closed_form) => closed_form.record(problem, &assessment.quality),
-        };
-        record.provenance = Some(problem.provenance());
-        record
+        }
     }
 }

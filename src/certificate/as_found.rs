@@ -57,7 +57,7 @@ pub(super) fn as_found(
         };
         Change {
             name: parameter_name(InstallationForm::General, i).unwrap_or_default(),
-            quantity: Quantity(group),
+            quantity: Quantity::Parameters(group),
             found: values_found[i] - base,
             left: values_left[i] - base,
             sigma: covariance.map(|p| p[(i, i)].max(0.0).sqrt()),

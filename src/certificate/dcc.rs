@@ -7,7 +7,9 @@ use std::fmt::Write;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{Certificate, Condition, Contact, Decided, Measured};
+use super::{
+    Certificate, Condition, Contact, Decided, Measured, temperature_words, to_twelve_digits,
+};
 
 /// Coverage probability of every uncertainty.
 const PROBABILITY: f64 = 0.9545;
@@ -290,38 +292,57 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
     xml.element("dcc:results", |xml| {
         xml.element("dcc:result", |xml| {
             xml.words("dcc:name", "Parameters");
-            let nominal = &certificate.provenance.nominal;
-            let unit = certificate.calibration.unit.as_ref();
-            let unit = unit.map(|unit| (unit.gyro.as_str(), unit.accel.as_str()));
-            let (gyro, accel) = unit.unwrap_or_default();
-            xml.words(
-                "dcc:description",
-                &format!(
-                    "Scale factors over their nominal value minus one, entries of the installation matrix in rad, \
-                     biases in rad/s and m/s². Nominal: gyros {:?} {gyro} per second for 1 rad/s, accelerometers \
-                     {:?} {accel} per second for 1 m/s². Body frame: {}.",
-                    nominal.gyro,
-                    nominal.accel,
-                    certificate.body_frame().words(),
-                ),
-            );
+            xml.words("dcc:description", &description(certificate));
             xml.element("dcc:data", |xml| {
-                xml.element("dcc:quantity", |xml| {
-                    xml.words("dcc:name", "names, in the order of the values");
-                    let names = certificate.results.iter().map(|of| of.name.as_str());
-                    xml.leaf("dcc:charsXMLList", &names.collect::<Vec<_>>().join(" "));
-                });
-                xml.element("dcc:quantity", |xml| {
-                    xml.words("dcc:name", "values");
-                    values(xml, &certificate.results, &certificate.covariance);
-                });
+                let covariance = Some(&certificate.covariance[..]);
+                quantities(xml, "", &certificate.results, covariance);
+                if !certificate.terms.is_empty() {
+                    quantities(xml, "error terms: ", &certificate.terms, None);
+                }
             });
         });
     });
 }
 
-/// The values with their expanded uncertainties and their covariance.
-fn values(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
+/// What the values are.
+fn description(certificate: &Certificate) -> String {
+    let nominal = &certificate.provenance.nominal;
+    let [for_gyros, for_accels] = [nominal.gyro, nominal.accel]
+        .map(|of| of.map(|scale| number(to_twelve_digits(scale))).join(", "));
+    let unit = certificate.calibration.unit.as_ref();
+    let unit = unit.map(|unit| (unit.gyro.as_str(), unit.accel.as_str()));
+    let (gyro, accel) = unit.unwrap_or_default();
+    let mut text = format!(
+        "Scale factors over their nominal value minus one, entries of the installation matrix in rad, biases in rad/s \
+         and m/s². Nominal: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers {for_accels} {accel} per \
+         second for 1 m/s². Body frame: {}.",
+        certificate.body_frame().words(),
+    );
+    if let Some(temperature) = &certificate.calibration.temperature {
+        text.push(' ');
+        text += &temperature_words(temperature, |t| format!("{t:.1}"));
+    }
+    text
+}
+
+/// Parameters by name, and their values.
+fn quantities(xml: &mut Xml, of: &str, results: &[Measured], covariance: Option<&[Vec<f64>]>) {
+    xml.element("dcc:quantity", |xml| {
+        xml.words(
+            "dcc:name",
+            &format!("{of}names, in the order of the values"),
+        );
+        let names = results.iter().map(|of| of.name.as_str());
+        xml.leaf("dcc:charsXMLList", &names.collect::<Vec<_>>().join(" "));
+    });
+    xml.element("dcc:quantity", |xml| {
+        xml.words("dcc:name", &format!("{of}values"));
+        values(xml, results, covariance);
+    });
+}
+
+/// The values with their expanded uncertainties and, where it is known, their covariance.
+fn values(xml: &mut Xml, results: &[Measured], covariance: Option<&[Vec<f64>]>) {
     let list = |of: &dyn Fn(&Measured) -> String| -> String {
         results.iter().map(of).collect::<Vec<_>>().join(" ")
     };
@@ -347,28 +368,35 @@ fn values(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
             };
             xml.leaf("si:distributionXMLList", &list(&distribution));
         });
-        xml.element("si:ellipsoidalRegionXMLList", |xml| {
-            xml.element("si:covarianceMatrix", |xml| {
-                for (column, of_column) in results.iter().enumerate() {
-                    xml.element("si:column", |xml| {
-                        for (row, of_row) in results.iter().enumerate() {
-                            let unit = format!(
-                                "{}{}",
-                                of_row.quantity.si_unit(),
-                                of_column.quantity.si_unit()
-                            );
-                            xml.element("si:covariance", |xml| {
-                                xml.leaf("si:value", &number(covariance[row][column]));
-                                xml.leaf("si:unit", &unit.replace("\\one\\one", "\\one"));
-                            });
-                        }
-                    });
-                }
-            });
-            xml.leaf("si:coverageFactor", &number(of_ellipsoid(results.len())));
-            xml.leaf("si:coverageProbability", &number(PROBABILITY));
-            xml.leaf("si:distribution", "normal");
+        if let Some(covariance) = covariance {
+            ellipsoid(xml, results, covariance);
+        }
+    });
+}
+
+/// The region that holds all values together.
+fn ellipsoid(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
+    xml.element("si:ellipsoidalRegionXMLList", |xml| {
+        xml.element("si:covarianceMatrix", |xml| {
+            for (column, of_column) in results.iter().enumerate() {
+                xml.element("si:column", |xml| {
+                    for (row, of_row) in results.iter().enumerate() {
+                        let unit = format!(
+                            "{}{}",
+                            of_row.quantity.si_unit(),
+                            of_column.quantity.si_unit()
+                        );
+                        xml.element("si:covariance", |xml| {
+                            xml.leaf("si:value", &number(covariance[row][column]));
+                            xml.leaf("si:unit", &unit.replace("\\one\\one", "\\one"));
+                        });
+                    }
+                });
+            }
         });
+        xml.leaf("si:coverageFactor", &number(of_ellipsoid(results.len())));
+        xml.leaf("si:coverageProbability", &number(PROBABILITY));
+        xml.leaf("si:distribution", "normal");
     });
 }
 
@@ -378,9 +406,9 @@ fn of_ellipsoid(dimensions: usize) -> f64 {
     square.map_or(1.0, f64::sqrt)
 }
 
-/// Name and version of the program that made the calibration.
+/// Name and release of the program that made the calibration; PTB's rules want a letter before a release's numbers.
 fn program(certificate: &Certificate) -> (String, String) {
     let program = &certificate.provenance.program;
-    let (name, release) = program.split_once(' ').unwrap_or((program, "unknown"));
-    (name.to_owned(), release.to_owned())
+    let (name, release) = program.split_once(' ').unwrap_or((program, "0"));
+    (name.to_owned(), format!("v{release}"))
 }

@@ -15,7 +15,7 @@ use crate::lot::Specification;
 pub use as_found::{AsFound, Change};
 pub use conformity::{Conformity, Decided, Decision};
 pub use laboratory::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
-pub use results::{Measured, Quantity};
+pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
 
 /// Why there can be no certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -59,6 +59,8 @@ pub struct Certificate {
     pub sha256: String,
     /// Every parameter with its expanded uncertainty.
     pub results: Vec<Measured>,
+    /// Every parameter of the instrument's error terms with its expanded uncertainty.
+    pub terms: Vec<Measured>,
     /// Covariance of the estimated parameters, in the order of the results, in SI.
     pub covariance: Vec<Vec<f64>>,
     /// Whether limits are kept, if any are given.
@@ -110,6 +112,7 @@ impl Certificate {
             laboratory,
             provenance,
             sha256,
+            terms: results::terms(&calibration),
             results,
             covariance,
             conformity,

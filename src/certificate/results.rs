@@ -2,8 +2,8 @@
 
 use crate::calibration::Group;
 use crate::calibration::result::{Calibration, Provenance};
-use crate::calibration::{PARAMETERS, parameter_name, sensor_and_parameter};
-use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor};
+use crate::calibration::{PARAMETERS, ThermalRecord, parameter_name, sensor_and_parameter};
+use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, Term};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// Coverage factor for 95.45 % where nothing says another.
@@ -11,26 +11,49 @@ const COVERAGE_FACTOR: f64 = 2.0;
 
 /// A quantity of a certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Quantity(pub Group);
+pub enum Quantity {
+    /// Parameters of a triad.
+    Parameters(Group),
+    /// Parameters of an error term.
+    Term(Term),
+}
 
 impl Quantity {
     /// Symbol of the unit that it is shown in, and its size in SI.
     pub fn unit(self) -> (&'static str, f64) {
-        match (self.0.kind(), self.0.sensor()) {
-            (ParameterKind::Scale, _) => ("ppm", PPM),
-            (ParameterKind::Installation, _) => ("″", ARCSEC),
-            (ParameterKind::Bias, Sensor::Gyro) => ("°/h", DEG_PER_H),
-            (ParameterKind::Bias, Sensor::Accel) => ("µg", MICRO_G),
+        match self {
+            Self::Term(term) => term.unit(),
+            Self::Parameters(group) => match (group.kind(), group.sensor()) {
+                (ParameterKind::Scale, _) => ("ppm", PPM),
+                (ParameterKind::Installation, _) => ("″", ARCSEC),
+                (ParameterKind::Bias, Sensor::Gyro) => ("°/h", DEG_PER_H),
+                (ParameterKind::Bias, Sensor::Accel) => ("µg", MICRO_G),
+            },
         }
     }
 
     /// Its SI unit as D-SI spells it.
     pub fn si_unit(self) -> &'static str {
-        match (self.0.kind(), self.0.sensor()) {
-            (ParameterKind::Scale, _) => "\\one",
-            (ParameterKind::Installation, _) => "\\radian",
-            (ParameterKind::Bias, Sensor::Gyro) => "\\radian\\second\\tothe{-1}",
-            (ParameterKind::Bias, Sensor::Accel) => "\\metre\\second\\tothe{-2}",
+        match self {
+            Self::Term(term) => match term {
+                Term::AccelSecondOrder | Term::AccelCrossCoupling => {
+                    "\\second\\tothe{2}\\metre\\tothe{-1}"
+                }
+                Term::AccelThirdOrder => "\\second\\tothe{4}\\metre\\tothe{-2}",
+                Term::AccelAsymmetry
+                | Term::GyroAsymmetry
+                | Term::GyroSecondOrder
+                | Term::GyroNonlinearity => "\\one",
+                Term::SizeEffect => "\\metre",
+                Term::TimeOffset => "\\second",
+                Term::GSensitivity => "\\radian\\second\\metre\\tothe{-1}",
+            },
+            Self::Parameters(group) => match (group.kind(), group.sensor()) {
+                (ParameterKind::Scale, _) => "\\one",
+                (ParameterKind::Installation, _) => "\\radian",
+                (ParameterKind::Bias, Sensor::Gyro) => "\\radian\\second\\tothe{-1}",
+                (ParameterKind::Bias, Sensor::Accel) => "\\metre\\second\\tothe{-2}",
+            },
         }
     }
 }
@@ -42,7 +65,8 @@ pub struct Measured {
     pub name: String,
     /// What it is.
     pub quantity: Quantity,
-    /// In SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s².
+    /// In SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s²; parameters of
+    /// error terms as the calibration's file has them.
     pub value: f64,
     /// Expanded uncertainty.
     pub expanded: f64,
@@ -93,14 +117,14 @@ pub(super) fn results(
     let budget = calibration.budget.as_ref();
     let results = indices.iter().zip(&calibration.parameters).enumerate();
     let results = results.map(|(n, (&i, name))| {
-        let quantity = Quantity(Group::of(i));
+        let group = Group::of(i);
         let value = *calibration.get(name)? / factor(i);
         let own = budget.and_then(|budget| budget.coverage_factor.get(n));
         let coverage_factor = own.copied().unwrap_or(COVERAGE_FACTOR);
         Some(Measured {
             name: name.clone(),
-            quantity,
-            value: match quantity.0.kind() {
+            quantity: Quantity::Parameters(group),
+            value: match group.kind() {
                 ParameterKind::Scale => value - 1.0,
                 ParameterKind::Installation | ParameterKind::Bias => value,
             },
@@ -110,4 +134,45 @@ pub(super) fn results(
         })
     });
     Some((results.collect::<Option<_>>()?, covariance))
+}
+
+/// Every estimated parameter of the instrument's error terms; those of the table are no results of the instrument.
+pub(super) fn terms(calibration: &Calibration) -> Vec<Measured> {
+    let measured = |k: usize| {
+        let name = Term::parameter_name(k)?;
+        let record = calibration.terms.get(&name)?;
+        Some(Measured {
+            name,
+            quantity: Quantity::Term(Term::of(k)?),
+            value: record.value,
+            expanded: COVERAGE_FACTOR * record.sigma?,
+            coverage_factor: COVERAGE_FACTOR,
+            degrees_of_freedom: None,
+        })
+    };
+    (0..TERM_PARAMETERS).filter_map(measured).collect()
+}
+
+/// At which temperatures the results are valid, and where it is said how they change.
+pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
+    let triad = |(name, sensor): (&str, Sensor)| {
+        let range = of.range.get(sensor);
+        format!(
+            "{name} at {} °C, known from {} to {} °C",
+            number(range.reference_degc),
+            number(range.lowest_degc),
+            number(range.highest_degc)
+        )
+    };
+    let triads = [("gyros", Sensor::Gyro), ("accelerometers", Sensor::Accel)].map(triad);
+    format!(
+        "The results are those at the reference temperature: {}. They change with temperature; the coefficients, with \
+         their equation and their covariance, are in the attached calibration.json.",
+        triads.join("; ")
+    )
+}
+
+/// A number to twelve digits: behind them stands the rounding of arithmetic alone.
+pub fn to_twelve_digits(x: f64) -> f64 {
+    format!("{x:.11e}").parse().unwrap_or(x)
 }

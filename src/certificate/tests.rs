@@ -1,7 +1,8 @@
 use super::conformity::decide;
 use super::*;
 use crate::calibration::frame::tests::{record, with_covariance};
-use crate::calibration::result::InputFile;
+use crate::calibration::result::{EQUATION_WITH_TERMS, InputFile, TermRecord};
+use crate::calibration::{BudgetRecord, RangeRecord, ThermalRecord};
 use crate::formats::digest_of_bytes;
 use crate::imu::{InstallationForm, PerSensor};
 use crate::lot::Limit;
@@ -111,6 +112,109 @@ fn results_are_those_of_the_calibration_in_si_with_their_own_coverage_factor() {
     assert!((1.0 + first.value - calibration.gyro.scale[0] / nominal).abs() < 1e-15);
     let sigma = calibration.covariance[0][0].sqrt() / nominal;
     assert!((first.expanded / sigma - 2.0).abs() < 1e-9);
+}
+
+/// What the certificate of a calibration says, as text, and its DCC.
+fn said(calibration: Calibration) -> (String, String) {
+    let made = Certificate::new(
+        calibration,
+        digest_of_bytes(b"file"),
+        laboratory(),
+        None,
+        None,
+    );
+    let certificate = made.unwrap();
+    let document = crate::report::certificate::document(&certificate);
+    (format!("{document:?}"), dcc::write(&certificate))
+}
+
+#[test]
+fn error_terms_are_results_with_their_uncertainty_and_stand_in_the_model() {
+    let mut calibration = calibration();
+    calibration.equation = Some(EQUATION_WITH_TERMS.to_owned());
+    for (name, value) in [("gyro.g_sensitivity.xy", 5e-9), ("table.base.up", 1e-5)] {
+        let sigma = Some(0.1 * value);
+        let record = TermRecord { value, sigma };
+        calibration.terms.insert(name.to_owned(), record);
+    }
+    let (text, xml) = said(calibration);
+    // 5e-9 rad/s per m/s² is 0.0101 °/h a g, and U is a fifth of it.
+    let row = r#"["gyro.g_sensitivity.xy", "0.0101", "0.0020", "°/h/g", "2.00", "–"]"#;
+    assert!(text.contains(row), "{text}");
+    for needed in [EQUATION_WITH_TERMS, "g-sensitivity adds Q f to w"] {
+        assert!(text.contains(needed), "no {needed} in {text}");
+    }
+    for needed in [
+        "<dcc:charsXMLList>gyro.g_sensitivity.xy</dcc:charsXMLList>",
+        "<si:valueXMLList>5e-9</si:valueXMLList>",
+        "<si:unitXMLList>\\radian\\second\\metre\\tothe{-1}</si:unitXMLList>",
+        "<si:uncertaintyXMLList>1e-9</si:uncertaintyXMLList>",
+    ] {
+        assert!(xml.contains(needed), "{needed}");
+    }
+    // The table is the laboratory's, not the customer's.
+    assert!(!text.contains("table.base.up") && !xml.contains("table.base.up"));
+}
+
+#[test]
+fn results_that_change_with_temperature_state_at_which_they_hold() {
+    let range = RangeRecord {
+        lowest_degc: -20.0,
+        highest_degc: 60.0,
+        reference_degc: 21.5,
+        largest_rate_k_per_s: 1e-3,
+    };
+    let mut calibration = calibration();
+    calibration.temperature = Some(ThermalRecord {
+        equation: String::new(),
+        range: PerSensor::from_fn(|_| range),
+        coefficients: Vec::new(),
+        covariance: Vec::new(),
+        cross: Vec::new(),
+        powers: Default::default(),
+    });
+    let (text, xml) = said(calibration);
+    assert!(
+        text.contains("gyros at 21.5 °C, known from −20.0 to 60.0 °C"),
+        "{text}"
+    );
+    assert!(xml.contains("accelerometers at 21.5 °C, known from -20.0 to 60.0 °C"));
+}
+
+#[test]
+fn a_budget_is_spoken_of_only_where_there_is_one() {
+    let without = calibration();
+    let mut with = calibration();
+    let size = with.parameters.len();
+    with.budget = Some(BudgetRecord {
+        sources: Vec::new(),
+        degrees_of_freedom: vec![None; size],
+        coverage_factor: vec![2.0; size],
+        left_off: Vec::new(),
+    });
+    for (calibration, has) in [(without, false), (with, true)] {
+        assert_eq!(said(calibration).0.contains("uncertainty budget"), has);
+    }
+}
+
+#[test]
+fn nominal_scales_have_no_digits_of_arithmetic() {
+    let mut calibration = calibration();
+    let provenance = calibration.provenance.as_mut().unwrap();
+    provenance.nominal.accel = [100000.00000000001; 3];
+    let (text, xml) = said(calibration);
+    assert!(
+        text.contains(r"accelerometers 100\u{202f}000, 100\u{202f}000"),
+        "{text}"
+    );
+    assert!(xml.contains("accelerometers 100000, 100000"));
+}
+
+#[test]
+fn releases_begin_with_a_letter_as_ptbs_rules_want() {
+    let xml = dcc::write(&certificate());
+    // PTB's Schematron: ^[a-zA-Z]( )?(\d{1,3}\.){0,3}\d{1,3}$
+    assert_eq!(xml.matches("<dcc:release>v0.0.0</dcc:release>").count(), 2);
 }
 
 #[test]

@@ -123,7 +123,8 @@ impl Demo {
         let mut record = solution.calibration(&problem, &assessment);
         stamp(&mut record, &root.join("run.toml"));
         record.write(&filtered.join("calibration.json"), false)?;
-        let record = whole.record(&still, &whole.quality(&still)?);
+        let mut record = whole.record(&still, &whole.quality(&still)?);
+        stamp(&mut record, &closed.join("run.toml"));
         record.write(&closed.join("calibration.json"), false)?;
         write_report(&document, &root.join("report"))?;
         directory.commit()?;

@@ -168,11 +168,15 @@ impl<'a, M: Fn(&str) -> Option<String>> Tables<'a, M> {
         if missing.is_empty() {
             return Ok(());
         }
-        let (count, missing) = (missing.len(), list(missing.iter().map(String::as_str)));
+        let fields = match missing.len() {
+            1 => "1 required field".to_owned(),
+            count => format!("{count} required fields"),
+        };
+        let missing = list(missing.iter().map(String::as_str));
         Err(FileError::new(
             path,
             At::File,
-            format_args!("{count} required fields missing"),
+            format_args!("{fields} missing"),
             format_args!("what ISO/IEC 17025, 7.8.2 and 7.8.4, ask for: {missing}"),
             "Add what is missing.",
         ))
@@ -361,6 +365,10 @@ mod tests {
         let without = LAB.replace("number = ", "# number = ");
         let message = read(&without).unwrap_err().to_string();
         assert!(message.contains("certificate.number") && !message.contains("customer"));
+        assert!(
+            message.contains("found 1 required field missing"),
+            "{message}"
+        );
     }
 
     #[test]

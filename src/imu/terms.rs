@@ -126,6 +126,25 @@ impl Term {
         }
     }
 
+    /// What a parameter q adds to specific force f or angular rate w.
+    pub fn adds(self) -> &'static str {
+        match self {
+            Self::AccelSecondOrder => "q f^2 along its axis to f",
+            Self::AccelAsymmetry => "q |f| along its axis to f",
+            Self::SizeEffect => "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
+            Self::TimeOffset => "-q w x f to f, accelerometers sampled later",
+            Self::GSensitivity => "Q f to w, this the row and column of Q",
+            Self::GyroAsymmetry => "q |w| along its axis to w",
+            Self::GyroSecondOrder => "q w^2 / r along its axis to w, r = 100 deg/s",
+            Self::GyroNonlinearity => {
+                "q |w| w / r (odd quadratic), q w^3 / r^2 (third order) along its axis to w, r = 100 \
+                 deg/s"
+            }
+            Self::AccelThirdOrder => "q f^3 along its axis to f",
+            Self::AccelCrossCoupling => "q times the product of these two of f along its axis to f",
+        }
+    }
+
     /// 1σ of each of its parameters where nothing better is known, in SI: ten times what precise
     /// instruments have.
     pub fn usual_sigma(self) -> f64 {

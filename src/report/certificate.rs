@@ -1,14 +1,19 @@
 //! A calibration certificate in words: a document, and what stands on every page of it.
 
+mod results;
+
 use super::document::{Document, Facts, List, Table, cells};
 use super::number::{count, or_dash, sigma, value};
 use super::pdf::{Attached, Frame, PdfError};
 use super::{document::Block, pdf};
 use crate::calibration::Group;
+use crate::calibration::result::EQUATION;
 use crate::certificate::{
-    AsFound, Certificate, Condition, Conformity, Contact, Decision, Measured, Quantity, dcc,
+    AsFound, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
+    temperature_words,
 };
-use crate::imu::{ParameterKind, Sensor};
+use crate::imu::ParameterKind;
+use results::{name, results};
 
 /// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
 ///
@@ -30,7 +35,10 @@ pub fn files(
         Attached {
             name: "calibration.json".to_owned(),
             mime: "application/json",
-            description: "Calibration with covariance and uncertainty budget".to_owned(),
+            description: match certificate.calibration.budget {
+                Some(_) => "Calibration with covariance and uncertainty budget".to_owned(),
+                None => "Calibration with covariance".to_owned(),
+            },
             alternative: false,
             bytes: calibration.clone(),
         },
@@ -156,9 +164,17 @@ fn method(certificate: &Certificate) -> Facts {
     );
     facts.push(
         "model",
-        "N = K C u + D; N output per second, u angular rate or specific force along the body axes, K scale factors, \
-         C installation matrix with entries E beside the diagonal, D bias",
+        format!(
+            "{}; N output per second, u angular rate or specific force along the body axes",
+            calibration.equation.as_deref().unwrap_or(EQUATION)
+        ),
     );
+    if let Some(temperature) = &calibration.temperature {
+        facts.push(
+            "temperature",
+            temperature_words(temperature, |t| value(t, 1.0)),
+        );
+    }
     facts.push("body frame", calibration.body_frame.words());
     if let Some(gravity) = calibration.gravity {
         let accuracy = match gravity.sigma_m_s2 > 0.0 {
@@ -207,63 +223,6 @@ fn conditions(certificate: &Certificate) -> Facts {
     facts
 }
 
-fn name(measured: &str) -> String {
-    measured
-        .replace("installation", "E")
-        .replace("scale", "K")
-        .replace("bias", "D")
-}
-
-fn results(certificate: &Certificate) -> Table {
-    let row = |of: &Measured| {
-        let (unit, size) = of.quantity.unit();
-        let expanded = of.expanded / size;
-        cells![
-            name(&of.name),
-            value(of.value / size, expanded),
-            sigma(expanded),
-            unit,
-            value(of.coverage_factor, 0.1),
-            or_dash(of.degrees_of_freedom, sigma).replace('–', "∞"),
-        ]
-    };
-    let groups = Group::all().map(|group| {
-        let of_group = certificate
-            .results
-            .iter()
-            .filter(move |of| of.quantity == Quantity(group));
-        of_group.map(row).collect::<Vec<_>>()
-    });
-    let provenance = &certificate.provenance;
-    let unit = certificate.calibration.unit.as_ref();
-    let nominal = |sensor: Sensor, input: &str| {
-        let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
-        let of = provenance
-            .nominal
-            .get(sensor)
-            .map(|scale| scale.to_string());
-        // What is no rate is told per second.
-        let per = match unit.contains('/') || unit == "g" {
-            true => "",
-            false => " per second",
-        };
-        format!("{} {unit}{per} for 1 {input}", of.join(", "))
-    };
-    Table::new("Results", ["parameter", "value", "U", "unit", "k", "ν"])
-        .sections(groups)
-        .note(format!(
-            "K: scale factors, departure from nominal: gyros {}; accelerometers {}. E: entries of the installation \
-             matrix in row and column. D: biases.",
-            nominal(Sensor::Gyro, "rad/s"),
-            nominal(Sensor::Accel, "m/s²"),
-        ))
-        .note(
-            "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
-             of 95.45 % (JCGM 100); ν: effective degrees of freedom. Results are correlated: their covariance matrix \
-             is in both attached files, their uncertainty budget in calibration.json.",
-        )
-}
-
 fn verdict(conformity: &Conformity) -> String {
     let limits = conformity.limits.len();
     let kept = conformity
@@ -308,9 +267,9 @@ fn probability(of: f64) -> String {
 
 fn limits(conformity: &Conformity) -> Table {
     let rows = conformity.limits.iter().map(|of| {
-        let quantity = Quantity(Group::of(of.limit.parameter));
-        let (unit, size) = quantity.unit();
-        let base = match quantity.0.kind() {
+        let group = Group::of(of.limit.parameter);
+        let (unit, size) = Quantity::Parameters(group).unit();
+        let base = match group.kind() {
             ParameterKind::Scale => 1.0,
             ParameterKind::Installation | ParameterKind::Bias => 0.0,
         };

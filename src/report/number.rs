@@ -52,6 +52,14 @@ pub(super) fn whole(x: f64) -> String {
     format!("{sign}{}", count(x.abs().round() as usize))
 }
 
+/// A number with all its digits.
+pub(super) fn plain(x: f64) -> String {
+    match x.fract() == 0.0 {
+        true => whole(x),
+        false => x.to_string().replace('-', "−"),
+    }
+}
+
 /// A whole number in groups of three digits.
 pub(super) fn count(n: usize) -> String {
     let digits = n.to_string();

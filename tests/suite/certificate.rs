@@ -31,6 +31,40 @@ else:
     print('no TURNCAL_DCC_SCHEMA')
 ";
 
+fn turncal(arguments: &[&Path]) {
+    let done = Command::new(env!("CARGO_BIN_EXE_turncal"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{done:?}");
+}
+
+/// Writes the certificate of a calibration to a directory.
+fn certify(calibration: &Path, paper: &Path) {
+    let lab = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
+    turncal(&[
+        Path::new("certificate"),
+        calibration,
+        Path::new("--laboratory"),
+        &lab,
+        Path::new("-o"),
+        paper,
+    ]);
+}
+
+#[test]
+fn both_calibrations_of_the_demo_get_a_certificate_that_names_their_files() {
+    let directory = tempfile::tempdir().unwrap();
+    let demo = directory.path().join("demo");
+    turncal(&[Path::new("demo"), Path::new("-o"), &demo]);
+    for method in ["ekf", "six-position"] {
+        let paper = directory.path().join(method);
+        certify(&demo.join(method).join("calibration.json"), &paper);
+        let xml = std::fs::read_to_string(paper.join("dcc.xml")).unwrap();
+        assert!(xml.contains("; imu.csv"), "{method}");
+    }
+}
+
 #[test]
 fn a_certificate_is_a_pdf_a_3_with_its_files_in_it_and_valid_xml() {
     let Some(shared) = shared("three-axis-counts") else {
@@ -38,29 +72,13 @@ fn a_certificate_is_a_pdf_a_3_with_its_files_in_it_and_valid_xml() {
     };
     let directory = tempfile::tempdir().unwrap();
     let [result, paper] = ["result", "paper"].map(|name| directory.path().join(name));
-    let turncal = |arguments: &[&Path]| {
-        let done = Command::new(env!("CARGO_BIN_EXE_turncal"))
-            .args(arguments)
-            .output()
-            .unwrap();
-        assert!(done.status.success(), "{done:?}");
-    };
-    let output = Path::new("-o");
     turncal(&[
         Path::new("calibrate"),
         &shared.join("run.toml"),
-        output,
+        Path::new("-o"),
         &result,
     ]);
-    let lab = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
-    turncal(&[
-        Path::new("certificate"),
-        &result.join("calibration.json"),
-        Path::new("--laboratory"),
-        &lab,
-        output,
-        &paper,
-    ]);
+    certify(&result.join("calibration.json"), &paper);
     let python = std::env::var("TURNCAL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let Ok(ran) = Command::new(python)
         .args(["-c", SCRIPT])

@@ -102,14 +102,17 @@ impl Remainder {
         }
     }
 
+    /// The largest length of `errors u` for u of length one.
+    fn largest(&self) -> f64 {
+        self.errors.singular_values().max()
+    }
+
     /// How much that is, in a sentence.
     pub fn words(&self) -> String {
         let scale = self.errors.diagonal().amax();
         let mut across = self.errors;
         across.fill_diagonal(0.0);
-        let worst = (0..3)
-            .map(|i| self.errors.row(i).norm())
-            .fold(0.0, f64::max);
+        let worst = self.largest();
         let (name, example) = match self.sensor {
             Sensor::Gyro => ("gyros", format!("{:.3} deg/s at 100 deg/s", 100.0 * worst)),
             Sensor::Accel => ("accelerometers", format!("{:.3} mg at 1 g", 1e3 * worst)),
@@ -119,8 +122,8 @@ impl Remainder {
             Sensor::Accel => format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
         };
         format!(
-            "{name}: what is left is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together {example}, \
-             and {bias} of bias",
+            "{name}: what is left is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together {example} \
+             in any direction, and {bias} of bias",
             scale / PPM,
             across.amax() / ARCSEC
         )
@@ -156,6 +159,26 @@ pub(super) fn upper(a: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_is_as_long_as_the_longest_error_vector_of_any_input() {
+        // Each row is 1e-3 long, yet along (1, 1, 1)/√3 all three err by it at once.
+        let errors = Matrix3::repeat(1e-3 / 3f64.sqrt());
+        let triad = Normalised {
+            nominal: Vector3::repeat(1.0),
+            sensitivity: Matrix3::identity() + errors,
+            bias: Vector3::zeros(),
+        };
+        let zero = Vector3::zeros();
+        let left = Remainder::of(Sensor::Accel, &triad, &Matrix3::identity(), &zero);
+        let input = Vector3::repeat(1.0 / 3f64.sqrt());
+        assert!(((errors * input).norm() - 1.732e-3).abs() < 1e-6);
+        let words = left.words();
+        assert!(
+            words.contains("together 1.732 mg at 1 g in any direction"),
+            "{words}"
+        );
+    }
 
     #[test]
     fn a_matrix_is_its_upper_triangle_times_a_rotation() {

@@ -127,24 +127,11 @@ impl<'a> Source<'a> {
         let line = |k: usize| {
             let term = Term::of(k).filter(|&term| has(term))?;
             let (name, value) = (Term::parameter_name(k)?, self.correction.terms[k]);
-            let adds = match term {
-                Term::AccelSecondOrder => "q f^2 along its axis to f",
-                Term::AccelAsymmetry => "q |f| along its axis to f",
-                Term::SizeEffect => "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
-                Term::TimeOffset => "-q w x f to f, accelerometers sampled later",
-                Term::GSensitivity => "Q f to w, this the row and column of Q",
-                Term::GyroAsymmetry => "q |w| along its axis to w",
-                Term::GyroSecondOrder => "q w^2 / r along its axis to w, r = 100 deg/s",
-                Term::GyroNonlinearity => {
-                    "q |w| w / r (odd quadratic), q w^3 / r^2 (third order) along its axis to w, r = 100 \
-                     deg/s"
-                }
-                Term::AccelThirdOrder => "q f^3 along its axis to f",
-                Term::AccelCrossCoupling => {
-                    "q times the product of these two of f along its axis to f"
-                }
-            };
-            Some(format!("{name} = {value:e} {}, adds {adds}", si_unit(term)))
+            Some(format!(
+                "{name} = {value:e} {}, adds {}",
+                si_unit(term),
+                term.adds()
+            ))
         };
         self.correction.terms().filter_map(line).collect()
     }

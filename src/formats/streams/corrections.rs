@@ -50,12 +50,22 @@ struct Known {
     applied: Option<Applied>,
 }
 
+/// What was done to samples of a triad, in the same words for all of them.
+struct Done {
+    applied: Option<Applied>,
+    /// Number of the first such sample, from one.
+    first: u64,
+    /// Whether numbers have changed behind the same words.
+    varies: bool,
+}
+
 /// What is taken out of the samples of a stream.
 pub(super) struct Undo {
     /// Who applied it.
     pub program: &'static str,
     pub corrected: PerSensor<Option<Corrected>>,
-    said: PerSensor<Option<String>>,
+    samples: u64,
+    done: PerSensor<Vec<Done>>,
     /// What was applied, as long as parameters and device stay.
     found: PerSensor<Option<Known>>,
 }
@@ -65,18 +75,22 @@ impl Undo {
         Self {
             program,
             corrected,
-            said: PerSensor::default(),
+            samples: 0,
+            done: PerSensor::default(),
             found: PerSensor::default(),
         }
     }
 
-    /// Makes of a sample what the sensor gave; `changes` counts those of parameters so far.
+    /// Makes of a sample what the sensor gave; `changes` counts those of parameters so far. Whether there is more to
+    /// say than before.
     pub fn undo(
         &mut self,
         row: &mut [f64],
         changes: u64,
         applied: impl Fn(Sensor, Option<f64>) -> Option<Applied>,
-    ) {
+    ) -> bool {
+        self.samples += 1;
+        let mut is_news = false;
         for sensor in Sensor::ALL {
             let Some(of) = self.corrected.get(sensor) else {
                 continue;
@@ -87,10 +101,12 @@ impl Undo {
                 .as_ref()
                 .is_some_and(|known| known.changes == changes && known.device == device)
             {
+                let applied = applied(sensor, device);
+                is_news |= note(self.done.get_mut(sensor), applied.as_ref(), self.samples);
                 *known = Some(Known {
                     changes,
                     device,
-                    applied: applied(sensor, device),
+                    applied,
                 });
             }
             let found = known.as_ref().and_then(|known| known.applied.as_ref());
@@ -100,35 +116,66 @@ impl Undo {
                     row[place] = row[place] / applied.scale[axis] + applied.offset[axis] * seconds;
                 }
             }
-            let said = self.said.get_mut(sensor);
-            if said.is_none() {
-                *said = Some(words(self.program, sensor, found));
-            }
         }
+        is_news
     }
 
-    /// What was undone, a sentence a triad.
+    /// What was undone, a sentence for each triad and each thing that was done to it.
     pub fn remarks(&self) -> Vec<String> {
-        let said = Sensor::ALL
-            .iter()
-            .filter_map(|&sensor| self.said.get(sensor).clone());
-        said.collect()
+        let of_triad = |&sensor: &Sensor| {
+            let done = self.done.get(sensor);
+            done.iter().map(move |of| {
+                let words = words(self.program, sensor, of);
+                match done.len() {
+                    1 => words,
+                    _ => format!("Part of the samples, from number {}: {words}", of.first),
+                }
+            })
+        };
+        Sensor::ALL.iter().flat_map(of_triad).collect()
     }
 }
 
-fn words(program: &str, sensor: Sensor, found: Option<&Applied>) -> String {
+/// Notes what is done to a sample; whether that has no words yet.
+fn note(done: &mut Vec<Done>, applied: Option<&Applied>, sample: u64) -> bool {
+    let kind = |of: Option<&Applied>| of.map(|of| (of.name.clone(), of.is_more));
+    let same = done
+        .iter_mut()
+        .find(|of| kind(of.applied.as_ref()) == kind(applied));
+    match same {
+        Some(same) => {
+            let differs = !same.varies && same.applied.as_ref() != applied;
+            same.varies |= differs;
+            differs
+        }
+        None => {
+            done.push(Done {
+                applied: applied.cloned(),
+                first: sample,
+                varies: false,
+            });
+            true
+        }
+    }
+}
+
+fn words(program: &str, sensor: Sensor, done: &Done) -> String {
     let triad = match sensor {
         Sensor::Gyro => "gyros",
         Sensor::Accel => "accelerometers",
     };
-    match found {
+    let varies = match done.varies {
+        true => ", which change within the log",
+        false => "",
+    };
+    match &done.applied {
         Some(of) if of.is_more => format!(
-            "{program} corrected its {triad} by {} and did more to them, turned axes or compensated temperature: this \
-             is not undone, so the calibration is that of corrected data.",
+            "{program} corrected its {triad} by {}{varies} and did more to them, turned axes or compensated \
+             temperature: this is not undone, so the calibration is that of corrected data.",
             of.name
         ),
         Some(of) => format!(
-            "{program} corrected its {triad} by {}: this is undone.",
+            "{program} corrected its {triad} by {}{varies}: this is undone.",
             of.name
         ),
         None => format!(

@@ -211,12 +211,11 @@ impl Log for DataFlash {
         }
         let (undo, instance) = &mut self.undo[stream];
         let (parameters, instance) = (&self.parameters, *instance);
-        undo.undo(row, self.changes, |sensor, _| {
+        let is_news = undo.undo(row, self.changes, |sensor, _| {
             applied(parameters, sensor, instance)
         });
-        let remarks = &mut self.streams[stream].remarks;
-        if remarks.is_empty() {
-            *remarks = undo.remarks();
+        if is_news {
+            self.streams[stream].remarks = undo.remarks();
         }
         Ok(())
     }
@@ -296,11 +295,13 @@ fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> 
         Sensor::Gyro => "GYR",
         Sensor::Accel => "ACC",
     };
-    let stem = match (instance, sensor) {
-        (0, Sensor::Gyro) => "INS_GYR".to_owned(),
-        (0, Sensor::Accel) => "INS_ACC".to_owned(),
-        (1 | 2, _) => format!("INS_{kind}{}", instance + 1),
-        (more, _) => format!("INS{}_{kind}", more + 1),
+    // A damaged log may have an instance 255.
+    let number = u16::from(instance) + 1;
+    let stem = match (number, sensor) {
+        (1, Sensor::Gyro) => "INS_GYR".to_owned(),
+        (1, Sensor::Accel) => "INS_ACC".to_owned(),
+        (2 | 3, _) => format!("INS_{kind}{number}"),
+        _ => format!("INS{number}_{kind}"),
     };
     let axes = |what: &str| {
         let of = |axis: &str| parameters.get(&format!("{stem}{what}_{axis}")).copied();
@@ -325,6 +326,6 @@ fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> 
         scale: scale
             .filter(|scale| scale.iter().all(|&s| s != 0.0))
             .unwrap_or([1.0; 3]),
-        is_more: is_on("AHRS_ORIENTATION") || is_on(&format!("INS_TCAL{}_ENABLE", instance + 1)),
+        is_more: is_on("AHRS_ORIENTATION") || is_on(&format!("INS_TCAL{number}_ENABLE")),
     })
 }

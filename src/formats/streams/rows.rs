@@ -46,8 +46,9 @@ pub(in crate::formats) fn survey(
                 if samples.len() <= stream {
                     samples.resize(stream + 1, 0);
                 }
-                // The first shows what is to be said of the stream.
-                if samples[stream] == 0
+                // The first shows whether there is something to say of the stream, which others may add to.
+                let is_told = |of: &Stream| !of.remarks.is_empty();
+                if (samples[stream] == 0 || is_told(&log.streams()[stream]))
                     && let Err(broken) = log.values(&mut row)
                 {
                     break Some(broken);

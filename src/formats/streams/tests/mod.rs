@@ -1,5 +1,6 @@
 //! What small files of every format give, whole, cut and damaged.
 
+mod ulog;
 mod write;
 
 use std::io::Cursor;
@@ -52,7 +53,7 @@ fn fixtures() -> Vec<Fixture> {
     vec![
         (
             "vehicle_imu[0]",
-            write::ulog(),
+            ulog::ulog(),
             [
                 "timestamp",
                 "delta_angle[0]",

@@ -25,7 +25,7 @@ fn counted(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u32).to_le_bytes(), bytes].concat()
 }
 
-fn floats(values: &[f64]) -> Vec<u8> {
+pub fn floats(values: &[f64]) -> Vec<u8> {
     values
         .iter()
         .flat_map(|&value| (value as f32).to_le_bytes())
@@ -37,49 +37,6 @@ fn doubles(values: &[f64]) -> Vec<u8> {
         .iter()
         .flat_map(|value| value.to_le_bytes())
         .collect()
-}
-
-pub fn ulog() -> Vec<u8> {
-    let message = |kind: u8, content: &[u8]| {
-        [&(content.len() as u16).to_le_bytes()[..], &[kind], content].concat()
-    };
-    let parameter = |name: &str, value: &[u8]| {
-        message(
-            b'P',
-            &[&[name.len() as u8], name.as_bytes(), value].concat(),
-        )
-    };
-    let mut file = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
-    file.extend(message(b'B', &[0; 40]));
-    let fields = "uint64_t timestamp;uint32_t accel_device_id;uint32_t gyro_device_id;float[3] delta_angle;\
-                  float[3] delta_velocity;uint32_t delta_angle_dt;uint32_t delta_velocity_dt;uint8_t[4] _padding0;";
-    file.extend(message(b'F', format!("vehicle_imu:{fields}").as_bytes()));
-    for (triad, id) in [("ACC", 11), ("GYRO", 12)] {
-        file.extend(parameter(
-            &format!("int32_t CAL_{triad}0_ID"),
-            &i32::to_le_bytes(id),
-        ));
-        file.extend(parameter(
-            &format!("float CAL_{triad}0_XOFF"),
-            &f32::to_le_bytes(0.5),
-        ));
-    }
-    file.extend(parameter("float CAL_ACC0_YSCALE", &f32::to_le_bytes(2.0)));
-    file.extend(message(b'A', &[&[0, 5, 0], &b"vehicle_imu"[..]].concat()));
-    for k in 0..SAMPLES {
-        let [t, ref values @ ..] = sample(k);
-        let data = [
-            &[5, 0][..],
-            &((t * 1e6) as u64).to_le_bytes(),
-            &11u32.to_le_bytes(),
-            &12u32.to_le_bytes(),
-            &floats(values),
-            &7812u32.to_le_bytes(),
-            &7812u32.to_le_bytes(),
-        ];
-        file.extend(message(b'D', &data.concat()));
-    }
-    file
 }
 
 pub fn dataflash() -> Vec<u8> {

@@ -15,12 +15,27 @@ const CALIBRATIONS: usize = 4;
 #[derive(Default)]
 pub(super) struct Parameters {
     values: BTreeMap<String, f64>,
-    selected: PerSensor<Option<f64>>,
+    pub selected: PerSensor<Option<f64>>,
     /// How often one of them was set.
     pub changes: u64,
 }
 
 impl Parameters {
+    /// None yet, with devices that were selected before.
+    pub fn of(selected: PerSensor<Option<f64>>) -> Self {
+        Self {
+            selected,
+            ..Self::default()
+        }
+    }
+
+    /// Whether it is known which gyros and which accelerometers are selected.
+    pub fn have_selected(&self) -> bool {
+        Sensor::ALL
+            .into_iter()
+            .all(|sensor| self.selected.get(sensor).is_some())
+    }
+
     pub fn take(&mut self, content: &mut Slice) -> Result<(), Broken> {
         let length = content.length(1, "the length of a parameter's name")?;
         let key = content.text(length, "a parameter's name")?;
@@ -44,11 +59,11 @@ impl Parameters {
     }
 
     pub fn select(&mut self, sensor: Sensor, device: f64) {
-        *self.selected.get_mut(sensor) = Some(device);
-        self.changes += 1;
+        let before = self.selected.get_mut(sensor).replace(device);
+        self.changes += u64::from(before != Some(device));
     }
 
-    fn of(&self, name: &str) -> Option<f64> {
+    fn value(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied()
     }
 
@@ -61,7 +76,7 @@ impl Parameters {
         };
         let named = |number: usize| format!("CAL_{kind}{number}");
         let mut known = (0..CALIBRATIONS).filter(|&number| {
-            let id = self.of(&format!("{}_ID", named(number)));
+            let id = self.value(&format!("{}_ID", named(number)));
             id.is_some_and(|id| id != 0.0 && device.is_none_or(|device| device == id))
         });
         let (number, further) = (known.next()?, known.next());
@@ -70,10 +85,10 @@ impl Parameters {
         }
         let name = named(number);
         let axes = |what: &str, otherwise: f64| {
-            let of = |axis| self.of(&format!("{name}_{axis}{what}"));
+            let of = |axis| self.value(&format!("{name}_{axis}{what}"));
             ["X", "Y", "Z"].map(|axis| of(axis).unwrap_or(otherwise))
         };
-        let is_on = |name: &str| self.of(name).is_some_and(|value| value > 0.0);
+        let is_on = |name: &str| self.value(name).is_some_and(|value| value > 0.0);
         Some(Applied {
             offset: axes("OFF", 0.0),
             scale: axes("SCALE", 1.0),
@@ -81,6 +96,18 @@ impl Parameters {
             name: format!("{name}_XOFF … {name}_ZSCALE"),
         })
     }
+}
+
+/// Columns of the devices that a topic says are selected; one says so when that changes, the other at intervals.
+pub(super) fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
+    PerSensor::from_fn(|sensor| {
+        let name = match topic {
+            "sensor_selection" => format!("{}_device_id", sensor.name()),
+            "sensors_status_imu" => format!("{}_device_id_primary", sensor.name()),
+            _ => return None,
+        };
+        columns.iter().position(|column| column.name == name)
+    })
 }
 
 /// What of a topic is corrected.

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::bytes::{Broken, Input, Slice};
 use super::corrections::Undo;
-use super::{Column, Log, Stream};
+use super::{Log, Stream};
 use crate::imu::{PerSensor, Sensor};
 use corrections::Parameters;
 use layout::Layout;
@@ -29,18 +29,11 @@ const INERTIAL: [&str; 4] = [
 
 pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(HEADER, "the header")?;
-    Ok(Box::new(Ulog {
-        input,
-        formats: BTreeMap::new(),
-        parameters: Parameters::default(),
-        is_px4: false,
-        streams: Vec::new(),
-        topics: HashMap::new(),
-        appended: Vec::new(),
-        message: Vec::new(),
-        offset: HEADER,
-        current: None,
-    }))
+    let mut ahead = Ulog::begin(input, PerSensor::default());
+    let selected = ahead.first_selected();
+    let mut input = ahead.input;
+    input.go_to(HEADER)?;
+    Ok(Box::new(Ulog::begin(input, selected)))
 }
 
 struct Ulog {
@@ -128,12 +121,11 @@ impl Log for Ulog {
         let data = self.message.get(2..).unwrap_or_default();
         topic.layout.values(data, self.offset + 5, row)?;
         let parameters = &self.parameters;
-        topic.undo.undo(row, parameters.changes, |sensor, device| {
+        let is_news = topic.undo.undo(row, parameters.changes, |sensor, device| {
             parameters.applied(sensor, device)
         });
-        let remarks = &mut self.streams[topic.stream].remarks;
-        if remarks.is_empty() {
-            *remarks = topic.undo.remarks();
+        if is_news {
+            self.streams[topic.stream].remarks = topic.undo.remarks();
         }
         Ok(())
     }
@@ -144,6 +136,29 @@ impl Log for Ulog {
 }
 
 impl Ulog {
+    /// At the first message, where these devices are the selected ones.
+    fn begin(input: Input, selected: PerSensor<Option<f64>>) -> Self {
+        Self {
+            input,
+            formats: BTreeMap::new(),
+            parameters: Parameters::of(selected),
+            is_px4: false,
+            streams: Vec::new(),
+            topics: HashMap::new(),
+            appended: Vec::new(),
+            message: Vec::new(),
+            offset: HEADER,
+            current: None,
+        }
+    }
+
+    /// The devices that are selected first: they were when logging began, but samples of others stand before the
+    /// message that says so. What is damaged is told where it is read.
+    fn first_selected(&mut self) -> PerSensor<Option<f64>> {
+        while !self.parameters.have_selected() && matches!(self.advance(), Ok(Some(_))) {}
+        self.parameters.selected
+    }
+
     fn content(&self) -> Slice<'_> {
         Slice::new(&self.message, self.offset + 3)
     }
@@ -232,11 +247,7 @@ impl Ulog {
         let layout = Layout::of(&name, &self.formats)
             .map_err(|(found, expected)| Broken::new(self.offset, found, expected))?;
         let undo = corrections::of_topic(&name, &layout.columns);
-        let selects = PerSensor::from_fn(|sensor| {
-            let device = format!("{}_device_id", sensor.name());
-            let is = |column: &Column| name == "sensor_selection" && column.name == device;
-            layout.columns.iter().position(is)
-        });
+        let selects = corrections::selects(&name, &layout.columns);
         let stream = self.streams.len();
         self.streams.push(Stream {
             name: format!("{name}[{instance}]"),

@@ -1,0 +1,100 @@
+//! The table of results.
+
+use super::super::document::{NONE, Table, cells};
+use super::super::number::{plain, sigma, value};
+use crate::calibration::Group;
+use crate::certificate::{Certificate, Measured, Quantity, to_twelve_digits};
+use crate::imu::{Sensor, Term};
+
+/// A parameter's name with the model's letter.
+pub(super) fn name(measured: &str) -> String {
+    measured
+        .replace("installation", "E")
+        .replace("scale", "K")
+        .replace("bias", "D")
+}
+
+/// Every parameter with its expanded uncertainty, and what both are.
+pub(super) fn results(certificate: &Certificate) -> Table {
+    let has_budget = certificate.calibration.budget.is_some();
+    let row = |of: &Measured| {
+        // Only a budget evaluates them, and it is one of the triads' parameters.
+        let infinite = match of.quantity {
+            Quantity::Parameters(_) if has_budget => "∞",
+            _ => NONE,
+        };
+        let (unit, size) = of.quantity.unit();
+        let expanded = of.expanded / size;
+        cells![
+            name(&of.name),
+            value(of.value / size, expanded),
+            sigma(expanded),
+            unit,
+            value(of.coverage_factor, 0.1),
+            of.degrees_of_freedom.map_or(infinite.to_owned(), sigma),
+        ]
+    };
+    let groups = Group::all().map(|group| {
+        let of_group = certificate
+            .results
+            .iter()
+            .filter(move |of| of.quantity == Quantity::Parameters(group));
+        of_group.map(row).collect::<Vec<_>>()
+    });
+    let terms = Term::ALL.map(|term| {
+        let all = certificate.terms.iter();
+        let of_term = all.filter(move |of| of.quantity == Quantity::Term(term));
+        of_term.map(row).collect::<Vec<_>>()
+    });
+    let provenance = &certificate.provenance;
+    let unit = certificate.calibration.unit.as_ref();
+    let nominal = |sensor: Sensor, input: &str| {
+        let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
+        let of = provenance
+            .nominal
+            .get(sensor)
+            .map(|scale| plain(to_twelve_digits(scale)));
+        // What is no rate is told per second.
+        let per = match unit.contains('/') || unit == "g" {
+            true => "",
+            false => " per second",
+        };
+        format!("{} {unit}{per} for 1 {input}", of.join(", "))
+    };
+    let budget = match has_budget {
+        true => ", their uncertainty budget in calibration.json",
+        false => "",
+    };
+    let table = Table::new("Results", ["parameter", "value", "U", "unit", "k", "ν"])
+        .sections(groups)
+        .sections(terms)
+        .note(format!(
+            "K: scale factors, departure from nominal: gyros {}; accelerometers {}. E: entries of the installation \
+             matrix in row and column. D: biases.",
+            nominal(Sensor::Gyro, "rad/s"),
+            nominal(Sensor::Accel, "m/s²"),
+        ))
+        .note(format!(
+            "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
+             of 95.45 % (JCGM 100); ν: effective degrees of freedom, – where not evaluated. Results are correlated: the covariance matrix of \
+             K, E and D is in both attached files{budget}.",
+        ));
+    match certificate.terms.is_empty() {
+        true => table,
+        false => table.note(of_terms(certificate)),
+    }
+}
+
+/// What the error terms that have results add to the model's input.
+fn of_terms(certificate: &Certificate) -> String {
+    let has = |term: &Term| {
+        let mut all = certificate.terms.iter();
+        all.any(|of| of.quantity == Quantity::Term(*term))
+    };
+    let words = |term: Term| format!("{} adds {}", term.name(), term.adds());
+    let all: Vec<String> = Term::ALL.into_iter().filter(has).map(words).collect();
+    format!(
+        "Error terms, of which t of the model is the sum: {}; f specific force, w angular rate, q the parameter.",
+        all.join("; ")
+    )
+}
