@@ -3,6 +3,7 @@
 //! place without a table.
 
 mod both_triads;
+mod earth_rate;
 mod gravity;
 mod labels;
 mod least_squares;

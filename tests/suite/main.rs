@@ -23,6 +23,7 @@ mod help;
 mod init;
 #[cfg(unix)]
 mod interrupted;
+mod labels;
 mod learnt_noise;
 mod logs;
 mod lot;
