@@ -12,6 +12,7 @@ mod cli;
 mod clocks;
 mod closed_form;
 mod compare;
+mod contradictions;
 mod door;
 mod error_terms;
 mod exits;
