@@ -3,6 +3,7 @@
 //! place without a table.
 
 mod both_triads;
+mod earth_rate;
 mod gravity;
 mod labels;
 mod least_squares;
@@ -17,6 +18,7 @@ use super::parameters::parameter;
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
 use super::rounding::{by_rounding, rounded};
+use super::unexplained::unexplained_residuals;
 use crate::earth::Site;
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
@@ -64,6 +66,8 @@ pub(super) fn six_position_by(
     let notes = problem.notes().into_iter();
     let notes = notes.map(|note| Finding::Recording { note });
     closed_form.findings.splice(0..0, notes);
+    let unexplained = unexplained_residuals(&closed_form.findings);
+    closed_form.findings.extend(unexplained);
     closed_form.findings.extend(scatter_at_rest(problem));
     let rounding = by_rounding(problem, &closed_form.estimate.triads);
     let covariance = &mut closed_form.estimate.covariance;

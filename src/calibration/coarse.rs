@@ -17,6 +17,7 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::linearisation::{AttitudePrior, Linearisation, singular};
+use super::parameters::ParameterMatrix;
 use super::problem::Problem;
 use crate::attitude::exp;
 use crate::imu::{ParameterKind, Sensor, TermVector};
@@ -105,6 +106,8 @@ fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ByGravity {
     pub estimate: Estimate,
+    /// Of how far the data bring the estimate from a prior that is right.
+    pub distance: ParameterMatrix,
     /// Residuals beyond chance, by which the covariance was widened, and a drift that they follow.
     pub ringing: Vec<Finding>,
 }
@@ -124,6 +127,7 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
     let residuals = equations.residuals(&shared).ok_or_else(singular)?;
     let growth = residuals.growth();
     let covariance = equations.covariance_by(&shared, growth.unwrap_or(1.0));
+    let distance = equations.covariance_of_distance(&shared, growth.unwrap_or(1.0));
     let (groups, times) = turns::dwells_and_moves(problem);
     let worst = residuals.worst(&groups);
     let mut of_equation = vec![0.0; groups.iter().map(Vec::len).sum()];
@@ -145,6 +149,7 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
             triads,
             covariance: covariance.ok_or_else(singular)?,
         },
+        distance: distance.ok_or_else(singular)?,
         ringing: growth
             .map(|growth| Finding::ResidualsLarge {
                 of: "both triads",

@@ -203,15 +203,23 @@ pub enum Finding {
         /// … and by how much at most in 999 runs of 1000 without, for both triads and both kinds at once.
         limit: f64,
     },
-    /// Innovations that no noise figure explains.
+    /// Innovations, or residuals of the closed form, that no noise figure explains.
     Unexplained {
-        /// NIS of all observations …
+        /// NIS of all observations; of the closed form χ² over its degrees of freedom, without the worst
+        /// position …
         nis: f64,
         /// … and what it stays below unless stated noise is more wrong than figures are.
         limit: f64,
-        /// When an innovation was the largest, s.
+        /// When an innovation was the largest, or the worst position begins, s.
         worst: f64,
     },
+}
+
+impl Finding {
+    /// Whether it says that no noise explains what a calibration leaves, so that it is none.
+    pub fn is_unexplained(&self) -> bool {
+        matches!(self, Self::Unexplained { .. })
+    }
 }
 
 /// By how much recordings differ in a group of parameters.

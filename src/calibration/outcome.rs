@@ -94,8 +94,7 @@ pub struct Outcome {
 impl Outcome {
     /// Whether it may be used: it converged, and noise explains what it leaves.
     pub fn is_usable(&self) -> bool {
-        let unexplained = |finding: &Finding| matches!(finding, Finding::Unexplained { .. });
-        self.converged && !self.findings.iter().any(unexplained)
+        self.converged && !self.findings.iter().any(Finding::is_unexplained)
     }
 
     /// Whether the run observed the heading: two that are opposite differ by more than 6 in χ² by what

@@ -5,7 +5,9 @@ use nalgebra::Vector3;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::model::Model;
-use super::parameters::{parameter, parameter_name, sensor_and_parameter};
+use super::parameters::{
+    ParameterMatrix, from_vector, parameter, parameter_name, sensor_and_parameter,
+};
 use super::prior_cause::PriorCause;
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::chi_square_limit;
@@ -15,6 +17,8 @@ use crate::units::{DEGREE, PPM};
 const CONTRADICTS: f64 = 5.0;
 /// Chance that a prior which is right is widened.
 const FALSE_ALARM: f64 = 1e-3;
+/// What data do not see, rounding moves by such a part of the prior's variance.
+const ROUNDING: f64 = 1e-9;
 /// Parts that differ by less than this much of what they have in common are alike.
 const ALIKE: f64 = 0.5;
 
@@ -31,6 +35,36 @@ pub(super) fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Findi
         distances: far.iter().map(|&i| off[i] / model.prior_sigma[i]).collect(),
         causes: causes(&far, &estimate.triads),
     })
+}
+
+/// Parameters of which the data alone say other than their prior does, where that is in the estimate; by the
+/// covariance of how far data bring an estimate from a prior that is right.
+///
+/// A prior that is too tight holds the estimate, so that its distance says nothing. With `P⁻¹ = S⁻¹ + V⁻¹` of
+/// prior and data it is `P V⁻¹` of theirs, `P S⁻¹ P V⁻¹` its variance where the prior is right: over its σ it is what
+/// theirs is over both σ.
+pub(super) fn far_by_data(
+    model: &Model,
+    estimate: &Estimate,
+    distance: &ParameterMatrix,
+) -> Option<Finding> {
+    let mut by_data = estimate.vector();
+    let mut sigma = estimate.sigma();
+    for i in estimate.estimated() {
+        let (off, prior) = (by_data[i] - model.prior_mean[i], model.prior_sigma[i]);
+        let share = distance[(i, i)] / prior.powi(2);
+        if off == 0.0 || share.is_nan() || share <= ROUNDING {
+            continue;
+        }
+        by_data[i] = model.prior_mean[i] + off / share;
+        // Both σ together are those of the distance over the share that the data have in it.
+        sigma[i] = prior * (share.recip() - 1.0).max(0.0).sqrt();
+    }
+    let by_data = Estimate {
+        triads: from_vector(estimate.form(), &by_data),
+        covariance: ParameterMatrix::from_diagonal(&sigma.map(|sigma| sigma.powi(2))),
+    };
+    far_from_prior(model, &by_data)
 }
 
 /// The model with a prior that its estimate does not contradict: where it does, σ of each parameter is at
@@ -160,7 +194,7 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
-    use crate::calibration::{Options, ParameterMatrix};
+    use crate::calibration::Options;
     use crate::imu::InstallationForm;
     use crate::simulation::Scenario;
 

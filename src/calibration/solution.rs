@@ -125,9 +125,12 @@ impl Solution {
         self.outcome().is_none_or(|outcome| outcome.converged)
     }
 
-    /// Whether it may be used: a closed form always, the filter by [`Outcome::is_usable`].
+    /// Whether it may be used: the filter converged, and noise explains what either method leaves.
     pub fn is_usable(&self) -> bool {
-        self.outcome().is_none_or(Outcome::is_usable)
+        match self {
+            Self::Filter(outcome) => outcome.is_usable(),
+            Self::ClosedForm(closed_form) => closed_form.is_usable(),
+        }
     }
 
     /// Tests error terms and judges what is left of gravity and turns. What error terms do that the data

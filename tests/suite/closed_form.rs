@@ -19,7 +19,7 @@ use turncal::turntable::{BodyStep, Moves, Path, Rotation};
 use turncal::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G};
 
 /// Chance that a mean over right runs lies outside its interval.
-const OUTSIDE: f64 = 2e-3;
+pub const OUTSIDE: f64 = 2e-3;
 
 /// NEES, the number of squares that it is a sum of, and the largest error over its σ.
 fn squares(closed_form: &ClosedForm, made: &Simulated) -> (f64, usize, f64) {
@@ -95,7 +95,7 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 
 /// The instrument of a scenario turned by hand: six positions, and a full turn about each axis both ways, each
 /// off by tilts of this σ. Without a table's log, and with labels.
-fn by_hand(scenario: &Scenario, tilt: f64, seed: u64) -> Simulated {
+pub fn by_hand(scenario: &Scenario, tilt: f64, seed: u64) -> Simulated {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let heading = exp(Vector3::z() * (normal(&mut rng).x * 10.0 * PI));
     let level = |up: Vector3<f64>| {
@@ -124,7 +124,9 @@ fn by_hand(scenario: &Scenario, tilt: f64, seed: u64) -> Simulated {
             Some(before) => go(log(&(Matrix3::transpose(&before) * here))),
         }
         labels.push(Some(LabelledMotion::Stands { up }));
-        let turn = exp(normal(&mut rng) * tilt) * up * TAU + normal(&mut rng) * tilt;
+        // Both of its ends are set by hand.
+        let ends = (normal(&mut rng) - normal(&mut rng)) * tilt;
+        let turn = exp(normal(&mut rng) * tilt) * up * TAU + ends;
         go(turn);
         let angle = TAU;
         labels.push(Some(LabelledMotion::Turns { axis: up, angle }));

@@ -12,6 +12,7 @@ mod cli;
 mod clocks;
 mod closed_form;
 mod compare;
+mod contradictions;
 mod door;
 mod error_terms;
 mod exits;
@@ -23,6 +24,7 @@ mod help;
 mod init;
 #[cfg(unix)]
 mod interrupted;
+mod labels;
 mod learnt_noise;
 mod logs;
 mod lot;

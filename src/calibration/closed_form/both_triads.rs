@@ -96,6 +96,7 @@ pub(super) fn both_triads(
     }
     // Both triads stand on one table.
     if let [of_gyro, of_accel] = &common[..]
+        && !observed.gyro.base.is_empty()
         && of_gyro.ncols() == of_accel.ncols()
     {
         let across = of_gyro * of_accel.transpose();

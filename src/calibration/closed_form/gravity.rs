@@ -2,16 +2,20 @@
 
 use super::super::coarse::{self, ByGravity};
 use super::super::error::CalibrationError;
-use super::super::prior_distance::far_from_prior;
+use super::super::prior_distance::far_by_data;
 use super::super::problem::Problem;
 use super::result::{ClosedForm, Reference, hidden};
 use crate::imu::PerSensor;
 
 /// Both triads from whatever positions there are, tied down by the prior where they are too few.
 pub(super) fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
-    let ByGravity { estimate, ringing } = coarse::by_gravity(problem)?;
+    let ByGravity {
+        estimate,
+        distance,
+        ringing,
+    } = coarse::by_gravity(problem)?;
     let model = &problem.model;
-    let far = far_from_prior(model, &estimate);
+    let far = far_by_data(model, &estimate, &distance);
     let hidden = hidden(model, &estimate, Reference::Gravity);
     let findings = far.into_iter().chain(hidden).chain(ringing).collect();
     let stretches = problem.stretches();

@@ -5,48 +5,92 @@
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
 //! g-sensitivity.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, Vector3};
 
 use super::super::error::CalibrationError;
 use super::super::finding::Finding;
-use super::super::model::Model;
 use super::super::problem::Problem;
 use super::both_triads::both_triads;
+use super::earth_rate::{Section, earth_rate, rest_at};
 use super::least_squares::across;
 use super::observed::{Observed, Position};
 use super::result::{ClosedForm, Reference, hidden};
 use crate::attitude::skew;
-use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::LabelledMotion;
-use crate::run::motion::{self, ContradictedLabel};
+use crate::run::motion::{self, ContradictedLabel, Rest};
 use crate::run::{Dwell, Run};
 
 /// Both triads from the sections whose labels say how the instrument stands or turns.
 pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
-    let (run, model): (&Run, &Model) = (problem.run(), &problem.model);
-    let mut positions = PerSensor::<Vec<Position>>::default();
-    let mut times = PerSensor::<Vec<[f64; 2]>>::default();
-    let mut turns = 0;
-    let mut standing_time = 0.0;
-    let sigma = run.segment_sigma;
-    let mut lost = Vec::new();
-    let mut contradicted = Vec::new();
+    let run: &Run = problem.run();
     let rests = motion::rests(run);
-    for check in motion::checks(run, &rests) {
+    let Used {
+        sections,
+        lost,
+        contradicted,
+    } = used_sections(run, &rests);
+    if sections.is_empty() && contradicted.is_empty() {
+        return Err(CalibrationError::NoSections {
+            labels: run.recording.labels(),
+        });
+    }
+    if sections.is_empty() {
+        return Err(CalibrationError::LabelsContradicted { contradicted });
+    }
+    let observed = PerSensor {
+        gyro: of_gyros(run, &rests, &sections),
+        accel: of_accelerometers(run, &sections),
+    };
+    let (estimate, mut findings) = both_triads(&observed, problem)?;
+    findings.extend(hidden(&problem.model, &estimate, Reference::Labels));
+    if !contradicted.is_empty() {
+        findings.push(Finding::LabelsContradicted { contradicted });
+    }
+    if !lost.is_empty() {
+        findings.push(Finding::SectionsLost { labels: lost });
+    }
+    let standing: Vec<&Section> = sections.iter().filter(|s| s.stands()).collect();
+    let samples: usize = standing.iter().map(|section| section.samples.len()).sum();
+    Ok(ClosedForm {
+        findings,
+        estimate,
+        reference: Reference::Labels,
+        positions: PerSensor::from_fn(|_| standing.len()),
+        turns: sections.len() - standing.len(),
+        standing_time: samples as f64 * run.recording.imu.period,
+    })
+}
+
+/// The sections that are used, and why others are not.
+struct Used {
+    sections: Vec<Section>,
+    lost: Vec<String>,
+    contradicted: Vec<ContradictedLabel>,
+}
+
+fn used_sections(run: &Run, rests: &[Rest]) -> Used {
+    let mut found = Used {
+        sections: Vec::new(),
+        lost: Vec::new(),
+        contradicted: Vec::new(),
+    };
+    for check in motion::checks(run, rests) {
         let segment = &check.segment;
-        let Some(labelled) = segment.motion else {
+        let Some(motion) = segment.motion else {
             continue;
         };
         if run.recording.imu.is_lost(&segment.samples) {
-            lost.push(format!("`{}`", segment.label));
+            found.lost.push(format!("`{}`", segment.label));
             continue;
         }
         let used = check.as_labelled();
         // Borders that are drawn a little wide do no harm.
         let as_stated = used.as_ref() == Some(&segment.samples);
         if let Some(said) = check.disagreement().filter(|_| !as_stated) {
-            contradicted.push(ContradictedLabel {
+            found.contradicted.push(ContradictedLabel {
                 label: segment.label.clone(),
                 start: segment.start,
                 said,
@@ -56,84 +100,116 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
         let Some(samples) = used else {
             continue;
         };
-        let section = Dwell {
+        let of_gyro = dwell(&samples).mean(Sensor::Gyro, run);
+        found.sections.push(Section {
             samples,
-            position: None,
-        };
-        let duration = section.samples.len() as f64 * run.recording.imu.period;
-        let of_gyro = section.mean(Sensor::Gyro, run);
-        let noise = Vector3::repeat(of_gyro.variance);
-        times.gyro.push(section.times(run));
-        match labelled {
-            LabelledMotion::Stands { up } => {
-                let of_accel = section.mean(Sensor::Accel, run);
-                let white = Vector3::repeat(of_accel.variance);
-                times.accel.push(section.times(run));
-                let force = up * run.site.gravity;
-                positions
-                    .accel
-                    .push(force_by_hand(sigma, force, of_accel.output, white));
-                // Which way is north is not known, so what is level of Earth rate is noise; a tilt brings
-                // some of it to the axis that is up.
-                let earth_rate = run.site.earth_rate_n();
-                let level = earth_rate.y.powi(2);
-                let level =
-                    across(&up) * (0.5 * level) + up.component_mul(&up) * (level * sigma.powi(2));
-                let rate = up * earth_rate.z;
-                let gyro = set_by_hand(sigma, rate, of_gyro.output, noise + level);
-                positions.gyro.push(gyro);
-                standing_time += duration;
-            }
-            LabelledMotion::Turns { axis, angle } => {
-                let rate = axis * (angle / duration);
-                let end = (sigma / duration).powi(2) + ROTATION_RATE.powi(2);
-                let noise = noise.add_scalar(end);
-                positions
-                    .gyro
-                    .push(set_by_hand(sigma, rate, of_gyro.output, noise));
-                turns += 1;
-            }
-        }
-    }
-    if positions.gyro.is_empty() && contradicted.is_empty() {
-        return Err(CalibrationError::NoSections {
-            labels: run.recording.labels(),
+            motion,
+            output: of_gyro.output,
+            variance: of_gyro.variance,
         });
     }
-    if positions.gyro.is_empty() {
-        return Err(CalibrationError::LabelsContradicted { contradicted });
+    found
+}
+
+fn dwell(samples: &Range<usize>) -> Dwell {
+    Dwell {
+        samples: samples.clone(),
+        position: None,
     }
-    let used = PerSensor::from_fn(|sensor| positions.get(sensor).len());
-    let observed = PerSensor::from_fn(|sensor| {
-        let noise = run.instrument.noise.get(sensor);
-        let positions = std::mem::take(positions.get_mut(sensor));
-        Observed {
-            errors: match sensor {
-                Sensor::Gyro => shortened(&positions, sigma),
-                Sensor::Accel => by_tilts(&positions, sigma),
-            },
-            ..Observed::over(positions, std::mem::take(times.get_mut(sensor)), noise)
+}
+
+fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Observed {
+    let sigma = run.segment_sigma;
+    let level = run.site.earth_rate_n().y;
+    let earth = earth_rate(run, rests, sections, sigma);
+    let positions = sections.iter().zip(&earth.known).map(|(section, known)| {
+        let noise = Vector3::repeat(section.variance);
+        match section.motion {
+            LabelledMotion::Stands { up } => {
+                // A tilt brings some of what is level of Earth's rate to the axis that is up, and a turn about
+                // that axis some to the other one that is level.
+                let tilted = up.component_mul(&up) + across(&up) * 0.5;
+                let noise = noise + tilted * (level * sigma).powi(2);
+                set_by_hand(sigma, *known, section.output, noise)
+            }
+            LabelledMotion::Turns { axis, angle } => {
+                let duration = section.samples.len() as f64 * run.recording.imu.period;
+                let rate = axis * (angle / duration) + known;
+                let ends = across(&axis) * (2.0 * (sigma / duration).powi(2));
+                set_by_hand(sigma, rate, section.output, noise + ends)
+            }
         }
     });
-    let (estimate, mut findings) = both_triads(&observed, problem)?;
-    findings.extend(hidden(model, &estimate, Reference::Labels));
-    if !contradicted.is_empty() {
-        findings.push(Finding::LabelsContradicted { contradicted });
+    let positions: Vec<Position> = positions.collect();
+    let times = sections.iter().map(|s| dwell(&s.samples).times(run));
+    let errors = [
+        shortened(&positions, sigma),
+        earth.errors,
+        by_ends(run, rests, sections),
+    ];
+    Observed {
+        errors: side_by_side(&errors),
+        ..Observed::over(positions, times.collect(), &run.instrument.noise.gyro)
     }
-    if !lost.is_empty() {
-        findings.push(Finding::SectionsLost { labels: lost });
+}
+
+fn of_accelerometers(run: &Run, sections: &[Section]) -> Observed {
+    let sigma = run.segment_sigma;
+    let (mut positions, mut times) = (Vec::new(), Vec::new());
+    for section in sections {
+        let LabelledMotion::Stands { up } = section.motion else {
+            continue;
+        };
+        let stands = dwell(&section.samples);
+        let of_accel = stands.mean(Sensor::Accel, run);
+        let white = Vector3::repeat(of_accel.variance);
+        let force = up * run.site.gravity;
+        positions.push(force_by_hand(sigma, force, of_accel.output, white));
+        times.push(stands.times(run));
     }
-    Ok(ClosedForm {
-        findings,
-        estimate,
-        reference: Reference::Labels,
-        positions: PerSensor {
-            gyro: used.gyro - turns,
-            accel: used.accel,
-        },
-        turns,
-        standing_time,
-    })
+    Observed {
+        errors: by_tilts(&positions, sigma),
+        ..Observed::over(positions, times, &run.instrument.noise.accel)
+    }
+}
+
+/// What the positions between which it is turned are off by about the turn's axis. Both ends of a turn are
+/// set by hand, and a position in which one turn ends and another begins is off by one angle in both.
+fn by_ends(run: &Run, rests: &[Rest], sections: &[Section]) -> DMatrix<f64> {
+    let mut places: Vec<Option<usize>> = Vec::new();
+    let mut column_of = |sample: usize| {
+        let rest = rest_at(rests, sample);
+        let known = places.iter().position(|&p| p.is_some() && p == rest);
+        known.unwrap_or_else(|| {
+            places.push(rest);
+            places.len() - 1
+        })
+    };
+    let mut errors = DMatrix::zeros(3 * sections.len(), 6 * sections.len());
+    for (k, section) in sections.iter().enumerate() {
+        let LabelledMotion::Turns { axis, .. } = section.motion else {
+            continue;
+        };
+        let duration = section.samples.len() as f64 * run.recording.imu.period;
+        let off = axis * axis.transpose() * (run.segment_sigma / duration);
+        let last = section.samples.end.saturating_sub(1);
+        for (sample, sign) in [(section.samples.start, -1.0), (last, 1.0)] {
+            let column = 3 * column_of(sample);
+            let mut of_end = errors.fixed_view_mut::<3, 3>(3 * k, column);
+            of_end += off * sign;
+        }
+    }
+    errors
+}
+
+fn side_by_side(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let rows = parts.first().map_or(0, DMatrix::nrows);
+    let columns = parts.iter().flat_map(|part| part.column_iter());
+    let values: Vec<f64> = columns
+        .flat_map(|c| c.iter().copied().collect::<Vec<_>>())
+        .collect();
+    let columns: usize = parts.iter().map(DMatrix::ncols).sum();
+    DMatrix::from_vec(rows, columns, values)
 }
 
 /// Gravity along an axis. It is weighted as if nothing were known of how it falls on the other two axes:

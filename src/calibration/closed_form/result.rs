@@ -44,6 +44,13 @@ pub struct ClosedForm {
     pub findings: Vec<Finding>,
 }
 
+impl ClosedForm {
+    /// Whether it may be used: noise explains what it leaves.
+    pub fn is_usable(&self) -> bool {
+        !self.findings.iter().any(Finding::is_unexplained)
+    }
+}
+
 /// Parameters that are hardly better known than before, if there are any.
 pub(super) fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Finding> {
     let sigma = estimate.sigma();

@@ -180,18 +180,40 @@ impl Equations {
         growth: f64,
     ) -> Option<ParameterMatrix> {
         let (design, _) = self.of_data();
-        let n = self.unknown.len();
-        let of_prior = DMatrix::from_fn(n, n, |i, j| {
-            let (i, j) = (self.unknown[i], self.unknown[j]);
-            let rows = self.rows[..self.of_prior].iter();
-            rows.map(|(row, _)| row[i] * row[j]).sum()
-        });
+        let of_prior = self.of_prior_alone();
         let square = growth.powi(2);
         let inverse = (&of_prior + design.tr_mul(&design) / square)
             .cholesky()?
             .inverse();
         let of_errors = design.tr_mul(&(self.errors(shared) * &design)) / square;
         Some(self.whole(&(&inverse * (of_prior + of_errors) * &inverse)))
+    }
+
+    /// Information of the prior's rows.
+    fn of_prior_alone(&self) -> DMatrix<f64> {
+        let n = self.unknown.len();
+        DMatrix::from_fn(n, n, |i, j| {
+            let (i, j) = (self.unknown[i], self.unknown[j]);
+            let rows = self.rows[..self.of_prior].iter();
+            rows.map(|(row, _)| row[i] * row[j]).sum()
+        })
+    }
+
+    /// Covariance of how far the data bring the unknown parameters from a prior that is right; the σ of the data
+    /// so many times as large.
+    pub(super) fn covariance_of_distance(
+        &self,
+        shared: &DMatrix<f64>,
+        growth: f64,
+    ) -> Option<ParameterMatrix> {
+        let (design, _) = self.of_data();
+        let of_prior = self.of_prior_alone();
+        let of_data = design.tr_mul(&design);
+        let inverse = (&of_prior + &of_data).cholesky()?.inverse();
+        let of_errors = design.tr_mul(&(self.errors(shared) * &design)) * growth.powi(2);
+        let prior = of_prior.cholesky()?.inverse();
+        let moved = &of_data * prior * &of_data + of_errors;
+        Some(self.whole(&(&inverse * moved * &inverse)))
     }
 
     /// A matrix of the unknown among all parameters.

@@ -247,8 +247,8 @@ impl fmt::Display for Finding {
             }
             Self::Unexplained { nis, limit, worst } => write!(
                 f,
-                "NIS of {nis:.4e} is no calibration: stated noise is hardly ever so wrong that it goes beyond \
-                 {limit:.0}. The largest innovation is at {worst:.1} s: look there for rows that are lost, repeated or \
+                "NIS (of the closed form χ² over its degrees of freedom) of {nis:.4e} is no calibration: stated noise \
+                 is hardly ever so wrong that it goes beyond {limit:.0}. The largest is at {worst:.1} s: look there for rows that are lost, repeated or \
                  wrapped, for a bump and for another table position, and at what is said of the files. Where it is \
                  noise after all, use --noise auto."
             ),

@@ -134,18 +134,40 @@ pub(super) struct Heading {
 
 /// The names of both rows together where the first, of groups, names several columns alike and both together do not.
 fn names_of_groups(groups: &[String], names: &[String]) -> Option<Vec<String>> {
-    let is_one = |names: &[String]| {
-        let mut sorted: Vec<&str> = names.iter().map(String::as_str).collect();
-        sorted.retain(|name| !name.is_empty());
-        sorted.sort_unstable();
-        sorted.windows(2).all(|pair| pair[0] != pair[1])
-    };
-    if groups.len() != names.len() || is_one(groups) {
+    if groups.len() != names.len() || are_distinct(groups) {
         return None;
     }
     let pairs = groups.iter().zip(names);
     let both = pairs.map(|(group, name)| format!("{group} {name}").trim().to_owned());
-    Some(both.collect()).filter(|both: &Vec<String>| is_one(both))
+    Some(both.collect()).filter(|both: &Vec<String>| are_distinct(both))
+}
+
+/// Whether each names one column: units of two columns are often one word.
+fn are_distinct(names: &[String]) -> bool {
+    let mut sorted: Vec<&str> = names.iter().map(String::as_str).collect();
+    sorted.retain(|name| !name.is_empty());
+    sorted.sort_unstable();
+    sorted.windows(2).all(|pair| pair[0] != pair[1])
+}
+
+/// Names of so many columns in comments above the rows, and the units in the comment below them.
+fn names_in_comments(
+    remarks: &[Option<String>; 2],
+    columns: usize,
+) -> (Vec<String>, Option<Vec<String>>) {
+    let fields = |remark: &Option<String>| {
+        let remark = remark.as_deref().unwrap_or_default();
+        let fields = Delimiter::of_row(remark).fields(remark);
+        fields
+            .ok()
+            .filter(|fields| fields.len() == columns && columns > 1)
+    };
+    match remarks.each_ref().map(fields) {
+        [Some(names), Some(units)] if are_distinct(&names) && !are_distinct(&units) => {
+            (names, Some(units))
+        }
+        [_, last] => (last.unwrap_or_default(), None),
+    }
 }
 
 /// Why lines cannot be read on.
@@ -177,8 +199,8 @@ pub(super) struct Lines {
     ended: bool,
     /// Whether it is still to be given out.
     pending: bool,
-    /// The last comment before it.
-    remark: Option<String>,
+    /// The last two comments before it.
+    remarks: [Option<String>; 2],
     /// What comments say of the rate of rows, Hz.
     rate: Option<f64>,
     /// A row that was looked at before its turn, with its number and whether it is ended.
@@ -195,7 +217,7 @@ impl Lines {
             number: 0,
             ended: false,
             pending: false,
-            remark: None,
+            remarks: [None, None],
             rate: None,
             ahead: None,
         };
@@ -243,12 +265,10 @@ impl Lines {
         let delimiter = Delimiter::of_row(&row);
         let mut names = delimiter.fields(&row).map_err(malformed)?;
         // Some programs write the names as a comment.
-        let remark = self.remark.take().unwrap_or_default();
-        let remarked = Delimiter::of_row(&remark).fields(&remark);
-        let remarked = remarked.unwrap_or_default();
+        let remarks = std::mem::take(&mut self.remarks);
+        let (remarked, units) = names_in_comments(&remarks, names.len());
         let numbers = names.iter().filter(|name| is_number(name)).count();
-        let is_named = remarked.len() == names.len()
-            && remarked.len() > 1
+        let is_named = !remarked.is_empty()
             && (numbers == names.len() || !remarked.iter().any(|name| is_number(name)));
         let is_row = numbers == names.len()
             || (numbers > 0 && (is_named || self.is_like_the_next(&names, delimiter)?));
@@ -262,7 +282,7 @@ impl Lines {
                 delimiter,
                 names,
                 line,
-                units: None,
+                units: units.filter(|_| is_named),
             }));
         }
         self.pending = self.take()?;
@@ -349,7 +369,9 @@ impl Lines {
             if let Some(text) = self.comment() {
                 let remark = String::from_utf8_lossy(text).into_owned();
                 self.rate = self.rate.or_else(|| rate(&remark));
-                self.remark = Some(remark);
+                let [_, last] = &mut self.remarks;
+                let above = last.replace(remark);
+                self.remarks[0] = above;
             }
         }
     }

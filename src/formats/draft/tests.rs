@@ -244,6 +244,23 @@ fn names_in_a_comment_above_rows_with_a_text_are_those_of_the_columns() {
 }
 
 #[test]
+fn names_in_a_comment_may_have_their_units_in_the_comment_below() {
+    let header = "% time gyr_x gyr_y gyr_z acc_x acc_y acc_z\n\
+                  % s rad/s rad/s rad/s m/s^2 m/s^2 m/s^2\n";
+    let text = draft(header, |k, v| {
+        format!("{} {}", k as f64 * 0.01, joined(&v, " "))
+    });
+    has(
+        &text,
+        &[
+            "gyro_unit = \"rad/s\"",
+            "accel_unit = \"m/s^2\"",
+            "columns = { time = \"time\", gyro = [\"gyr_x\", ",
+        ],
+    );
+}
+
+#[test]
 fn seconds_and_nanoseconds_are_one_time_with_and_without_names() {
     let time = |k: usize| format!("{},{}", 1_520_530_308 + k / 100, 10_000_000 * (k % 100));
     let text = draft("", |k, v| format!("{},imu_link,{}", time(k), message(v)));

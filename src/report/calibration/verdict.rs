@@ -12,8 +12,7 @@ impl Report<'_> {
             return "Not calibrated: the filter did not converge; values and σ may not be used."
                 .to_owned();
         }
-        let unexplained = |finding: &Finding| matches!(finding, Finding::Unexplained { .. });
-        if self.findings.iter().any(unexplained) {
+        if self.findings.iter().any(Finding::is_unexplained) {
             return "Not calibrated: no noise explains what the calibration leaves; values may not be used."
                 .to_owned();
         }
