@@ -105,3 +105,20 @@ fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
     let from = (edge - first) as f64;
     cubic(from + part) - cubic(from)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As the edges of samples are by a clock that goes back.
+    #[test]
+    fn there_is_no_integral_from_a_later_place_to_an_earlier_one() {
+        let course = Course {
+            begin: 10.0,
+            sums: [vec![1.0; 8], vec![2.0; 8], vec![3.0; 8]],
+        };
+        assert_eq!(course.between(12.0, 15.0).unwrap().0, [3.0, 6.0, 9.0]);
+        assert!(course.between(15.0, 12.0).is_none());
+        assert!(course.between(f64::NAN, 12.0).is_none());
+    }
+}

@@ -332,23 +332,3 @@ fn rows_that_come_behind_later_ones_are_put_in_their_place() {
         }
     }
 }
-
-/// A file that turns to garbage behind some rows, as a damaged log does, is refused and not read on.
-#[test]
-fn times_that_turn_to_garbage_are_refused_at_their_line() {
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("imu.csv");
-    let mut text = "t,a,b,c,d,e,f\n".to_owned();
-    for k in 0..116 {
-        writeln!(text, "{:.2},1,2,3,4,5,{}", 1e-2 * f64::from(k), k % 7).unwrap();
-    }
-    for k in 0..160 {
-        let time = (f64::from(k) * 0.618_033_988_749_895).fract() * 5e-7;
-        writeln!(text, "{time:e},1,2,3,4,5,{}", k % 7).unwrap();
-    }
-    fs::write(&file, text).unwrap();
-    let mut log = of_file(&file);
-    log.output = Output::Rate;
-    let error = log.read(&mut Vec::new()).unwrap_err().to_string();
-    assert!(error.contains("line"), "{error}");
-}

@@ -127,3 +127,24 @@ impl Wander {
         y + (next_y - y) * (at - x) / (next_x - x)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_stops_going_on_where_its_times_do_not_increase() {
+        let stops = |offs: [f64; 3]| {
+            let knots = offs.into_iter().enumerate();
+            let knots = knots.map(|(k, off)| (32.0 + 64.0 * k as f64, off));
+            let wander = Wander {
+                knots: knots.collect(),
+            };
+            wander.stops()
+        };
+        assert_eq!(stops([0.0, -60.0, 60.0]), None);
+        assert_eq!(stops([0.0, 60.0, -10.0]), Some(96));
+        assert_eq!(stops([0.0, -64.0, 0.0]), Some(32));
+        assert_eq!(stops([0.0, f64::NAN, 0.0]), Some(32));
+    }
+}
