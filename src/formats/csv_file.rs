@@ -1,5 +1,6 @@
 //! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
 
+mod ahead;
 mod lines;
 mod row;
 
@@ -12,6 +13,7 @@ use flate2::read::MultiGzDecoder;
 use super::error::{FileError, Place};
 use super::names::Names;
 use crate::room;
+use ahead::Ahead;
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 
@@ -100,7 +102,7 @@ impl CsvFile {
         let file = File::open(path).map_err(refused)?;
         let file = BufReader::with_capacity(1 << 16, file);
         let source: Box<dyn BufRead> = if plain.is_some() {
-            Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file)))
+            Box::new(Ahead::of(MultiGzDecoder::new(file)).map_err(refused)?)
         } else {
             Box::new(file)
         };

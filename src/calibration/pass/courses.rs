@@ -24,15 +24,24 @@ pub(super) struct StepModel<const M: usize> {
 pub(super) struct Courses<const M: usize, const G: usize> {
     models: Vec<StepModel<M>>,
     points: Vec<Point<M, G>>,
+    observations: Vec<Observation<M, G>>,
 }
 
 /// A point of a course.
-pub(super) struct Point<const M: usize, const G: usize> {
-    /// How the last observation before it was taken in.
-    pub gain: Gain<M, G>,
-    pub known: Box<Known<M, G>>,
+struct Point<const M: usize, const G: usize> {
+    known: Box<Known<M, G>>,
+    /// The last observation before it.
+    observation: usize,
     /// Where each thing that may happen next leads.
     next: Vec<(Event, usize)>,
+}
+
+/// An observation of a course.
+struct Observation<const M: usize, const G: usize> {
+    /// How it is taken in.
+    gain: Gain<M, G>,
+    /// Information of `g` by it and all observations before it, and by nothing else.
+    information: [[f64; G]; G],
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -44,7 +53,6 @@ enum Event {
 }
 
 /// How an observation is taken in where `g` is given.
-#[derive(Clone)]
 pub(super) struct Gain<const M: usize, const G: usize> {
     /// Lower triangular root of its covariance.
     pub root: Matrix3<f64>,
@@ -54,15 +62,13 @@ pub(super) struct Gain<const M: usize, const G: usize> {
     pub of_errors: [[f64; M]; 3],
 }
 
-/// What is known of navigation errors `U g + m` where `g` is given, and of `g` by observations alone.
+/// What is known of navigation errors `U g + m` where `g` is given.
 #[derive(Clone)]
 pub(super) struct Known<const M: usize, const G: usize> {
     /// U
     pub of_given: [[f64; G]; M],
     /// Of m.
     pub covariance: [[f64; M]; M],
-    /// Information of `g`.
-    pub information: [[f64; G]; G],
 }
 
 /// So many points are kept before a part begins: those of a few courses, some megabytes.
@@ -82,11 +88,11 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         let known = Known {
             of_given,
             covariance: [[0.0; M]; M],
-            information: [[0.0; G]; G],
         };
         Self {
             models: Vec::new(),
-            points: vec![Point::new(Gain::none(), known)],
+            points: vec![Point::new(known, 0)],
+            observations: vec![Observation::none()],
         }
     }
 
@@ -96,6 +102,7 @@ impl<const M: usize, const G: usize> Courses<M, G> {
             self.models.clear();
             self.points.truncate(1);
             self.points[Self::BEGIN].next.clear();
+            self.observations.truncate(1);
         }
     }
 
@@ -112,15 +119,29 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         &self.models[number]
     }
 
-    pub fn point(&self, number: usize) -> &Point<M, G> {
-        &self.points[number]
+    /// What is known at a point of navigation errors …
+    pub fn known(&self, point: usize) -> &Known<M, G> {
+        &self.points[point].known
+    }
+
+    /// … and of `g`.
+    pub fn information(&self, point: usize) -> &[[f64; G]; G] {
+        &self.observations[self.points[point].observation].information
+    }
+
+    /// How the last observation before a point was taken in.
+    pub fn gain(&self, point: usize) -> &Gain<M, G> {
+        &self.observations[self.points[point].observation].gain
     }
 
     /// Where a step leads.
     pub fn step(&mut self, from: usize, model: usize) -> usize {
         self.reached(from, Event::Step(model)).unwrap_or_else(|| {
-            let known = self.points[from].known.propagated(&self.models[model]);
-            self.leads(from, Event::Step(model), Point::new(Gain::none(), known))
+            let Point {
+                known, observation, ..
+            } = &self.points[from];
+            let to = Point::new(known.propagated(&self.models[model]), *observation);
+            self.leads(from, Event::Step(model), to)
         })
     }
 
@@ -131,10 +152,17 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         if let Some(reached) = self.reached(from, event) {
             return Some(reached);
         }
-        let known = &self.points[from].known;
+        let known = self.known(from);
         let gain = known.gain(state, variance)?;
-        let known = known.told(&gain);
-        Some(self.leads(from, event, Point::new(gain, known)))
+        let to = Point::new(known.told(&gain), self.observations.len());
+        let mut information = *self.information(from);
+        for row in &gain.rows {
+            for (of_component, weight) in information.iter_mut().zip(row) {
+                add(of_component, *weight, row);
+            }
+        }
+        self.observations.push(Observation { gain, information });
+        Some(self.leads(from, event, to))
     }
 
     fn reached(&self, from: usize, event: Event) -> Option<usize> {
@@ -152,22 +180,25 @@ impl<const M: usize, const G: usize> Courses<M, G> {
 }
 
 impl<const M: usize, const G: usize> Point<M, G> {
-    fn new(gain: Gain<M, G>, known: Known<M, G>) -> Self {
+    fn new(known: Known<M, G>, observation: usize) -> Self {
         Self {
-            gain,
             known: Box::new(known),
+            observation,
             next: Vec::new(),
         }
     }
 }
 
-impl<const M: usize, const G: usize> Gain<M, G> {
+impl<const M: usize, const G: usize> Observation<M, G> {
     /// Nothing is observed.
     fn none() -> Self {
         Self {
-            root: Matrix3::identity(),
-            rows: [[0.0; G]; 3],
-            of_errors: [[0.0; M]; 3],
+            gain: Gain {
+                root: Matrix3::identity(),
+                rows: [[0.0; G]; 3],
+                of_errors: [[0.0; M]; 3],
+            },
+            information: [[0.0; G]; G],
         }
     }
 }
@@ -192,7 +223,6 @@ impl<const M: usize, const G: usize> Known<M, G> {
         Self {
             of_given,
             covariance,
-            information: self.information,
         }
     }
 
@@ -219,9 +249,6 @@ impl<const M: usize, const G: usize> Known<M, G> {
             for (state, gain) in of_errors.iter().enumerate() {
                 add(&mut known.of_given[state], -gain, row);
                 add(&mut known.covariance[state], -gain, of_errors);
-            }
-            for (of_component, weight) in known.information.iter_mut().zip(row) {
-                add(of_component, *weight, row);
             }
         }
         known

@@ -89,7 +89,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         let to = self
             .courses
             .observe(self.at, observed.state, observed.variance)?;
-        let Gain { root, rows, .. } = &self.courses.point(to).gain;
+        let Gain { root, rows, .. } = self.courses.gain(to);
         let expected = Vector3::from_fn(|axis, _| self.mean[observed.state + axis]);
         let residual = root.solve_lower_triangular(&(observed.residual - expected))?;
         let unexpected = self.given.look(rows, &residual)?;
@@ -111,7 +111,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     /// Takes an innovation in.
     pub fn take(&mut self, look: &Look<G>) {
         self.at = look.to;
-        let gain = &self.courses.point(look.to).gain;
+        let gain = self.courses.gain(look.to);
         for k in 0..3 {
             add(&mut self.mean, look.residual[k], &gain.of_errors[k]);
             add(&mut self.vector, look.residual[k], &gain.rows[k]);
@@ -122,14 +122,14 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     /// Rows of what is measured of `g`, each with the component that it took out: the rows after it have
     /// none of that.
     pub fn measured(&self) -> Vec<(usize, [f64; G])> {
-        let information = self.courses.point(self.at).known.information;
+        let information = *self.courses.information(self.at);
         let rows = factor(information, self.vector);
         rows.map(|(pivot, row, _)| (pivot, row)).collect()
     }
 
     pub fn outcome(self) -> Outcome {
-        let known = &self.courses.point(self.at).known;
-        let rows = factor(known.information, self.vector);
+        let known = self.courses.known(self.at);
+        let rows = factor(*self.courses.information(self.at), self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         Outcome {
             measured: matrix(&rows),

@@ -166,7 +166,10 @@ fn find(
     pulses: bool,
 ) -> Vec<Found> {
     let limit = Limit::of_rows(columns[0].len());
-    let steps = std::array::from_fn(|k| facts[k].step.unwrap_or_else(|| last_digit(&columns[k])));
+    let step_of = |(facts, column): (&ColumnFacts, &Vec<f64>)| {
+        facts.step.unwrap_or_else(|| last_digit(column))
+    };
+    let steps: Vec<f64> = facts.par_iter().zip(columns).map(step_of).collect();
     let spikes = spikes(
         &std::array::from_fn(|k| columns[k].as_slice()),
         &steps,

@@ -1,5 +1,7 @@
 //! Single samples that neither side leads to.
 
+use rayon::prelude::*;
+
 use super::chance::Limit;
 
 /// Samples of a line that is carried on to the next one: few follow a motion, many average noise.
@@ -21,11 +23,12 @@ const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 /// around, so that it has in it noise, grid and motion. The limit follows the tail that second
 /// differences of the whole column have. A knock is motion as well: it lasts longer than a sample, or
 /// other axes have it.
-pub(super) fn spikes(columns: &[&[f64]; 6], steps: &[f64; 6], limit: Limit) -> [Vec<usize>; 6] {
+pub(super) fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];
     }
-    let bends: [Bends; 6] = std::array::from_fn(|k| Bends::of(columns[k], steps[k], limit));
+    let of_column = |(column, step): (&&[f64], &f64)| Bends::of(column, *step, limit);
+    let bends: Vec<Bends> = columns.par_iter().zip(steps).map(of_column).collect();
     let mut spikes = [const { Vec::new() }; 6];
     for (axis, bent) in bends.iter().enumerate() {
         let grid = grid(steps[axis]);

@@ -169,7 +169,7 @@ impl Filter {
                     of_errors = before;
                 }
                 Done::Observed { state, seen, point } => {
-                    let gain = &courses.point(point).gain;
+                    let gain = courses.gain(point);
                     let effects = of_observation(gain, &of_errors, &of_sum);
                     for (axis, effect) in effects.iter().enumerate() {
                         add(&mut of_errors[state + axis], 1.0, effect);
