@@ -1,4 +1,5 @@
 //! A calibration from one start, with stated noise: with a table a pass with feedback, and Gauss–Newton iterations.
+//! Where stated noise leads nowhere, with the noise that the data show at the start.
 
 use std::ops::Range;
 
@@ -7,9 +8,11 @@ use super::error::CalibrationError;
 use super::group::Group;
 use super::iterations::{Iterated, iterate, summary};
 use super::linearisation::{AttitudePrior, Linearisation};
+use super::noise::{Learnt, NoisePolicy, learn};
 use super::outcome::Pass;
 use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
 use super::pass::{Epoch, Gate, Mode, pass};
+use super::prior_distance::widened;
 use super::problem::Problem;
 use crate::attitude::log;
 use crate::imu::{ParameterKind, Sensor};
@@ -21,13 +24,15 @@ const ENOUGH_TO_MATTER: f64 = 10.0;
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 
-/// A calibration from one start, with stated noise.
+/// A calibration from one start, with stated noise, unless it had to be learnt there.
 pub(super) struct Attempt {
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
     /// Of the pass with feedback, where there was one.
     pub feedback_history: Vec<Epoch>,
     pub iterated: Iterated,
+    /// Noise that was learnt at the start, with which the passes were made.
+    pub learnt: Option<Learnt>,
     /// Mean square by which the parameters differ from those of the other headings, each as likely as its data.
     pub by_headings: ParameterMatrix,
 }
@@ -124,7 +129,7 @@ impl Heading {
             (off.z / prior.sigma.z).powi(2)
         });
         attempt.iterated.converged.then(|| Self {
-            deviance: held.cost + held.log_determinant - off.sum::<f64>(),
+            deviance: held.deviance() - off.sum::<f64>(),
             parameters: to_vector(&held.estimate.triads),
         })
     }
@@ -175,27 +180,72 @@ fn attempt(
         Some(pass) => (Some(pass.estimate), pass.history),
         None => (None, Vec::new()),
     };
-    let iterated = match live.map(&mut from) {
-        Some(Ok(iterated)) if iterated.converged => iterated,
+    let stated = match live.map(&mut from) {
+        Some(Ok(iterated)) if iterated.converged => Ok(iterated),
         // What figures that are wrong by orders of magnitude feed back may lead astray, too.
-        Some(astray) => match (astray, from(start.at)) {
-            (Ok(astray), Err(_)) => astray,
-            (_, of_start) => of_start?,
+        Some(astray) => match (astray, from(start.at.clone())) {
+            (Ok(astray), Err(_)) => Ok(astray),
+            (_, of_start) => of_start,
         },
-        None => from(start.at)?,
+        None => from(start.at.clone()),
+    };
+    let learnt = match problem.options.noise {
+        NoisePolicy::Stated => None,
+        _ => instead_of(&stated, problem, (&priors, start.at), &mut passes, progress),
     };
     Ok(Attempt {
         priors,
         passes,
         feedback_history,
-        iterated,
+        iterated: match &learnt {
+            Some(learnt) => learnt.iterated.clone(),
+            None => stated?,
+        },
+        learnt,
         by_headings: ParameterMatrix::zeros(),
     })
 }
 
-/// The one that converged, and if both did, that of the lower cost.
+/// The calibration with the noise that the data show at the start, where that is the better one: what came of stated
+/// noise did not converge, or contradicts the prior, which this one does not, and is less likely with the noise
+/// that the data show there.
+///
+/// Where noise is stated far too small, what it leaves of moves pulls a step out of all that is linear; as large as it
+/// is, the step is a short one.
+fn instead_of(
+    stated: &Result<Iterated, CalibrationError>,
+    problem: &Problem,
+    (priors, start): (&[AttitudePrior], Linearisation),
+    passes: &mut Vec<Pass>,
+    progress: Progress,
+) -> Option<Learnt> {
+    let contradicts = |of: &Iterated| widened(&problem.model, &of.held.both_triads()).is_some();
+    let converged = stated.as_ref().ok().filter(|stated| stated.converged);
+    if converged.is_some_and(|stated| !contradicts(stated)) {
+        return None;
+    }
+    let mut here = pass(problem, priors, &start, Mode::Held(Gate::Open)).ok()?;
+    here.estimate = start;
+    let here = Iterated {
+        held: here,
+        converged: false,
+    };
+    let mut learnt = |from| learn(problem, priors, from, passes, progress).ok();
+    let of_start = learnt(here).filter(|learnt| learnt.iterated.converged)?;
+    let likelier = |stated: &Iterated| {
+        let of_stated = learnt(stated.clone());
+        let deviance = of_stated.map_or(f64::INFINITY, |l| l.iterated.held.deviance());
+        !contradicts(&of_start.iterated) && of_start.iterated.held.deviance() < deviance
+    };
+    converged.is_none_or(likelier).then_some(of_start)
+}
+
+/// The one that converged, and if both did, the likelier one.
 fn better(one: Tried, other: Tried) -> Tried {
-    let rank = |attempt: &Attempt| (!attempt.iterated.converged, attempt.iterated.held.cost);
+    let rank = |attempt: &Attempt| {
+        let Iterated { held, converged } = &attempt.iterated;
+        (!converged, held.deviance())
+    };
     match (&one.attempt, &other.attempt) {
         (Ok(first), Ok(second)) if rank(second) < rank(first) => other,
         (Err(_), Ok(_)) => other,

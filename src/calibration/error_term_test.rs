@@ -18,7 +18,6 @@ use super::finding::Finding;
 use super::group::Group;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
-use super::pass::PassResult;
 use super::problem::Problem;
 use evidence::ln_survival;
 use joint::{Explanation, Fit, Joint, once_more};
@@ -182,8 +181,7 @@ impl Tested {
             left_off: None,
         };
         let own = Fit::of(&joint.own);
-        let deviance = |result: &PassResult| result.cost + result.log_determinant;
-        let deviance_falls = deviance(&joint.own) - deviance(&otherwise);
+        let deviance_falls = joint.own.deviance() - otherwise.deviance();
         let of_constant = |term: ErrorTerm| {
             let (with, without, evidence) = if model.has(term) {
                 let (without, evidence) = joint.without(term)?;

@@ -7,10 +7,8 @@ use super::alone::Alone;
 use super::attempt::{Attempt, Progress, from_coarse_start};
 use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
-use super::curvature::curvature;
 use super::dwell_scatter::DwellScores;
 use super::error::CalibrationError;
-use super::estimate::Estimate;
 use super::finding::Finding;
 use super::form::{FormTest, form_test};
 use super::innovation::{consistency, inconsistencies};
@@ -21,7 +19,7 @@ use super::noise::{Learnt, learn};
 use super::observability::Observability;
 use super::outcome::Outcome;
 use super::parameters::{ParameterMatrix, parameter_name};
-use super::pass::{Gate, PassResult};
+use super::pass::Gate;
 use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
 use super::rest_scatter::scatter_at_rest;
@@ -59,11 +57,15 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         mut passes,
         feedback_history,
         mut iterated,
+        learnt,
         by_headings,
     } = attempt;
     let stated = &problem;
-    let problem = &problem;
-    let widened = widened(&problem.model, &estimated(&iterated.held));
+    let with_noise = learnt
+        .as_ref()
+        .map(|learnt| problem.with_model(learnt.model.clone()));
+    let problem = with_noise.as_ref().unwrap_or(&problem);
+    let widened = widened(&problem.model, &iterated.held.both_triads());
     let with_wide_prior = widened.map(|model| problem.with_model(model));
     let problem = with_wide_prior.as_ref().unwrap_or(problem);
     if with_wide_prior.is_some() {
@@ -81,9 +83,14 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         },
         report,
         of_other_noise,
-    } = match is_no_noise {
-        true => Learnt::stated(problem, iterated),
-        false => {
+    } = match learnt {
+        Some(learnt) => Learnt {
+            model: problem.model.clone(),
+            iterated,
+            ..learnt
+        },
+        None if is_no_noise => Learnt::stated(problem, iterated),
+        None => {
             let (stated, number) = (iterated.clone(), passes.len());
             match learn(problem, &priors, iterated, &mut passes, progress) {
                 Ok(learnt) if learnt.iterated.converged || !stated.converged => learnt,
@@ -99,10 +106,10 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
     let by_scatter = scores.as_ref().and_then(DwellScores::widened);
-    let estimate = estimated(&held);
+    let estimate = held.both_triads();
     let scattered = by_scatter.map(|widened| {
         held.widen(&Layout::new(&problem.model), &widened);
-        estimated(&held).covariance - estimate.covariance
+        held.both_triads().covariance - estimate.covariance
     });
     let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
     if !Sensor::ALL.into_iter().all(usable) {
@@ -172,15 +179,6 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     Ok(outcome)
 }
 
-/// What a pass makes of both triads.
-fn estimated(held: &PassResult) -> Estimate {
-    let triads = held.estimate.triads;
-    Estimate {
-        covariance: held.covariance + curvature(&triads, &held.covariance),
-        triads,
-    }
-}
-
 /// A calibration with stated noise, of one recording or of several together.
 struct Solved<'a> {
     attempt: Attempt,
@@ -198,6 +196,7 @@ impl<'a> Solved<'a> {
                 passes: joint.passes,
                 feedback_history: Vec::new(),
                 iterated: joint.iterated,
+                learnt: None,
                 by_headings: ParameterMatrix::zeros(),
             },
             problem: joint.problem,

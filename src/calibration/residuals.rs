@@ -55,11 +55,14 @@ impl Residuals {
         let explained = if design.is_empty() {
             DMatrix::zeros(errors.len(), 0)
         } else {
-            let svd = design.svd(true, false);
-            let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
-            let explains = |&k: &usize| svd.singular_values[k] > ROUNDING * largest;
-            let columns: Vec<usize> = (0..svd.singular_values.len()).filter(explains).collect();
-            svd.u?.select_columns(&columns)
+            // Unlike singular values, which are iterated for, it comes to an end whatever the design is.
+            let qr = design.col_piv_qr();
+            let r = qr.r();
+            let left: Vec<f64> = (0..r.nrows()).map(|k| r[(k, k)].abs()).collect();
+            let largest = left.iter().copied().fold(0.0, f64::max);
+            let explains = |&k: &usize| left[k] > ROUNDING * largest;
+            let columns: Vec<usize> = (0..left.len()).filter(explains).collect();
+            qr.q().select_columns(&columns)
         };
         let whitened = factor.solve_lower_triangular(errors)?;
         let whitened = &whitened - &explained * explained.tr_mul(&whitened);

@@ -7,8 +7,10 @@ use super::filter::{Dwells, Filter};
 use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
+use crate::calibration::curvature::curvature;
 use crate::calibration::day_to_day::Difference;
 use crate::calibration::dwell_scatter::Posterior;
+use crate::calibration::estimate::Estimate;
 use crate::calibration::innovation::Innovation;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
@@ -64,6 +66,22 @@ pub(in crate::calibration) struct PassResult {
     pub posteriors: Vec<Posterior>,
     /// What auxiliary parameters that were tried would do to it.
     pub tried: Option<Tried>,
+}
+
+impl PassResult {
+    /// −2 ln of the likelihood, but for a constant.
+    pub fn deviance(&self) -> f64 {
+        self.cost + self.log_determinant
+    }
+
+    /// What it makes of both triads.
+    pub fn both_triads(&self) -> Estimate {
+        let triads = self.estimate.triads;
+        Estimate {
+            covariance: self.covariance + curvature(&triads, &self.covariance),
+            triads,
+        }
+    }
 }
 
 /// What auxiliary parameters that are no states of a pass would do to it.
