@@ -168,7 +168,7 @@ struct Turn {
     of_before: SMatrix<f64, 3, PARAMETERS>,
     /// … and after it.
     of_after: SMatrix<f64, 3, PARAMETERS>,
-    /// Variance of each of its two components, by the random walk of the gyros …
+    /// Variance of each of its two components, by noise and interpolation of the gyros …
     walk: f64,
     /// … and with that of Up.
     variance: f64,
@@ -183,7 +183,7 @@ impl Chain {
         up: &[Up],
     ) -> Result<Self, CalibrationError> {
         let (run, dwells) = (stretch.run, &stretch.dwells);
-        let walk = PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk);
+        let noise = model.process_noise();
         let mut attitudes = vec![*attitude];
         let mut turns = Vec::new();
         let of_gravity =
@@ -197,7 +197,9 @@ impl Chain {
             let tilt = tilt(&(block.state.attitude * up.1.direction));
             let attitude = exp(tilt) * block.state.attitude;
             let level = -skew(Vector3::z());
-            let walk = walk.gyro.powi(2) * block.duration;
+            // East and North: alike but for what is interpolated.
+            let drifted = block.noise.covariance(&noise);
+            let walk = 0.5 * (drifted[(0, 0)] + drifted[(1, 1)]);
             attitudes.push(attitude);
             turns.push(Turn {
                 tilt,
