@@ -1,6 +1,7 @@
 //! What is wrong with a log's rows, and what was done about it.
 
 mod chance;
+mod clipped;
 mod held;
 mod impossible;
 mod interpolation;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
+use clipped::clipped;
 use held::held;
 pub(crate) use notes::notes;
 pub(crate) use repair::{Repaired, Rows};
@@ -194,6 +196,7 @@ fn find(
             spikes,
             stuck: &stuck,
             held: held(triad, column % 3, limit),
+            clipped: clipped(triad, column % 3, limit),
         };
         let saturated = range.saturated();
         // The row before a run has its value.

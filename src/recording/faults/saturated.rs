@@ -24,6 +24,8 @@ pub(super) struct Column<'a> {
     pub stuck: &'a [Range<usize>],
     /// σ of the noise of an axis that the smallest value holds at rest, and the largest.
     pub held: [Option<f64>; 2],
+    /// Whether the smallest value cuts a motion off, and the largest.
+    pub clipped: [bool; 2],
 }
 
 impl Column<'_> {
@@ -53,6 +55,7 @@ impl Column<'_> {
         let sure: [bool; 2] = std::array::from_fn(|k| {
             let end = extremes[k];
             self.held[k].is_some()
+                || self.clipped[k]
                 || self.is_register_end(end)
                 || self.is_reached_by_spikes(end)
                 || self.stops_motion(end)
@@ -192,6 +195,7 @@ mod tests {
             spikes: &spikes,
             stuck: &[],
             held: [None; 2],
+            clipped: [false; 2],
             values,
             smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
             largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
