@@ -12,7 +12,6 @@ use super::noise::{Learnt, NoisePolicy, learn};
 use super::outcome::Pass;
 use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
 use super::pass::{Epoch, Gate, Mode, pass};
-use super::prior_distance::widened;
 use super::problem::Problem;
 use crate::attitude::log;
 use crate::imu::{ParameterKind, Sensor};
@@ -21,11 +20,16 @@ use crate::run::Aiding;
 /// Of the variance that Earth rate would have along an unknown heading, so much of that of a bias is too little to tell.
 const ENOUGH_TO_MATTER: f64 = 10.0;
 
+/// A fall of −2 ln of the likelihood that is nothing: a third of a σ of one parameter.
+const SETTLED: f64 = 0.1;
+
 /// Told after each pass; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 
 /// A calibration from one start, with stated noise, unless it had to be learnt there.
 pub(super) struct Attempt {
+    /// The first point of linearisation, of one recording.
+    pub start: Option<Linearisation>,
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
     /// Of the pass with feedback, where there was one.
@@ -46,7 +50,7 @@ pub(super) fn from_coarse_start(
     let start = coarse_start(problem)?;
     let tried = Tried::new(problem, start.clone(), progress);
     if !start.hidden {
-        return tried.attempt;
+        return tried.or_learnt(problem, progress);
     }
     let stretches = start.attitudes.len();
     let (mut best, mut by_headings) = tried.among_headings(problem, 0..stretches, progress);
@@ -58,7 +62,7 @@ pub(super) fn from_coarse_start(
             by_headings += of_stretch;
         }
     }
-    let mut attempt = best.attempt?;
+    let mut attempt = best.or_learnt(problem, progress)?;
     attempt.by_headings = by_headings;
     Ok(attempt)
 }
@@ -84,6 +88,30 @@ impl Tried {
         Self {
             attempt: attempt(problem, start.clone(), progress),
             start,
+        }
+    }
+
+    /// What came of it; where that did not converge, what comes of the noise that the data show at the start.
+    fn or_learnt(self, problem: &Problem, progress: Progress) -> Result<Attempt, CalibrationError> {
+        let converged = |attempt: &Attempt| attempt.iterated.converged;
+        if self.attempt.as_ref().is_ok_and(converged)
+            || problem.options.noise == NoisePolicy::Stated
+        {
+            return self.attempt;
+        }
+        let CoarseStart { at, attitudes, .. } = self.start;
+        let mut passes = Vec::new();
+        match learnt_at(&at, problem, &attitudes, &mut passes, progress) {
+            Ok(learnt) if learnt.iterated.converged => Ok(Attempt {
+                start: Some(at),
+                priors: attitudes,
+                passes,
+                feedback_history: Vec::new(),
+                iterated: learnt.iterated.clone(),
+                learnt: Some(learnt),
+                by_headings: ParameterMatrix::zeros(),
+            }),
+            _ => self.attempt,
         }
     }
 
@@ -189,55 +217,55 @@ fn attempt(
         },
         None => from(start.at.clone()),
     };
-    let learnt = match problem.options.noise {
-        NoisePolicy::Stated => None,
-        _ => instead_of(&stated, problem, (&priors, start.at), &mut passes, progress),
-    };
     Ok(Attempt {
+        start: Some(start.at),
         priors,
         passes,
         feedback_history,
-        iterated: match &learnt {
-            Some(learnt) => learnt.iterated.clone(),
-            None => stated?,
-        },
-        learnt,
+        iterated: stated?,
+        learnt: None,
         by_headings: ParameterMatrix::zeros(),
     })
 }
 
-/// The calibration with the noise that the data show at the start, where that is the better one: what came of stated
-/// noise did not converge, or contradicts the prior, which this one does not, and is less likely with the noise
-/// that the data show there.
-///
-/// Where noise is stated far too small, what it leaves of moves pulls a step out of all that is linear; as large as it
-/// is, the step is a short one.
-fn instead_of(
-    stated: &Result<Iterated, CalibrationError>,
+/// The calibration with the noise that the data show at the start. Where noise is stated far too small, what it leaves
+/// of moves pulls a step out of all that is linear; as large as it is, the step is a short one.
+fn learnt_at(
+    start: &Linearisation,
     problem: &Problem,
-    (priors, start): (&[AttitudePrior], Linearisation),
+    priors: &[AttitudePrior],
     passes: &mut Vec<Pass>,
     progress: Progress,
-) -> Option<Learnt> {
-    let contradicts = |of: &Iterated| widened(&problem.model, &of.held.both_triads()).is_some();
-    let converged = stated.as_ref().ok().filter(|stated| stated.converged);
-    if converged.is_some_and(|stated| !contradicts(stated)) {
-        return None;
-    }
-    let mut here = pass(problem, priors, &start, Mode::Held(Gate::Open)).ok()?;
-    here.estimate = start;
+) -> Result<Learnt, CalibrationError> {
+    let mut held = pass(problem, priors, start, Mode::Held(Gate::Open))?;
+    held.estimate = start.clone();
     let here = Iterated {
-        held: here,
+        held,
         converged: false,
     };
-    let mut learnt = |from| learn(problem, priors, from, passes, progress).ok();
-    let of_start = learnt(here).filter(|learnt| learnt.iterated.converged)?;
-    let likelier = |stated: &Iterated| {
-        let of_stated = learnt(stated.clone());
-        let deviance = of_stated.map_or(f64::INFINITY, |l| l.iterated.held.deviance());
-        !contradicts(&of_start.iterated) && of_start.iterated.held.deviance() < deviance
-    };
-    converged.is_none_or(likelier).then_some(of_start)
+    learn(problem, priors, here, passes, progress)
+}
+
+/// A calibration with learnt noise, or with what the data show of it at the start, where that is likelier: stated noise
+/// that was too small may have led to a place from which no step leads back, or to sources that others there make
+/// needless.
+pub(super) fn likelier_from(
+    start: &Linearisation,
+    learnt: Learnt,
+    (problem, priors): (&Problem, &[AttitudePrior]),
+    passes: &mut Vec<Pass>,
+    progress: Progress,
+) -> Learnt {
+    let held = &learnt.iterated.held;
+    let number = passes.len();
+    if let Ok(of_start) = learnt_at(start, problem, priors, passes, progress)
+        && of_start.iterated.converged
+        && of_start.iterated.held.deviance() < held.deviance() - SETTLED
+    {
+        return of_start;
+    }
+    passes.truncate(number);
+    learnt
 }
 
 /// The one that converged, and if both did, the likelier one.

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::alone::Alone;
-use super::attempt::{Attempt, Progress, from_coarse_start};
+use super::attempt::{Attempt, Progress, from_coarse_start, likelier_from};
 use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
 use super::dwell_scatter::DwellScores;
@@ -53,6 +53,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         },
     };
     let Attempt {
+        start,
         priors,
         mut passes,
         feedback_history,
@@ -60,7 +61,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         learnt,
         by_headings,
     } = attempt;
-    let stated = &problem;
+    let as_stated = &problem;
     let with_noise = learnt
         .as_ref()
         .map(|learnt| problem.with_model(learnt.model.clone()));
@@ -93,7 +94,15 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         None => {
             let (stated, number) = (iterated.clone(), passes.len());
             match learn(problem, &priors, iterated, &mut passes, progress) {
-                Ok(learnt) if learnt.iterated.converged || !stated.converged => learnt,
+                Ok(learnt) if learnt.iterated.converged || !stated.converged => {
+                    match start.filter(|_| learnt.report.learnt) {
+                        Some(start) => {
+                            let of = (as_stated, &*priors);
+                            likelier_from(&start, learnt, of, &mut passes, progress)
+                        }
+                        None => learnt,
+                    }
+                }
                 // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
                 _ => {
                     passes.truncate(number);
@@ -122,13 +131,13 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         dwell_scatter: scores.map(|scores| scores.scatter),
         observability: Observability::new(
             &estimate,
-            &stated.model.prior_sigma,
+            &as_stated.model.prior_sigma,
             &held.attitude_covariance,
         ),
         covariance_by_noise: estimate.covariance,
         estimate,
         beside: BTreeMap::new(),
-        prior_sigma: stated.model.prior_sigma,
+        prior_sigma: as_stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: priors,
         attitude_sigma: held.attitude_sigma,
@@ -167,7 +176,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     if let Some(of_other_noise) = of_other_noise {
         outcome.set_part(BudgetSource::LearntNoise, of_other_noise);
     }
-    outcome.findings = findings(stated, &outcome);
+    outcome.findings = findings(as_stated, &outcome);
     outcome.findings.extend(of_recordings);
     if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
         outcome.findings.push(Finding::DwellsScatter {
@@ -192,6 +201,7 @@ impl<'a> Solved<'a> {
     fn of(joint: Joint<'a>) -> Self {
         Self {
             attempt: Attempt {
+                start: None,
                 priors: joint.priors,
                 passes: joint.passes,
                 feedback_history: Vec::new(),
