@@ -4,6 +4,8 @@ use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 
 /// As many columns as a spreadsheet has.
 pub(super) const MOST_COLUMNS: usize = 16_384;
+/// There is room for as many at first.
+const FEW_COLUMNS: usize = 64;
 /// No number and no name is longer, bytes.
 pub(super) const LONGEST_FIELD: usize = 1 << 16;
 
@@ -20,6 +22,7 @@ pub(super) enum Malformed {
 
 /// The fields of a line, which may stand in quotes; no field goes beyond its line.
 pub(super) struct Row {
+    delimiter: u8,
     parser: Reader,
     text: Vec<u8>,
     /// End of each field in the text, and room for more.
@@ -31,22 +34,54 @@ impl Row {
     /// No fields yet, to be parted by this byte.
     pub fn new(delimiter: u8) -> Self {
         Self {
+            delimiter,
             parser: ReaderBuilder::new()
                 .delimiter(delimiter)
                 .terminator(Terminator::Any(b'\n'))
                 .build(),
             text: Vec::new(),
-            ends: vec![0; 64],
+            ends: Vec::new(),
             count: 0,
         }
     }
 
     /// Takes the fields of a line, which comes without its end.
     pub fn split(&mut self, line: &[u8]) -> Result<(), Malformed> {
+        match line.contains(&b'"') {
+            true => self.parse(line)?,
+            false => self.cut(line),
+        }
+        if self.count > MOST_COLUMNS {
+            return Err(Malformed::Columns);
+        }
+        let is_long = |field: &[u8]| field.len() > LONGEST_FIELD;
+        match line.len() > LONGEST_FIELD && self.fields().any(is_long) {
+            true => Err(Malformed::Field),
+            false => Ok(()),
+        }
+    }
+
+    /// Cuts a line without quotes at each delimiter.
+    fn cut(&mut self, line: &[u8]) {
+        self.text.clear();
+        self.ends.clear();
+        if !line.is_empty() {
+            let fields = line.split(|byte| *byte == self.delimiter);
+            for field in fields.take(MOST_COLUMNS + 1) {
+                self.text.extend_from_slice(field);
+                self.ends.push(self.text.len());
+            }
+        }
+        self.count = self.ends.len();
+    }
+
+    /// Takes fields of which some stand in quotes.
+    fn parse(&mut self, line: &[u8]) -> Result<(), Malformed> {
         self.parser.reset();
         self.count = 0;
         // Fields together are never longer than their line.
         self.text.resize(line.len() + 1, 0);
+        self.ends.resize(self.ends.capacity().max(FEW_COLUMNS), 0);
         let (mut length, mut rest, mut ended) = (0, line, false);
         loop {
             let (result, read, written, ends) = self.parser.read_record(
@@ -68,13 +103,7 @@ impl Row {
                 ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len(), 0),
             }
         }
-        if self.count > MOST_COLUMNS {
-            return Err(Malformed::Columns);
-        }
-        match self.fields().any(|field| field.len() > LONGEST_FIELD) {
-            true => Err(Malformed::Field),
-            false => Ok(()),
-        }
+        Ok(())
     }
 
     /// How many fields there are.
