@@ -65,8 +65,8 @@ pub(super) struct Known<const M: usize, const G: usize> {
     pub information: [[f64; G]; G],
 }
 
-/// So many points are kept before a part begins: those of a few courses, some megabytes.
-const MOST: usize = 512;
+/// So many bytes of points are kept before a part begins: those of a few courses.
+const MOST: usize = 2 << 20;
 
 impl<const M: usize, const G: usize> Courses<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
@@ -86,13 +86,14 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         };
         Self {
             models: Vec::new(),
-            points: vec![Point::new(Gain::none(), known)],
+            points: vec![Point::new(Gain::none(), Box::new(known))],
         }
     }
 
     /// Forgets what is kept where that is too much.
     pub fn tidy(&mut self) {
-        if self.points.len() > MOST {
+        let of_each = size_of::<Point<M, G>>() + size_of::<Known<M, G>>();
+        if self.points.len() * of_each > MOST {
             self.models.clear();
             self.points.truncate(1);
             self.points[Self::BEGIN].next.clear();
@@ -120,7 +121,8 @@ impl<const M: usize, const G: usize> Courses<M, G> {
     pub fn step(&mut self, from: usize, model: usize) -> usize {
         self.reached(from, Event::Step(model)).unwrap_or_else(|| {
             let known = self.points[from].known.propagated(&self.models[model]);
-            self.leads(from, Event::Step(model), Point::new(Gain::none(), known))
+            let to = Point::new(Gain::none(), Box::new(known));
+            self.leads(from, Event::Step(model), to)
         })
     }
 
@@ -131,9 +133,9 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         if let Some(reached) = self.reached(from, event) {
             return Some(reached);
         }
-        let known = &self.points[from].known;
+        let mut known = self.points[from].known.clone();
         let gain = known.gain(state, variance)?;
-        let known = known.told(&gain);
+        known.tell(&gain);
         Some(self.leads(from, event, Point::new(gain, known)))
     }
 
@@ -152,10 +154,10 @@ impl<const M: usize, const G: usize> Courses<M, G> {
 }
 
 impl<const M: usize, const G: usize> Point<M, G> {
-    fn new(gain: Gain<M, G>, known: Known<M, G>) -> Self {
+    fn new(gain: Gain<M, G>, known: Box<Known<M, G>>) -> Self {
         Self {
             gain,
-            known: Box::new(known),
+            known,
             next: Vec::new(),
         }
     }
@@ -212,18 +214,16 @@ impl<const M: usize, const G: usize> Known<M, G> {
         })
     }
 
-    /// After an observation.
-    fn told(&self, gain: &Gain<M, G>) -> Self {
-        let mut known = self.clone();
+    /// Takes in an observation.
+    fn tell(&mut self, gain: &Gain<M, G>) {
         for (row, of_errors) in gain.rows.iter().zip(&gain.of_errors) {
             for (state, gain) in of_errors.iter().enumerate() {
-                add(&mut known.of_given[state], -gain, row);
-                add(&mut known.covariance[state], -gain, of_errors);
+                add(&mut self.of_given[state], -gain, row);
+                add(&mut self.covariance[state], -gain, of_errors);
             }
-            for (of_component, weight) in known.information.iter_mut().zip(row) {
+            for (of_component, weight) in self.information.iter_mut().zip(row) {
                 add(of_component, *weight, row);
             }
         }
-        known
     }
 }
