@@ -157,9 +157,10 @@ impl Tested {
         } else {
             otherwise.switch_on(varying);
         }
-        let (joint, otherwise) = rayon::join(
-            || Joint::new(problem, outcome),
+        // The longer of the two first: whoever is done with something else can take the other.
+        let (otherwise, joint) = rayon::join(
             || once_more(&problem.with_model(otherwise), outcome, &[]),
+            || Joint::new(problem, outcome),
         );
         let (joint, otherwise) = (joint?, otherwise?);
         let tried = ErrorTerm::ALL

@@ -67,10 +67,10 @@ impl NoiseInputs {
         let mut sum = Errors::default();
         for (number, part) in self.parts.iter().enumerate() {
             let over = part.transition(&self.earth_rate);
-            // Φ (Φ Pᵀ)ᵀ with a symmetric P, none before the first part.
-            for _ in 0..if number > 0 { 2 } else { 0 } {
+            // Φ P Φᵀ, no P before the first part.
+            if number > 0 {
                 over.carry(&mut sum);
-                sum = sum.transposed();
+                over.carry_causes(&mut sum);
             }
             sum.add(&part.covariance(noise));
         }

@@ -44,6 +44,8 @@ pub struct Navigator<'a> {
     instrument: PerSensor<Instrument>,
     thermal: Option<Thermal>,
     terms: TermValues,
+    /// Whether any of them has a value.
+    shifted: bool,
     /// Where navigation stands.
     pub state: State,
 }
@@ -103,6 +105,7 @@ impl<'a> Navigator<'a> {
             instrument: instruments(triads, imu.period)?,
             thermal: None,
             terms: TermValues::default(),
+            shifted: false,
             state,
         })
     }
@@ -152,12 +155,14 @@ impl<'a> Navigator<'a> {
 
     /// The same with error terms.
     pub fn with_terms(mut self, terms: TermValues) -> Self {
-        self.terms = terms;
+        self.set_terms(terms.values);
+        self.terms.on = terms.on;
         self
     }
 
     /// Goes on with other values of the error terms.
     pub fn set_terms(&mut self, values: TermVector) {
+        self.shifted = values != TermVector::zeros();
         self.terms.values = values;
     }
 
@@ -189,7 +194,7 @@ impl<'a> Navigator<'a> {
         period: f64,
     ) -> (Increments, Sensed) {
         let mut increments = of_triads;
-        if self.terms.values == TermVector::zeros() {
+        if !self.shifted {
             return (increments, sensed);
         }
         // Triads see u + t(u), and u is what is looked for.
@@ -254,23 +259,30 @@ impl<'a> Navigator<'a> {
     fn move_through(&mut self, samples: Range<usize>) -> Moments {
         let period = self.imu.period;
         let mut moments = Moments::with_terms(&self.terms.on);
-        self.navigate(samples, |navigator, step| {
-            let middle = (step.before + step.after) * 0.5;
-            moments.add(&middle, &step.increments, &step.change, period);
-            let turned = step.increments.angle - middle.tr_mul(&navigator.earth_rate) * period;
-            let change = step.change + navigator.gravity * period;
+        let mut underway = self.before(&samples);
+        for k in samples {
+            let step = self.through(k, &mut underway);
+            let middle = &step.middle;
+            moments.add(middle, &step.increments, &step.change, period);
+            let turned = step.increments.angle - middle.tr_mul(&self.earth_rate) * period;
+            let change = step.change + self.gravity * period;
             moments.add_motion(&turned, &change, period);
             if let Some(sensed) = &step.sensed {
-                let responses = navigator.responses(sensed);
-                moments.add_terms(&middle, &responses, &step.change, period);
+                let responses = self.responses(sensed);
+                moments.add_terms(middle, &responses, &step.change, period);
             }
-        });
+        }
+        self.arrive(underway.state);
         moments
     }
 
     /// The same where the table stands.
     pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
-        self.navigate(samples.clone(), |_, _| {});
+        let mut underway = self.before(&samples);
+        for k in samples.clone() {
+            self.through(k, &mut underway);
+        }
+        self.arrive(underway.state);
         self.standing(&self.state.attitude, samples)
     }
 
@@ -293,9 +305,9 @@ impl<'a> Navigator<'a> {
         }
         let motion = sums.motion(&increments, &correction);
         let earth_turn = exp(-self.earth_rate * period);
-        let (mut state, _) = self.moved(&self.state, &motion, &earth_turn, period);
-        state.attitude = orthonormalised(&state.attitude);
-        self.state = state;
+        let mut state = self.state;
+        self.go_on(&mut state, &motion, &earth_turn, period);
+        self.arrive(state);
     }
 
     /// The block of these samples where the table stands in this attitude; its state is where navigation
@@ -327,61 +339,63 @@ impl<'a> Navigator<'a> {
         block.bridging(self.bridged(samples))
     }
 
-    /// Navigates through samples and tells `each` of every one.
-    #[inline]
-    fn navigate(&mut self, samples: Range<usize>, mut each: impl FnMut(&Self, &Step)) {
-        let period = self.imu.period;
+    /// Before these samples.
+    fn before(&mut self, samples: &Range<usize>) -> Underway {
         // Coning asks for the sample before, angular acceleration for those beside.
         self.near
             .reach(&(samples.start.saturating_sub(2)..samples.end + 1));
-        let mut state = self.state;
-        let mut before = samples
-            .start
-            .checked_sub(1)
-            .map_or_else(Increments::default, |k| {
-                self.increments(k, &state.attitude).0
-            });
-        for k in samples {
-            let (increments, sensed) = self.increments(k, &state.attitude);
-            let motion = increments.motion(&before);
-            before = increments;
-            let (after, change) = self.moved(&state, &motion, &self.earth_turn, period);
-            let step = Step {
-                before: state.attitude,
-                after: after.attitude,
-                increments,
-                change,
-                sensed,
-            };
-            each(self, &step);
-            state = after;
+        let last = samples.start.checked_sub(1);
+        Underway {
+            state: self.state,
+            last: last.map_or_else(Increments::default, |k| {
+                self.increments(k, &self.state.attitude).0
+            }),
         }
+    }
+
+    /// Navigates through a sample.
+    #[inline(always)]
+    fn through(&self, k: usize, underway: &mut Underway) -> Step {
+        let Underway { state, last } = underway;
+        let (increments, sensed) = self.increments(k, &state.attitude);
+        let motion = increments.motion(last);
+        *last = increments;
+        let attitude = state.attitude;
+        let change = self.go_on(state, &motion, &self.earth_turn, self.imu.period);
+        Step {
+            middle: (attitude + state.attitude) * 0.5,
+            increments,
+            change,
+            sensed,
+        }
+    }
+
+    /// Is where the samples led to.
+    fn arrive(&mut self, mut state: State) {
         state.attitude = orthonormalised(&state.attitude);
         self.state = state;
     }
 
-    /// The state after this motion over a time in which the Earth turns so, and the velocity change by
+    /// The state goes on by this motion over a time in which the Earth turns so; the velocity change by
     /// specific force.
-    #[inline]
-    fn moved(
+    #[inline(always)]
+    fn go_on(
         &self,
-        from: &State,
+        state: &mut State,
         motion: &Motion,
         earth_turn: &Matrix3<f64>,
         period: f64,
-    ) -> (State, Vector3<f64>) {
-        let in_start_frame = from.attitude * motion.velocity;
+    ) -> Vector3<f64> {
+        let in_start_frame = state.attitude * motion.velocity;
         // The frame turns with the Earth meanwhile.
         let half_turn = self.earth_rate * (0.5 * period);
         let change = in_start_frame - half_turn.cross(&in_start_frame);
-        let coriolis = self.earth_rate.cross(&from.velocity) * 2.0;
-        let velocity = from.velocity + change + (self.gravity - coriolis) * period;
-        let state = State {
-            attitude: earth_turn * (from.attitude * exp(motion.rotation)),
-            velocity,
-            position: from.position + (from.velocity + velocity) * (0.5 * period),
-        };
-        (state, change)
+        let coriolis = self.earth_rate.cross(&state.velocity) * 2.0;
+        let velocity = state.velocity + change + (self.gravity - coriolis) * period;
+        state.attitude = earth_turn * (state.attitude * exp(motion.rotation));
+        state.position += (state.velocity + velocity) * (0.5 * period);
+        state.velocity = velocity;
+        change
     }
 
     fn block(&self, passage: Passage) -> Block {
@@ -404,11 +418,17 @@ impl<'a> Navigator<'a> {
     }
 }
 
+/// Navigation within samples that follow one another.
+struct Underway {
+    state: State,
+    /// Of the sample before.
+    last: Increments,
+}
+
 /// One sample of navigation.
 struct Step {
-    /// Attitude before and after it.
-    before: Matrix3<f64>,
-    after: Matrix3<f64>,
+    /// Attitude at its middle.
+    middle: Matrix3<f64>,
     increments: Increments,
     /// Velocity change by specific force.
     change: Vector3<f64>,

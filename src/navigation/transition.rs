@@ -33,17 +33,40 @@ impl Transition {
         } = errors;
         for column in 0..N {
             let of = |[x, y, z]: &[[f64; N]; 3]| Vector3::new(x[column], y[column], z[column]);
-            let (tilt, drift) = (of(attitude), of(velocity));
-            let by_force = self.force.cross(&tilt);
-            let turned = self.earth_turn.cross(&tilt);
-            let more = by_force - self.earth_turn.cross(&drift) * 2.0;
-            let moved = (by_force * 0.5 + drift) * self.duration;
+            let [turned, more, moved] = self.changes(&of(attitude), &of(velocity));
             for row in 0..3 {
-                attitude[row][column] -= turned[row];
+                attitude[row][column] += turned[row];
                 velocity[row][column] += more[row];
                 position[row][column] += moved[row];
             }
         }
+    }
+
+    /// Takes the causes of errors, each itself an error, over the samples: of a covariance its other side.
+    pub fn carry_causes(&self, errors: &mut Errors<NAVIGATION>) {
+        let kinds = [
+            &mut errors.attitude,
+            &mut errors.velocity,
+            &mut errors.position,
+        ];
+        for row in kinds.into_iter().flat_map(|kind| &mut kind.0) {
+            let of = |first: usize| Vector3::new(row[first], row[first + 1], row[first + 2]);
+            let changes = self.changes(&of(0), &of(3));
+            for (cause, change) in row.iter_mut().zip(changes.iter().flatten()) {
+                *cause += change;
+            }
+        }
+    }
+
+    /// What an error of attitude and one of velocity add to those of attitude, velocity and position.
+    #[inline]
+    fn changes(&self, tilt: &Vector3<f64>, drift: &Vector3<f64>) -> [Vector3<f64>; 3] {
+        let by_force = self.force.cross(tilt);
+        [
+            -self.earth_turn.cross(tilt),
+            by_force - self.earth_turn.cross(drift) * 2.0,
+            (by_force * 0.5 + drift) * self.duration,
+        ]
     }
 }
 
@@ -80,18 +103,6 @@ impl Errors<NAVIGATION> {
                     *sum += matrix[(3 * kind + axis, column)];
                 }
             }
-        }
-    }
-
-    pub fn transposed(&self) -> Self {
-        let from = [&self.attitude, &self.velocity, &self.position];
-        let of = |kind: usize| {
-            Vectors::from_fn(|row, column| from[column / 3].0[column % 3][3 * kind + row])
-        };
-        Self {
-            attitude: of(0),
-            velocity: of(1),
-            position: of(2),
         }
     }
 }

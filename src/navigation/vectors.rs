@@ -13,14 +13,6 @@ impl<const N: usize> Default for Vectors<N> {
 }
 
 impl<const N: usize> Vectors<N> {
-    /// From components, by row and vector.
-    #[inline]
-    pub fn from_fn(component: impl Fn(usize, usize) -> f64) -> Self {
-        Self(std::array::from_fn(|row| {
-            std::array::from_fn(|column| component(row, column))
-        }))
-    }
-
     /// `self += weight others`
     #[inline]
     pub fn add(&mut self, weight: f64, others: &Self) {

@@ -71,8 +71,8 @@ pub(super) struct Known<const M: usize, const G: usize> {
     pub covariance: [[f64; M]; M],
 }
 
-/// So many points are kept before a part begins: those of a few courses, some megabytes.
-const MOST: usize = 512;
+/// So many bytes of points and observations are kept before a part begins: those of a few courses.
+const MOST: usize = 2 << 20;
 
 impl<const M: usize, const G: usize> Courses<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
@@ -91,14 +91,17 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         };
         Self {
             models: Vec::new(),
-            points: vec![Point::new(known, 0)],
+            points: vec![Point::new(Box::new(known), 0)],
             observations: vec![Observation::none()],
         }
     }
 
     /// Forgets what is kept where that is too much.
     pub fn tidy(&mut self) {
-        if self.points.len() > MOST {
+        let of_point = size_of::<Point<M, G>>() + size_of::<Known<M, G>>();
+        let of_points = self.points.len() * of_point;
+        let of_observations = self.observations.len() * size_of::<Observation<M, G>>();
+        if of_points + of_observations > MOST {
             self.models.clear();
             self.points.truncate(1);
             self.points[Self::BEGIN].next.clear();
@@ -140,7 +143,8 @@ impl<const M: usize, const G: usize> Courses<M, G> {
             let Point {
                 known, observation, ..
             } = &self.points[from];
-            let to = Point::new(known.propagated(&self.models[model]), *observation);
+            let known = Box::new(known.propagated(&self.models[model]));
+            let to = Point::new(known, *observation);
             self.leads(from, Event::Step(model), to)
         })
     }
@@ -152,15 +156,16 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         if let Some(reached) = self.reached(from, event) {
             return Some(reached);
         }
-        let known = self.known(from);
+        let mut known = self.points[from].known.clone();
         let gain = known.gain(state, variance)?;
-        let to = Point::new(known.told(&gain), self.observations.len());
+        known.tell(&gain);
         let mut information = *self.information(from);
         for row in &gain.rows {
             for (of_component, weight) in information.iter_mut().zip(row) {
                 add(of_component, *weight, row);
             }
         }
+        let to = Point::new(known, self.observations.len());
         self.observations.push(Observation { gain, information });
         Some(self.leads(from, event, to))
     }
@@ -180,9 +185,9 @@ impl<const M: usize, const G: usize> Courses<M, G> {
 }
 
 impl<const M: usize, const G: usize> Point<M, G> {
-    fn new(known: Known<M, G>, observation: usize) -> Self {
+    fn new(known: Box<Known<M, G>>, observation: usize) -> Self {
         Self {
-            known: Box::new(known),
+            known,
             observation,
             next: Vec::new(),
         }
@@ -242,15 +247,13 @@ impl<const M: usize, const G: usize> Known<M, G> {
         })
     }
 
-    /// After an observation.
-    fn told(&self, gain: &Gain<M, G>) -> Self {
-        let mut known = self.clone();
+    /// Takes in an observation.
+    fn tell(&mut self, gain: &Gain<M, G>) {
         for (row, of_errors) in gain.rows.iter().zip(&gain.of_errors) {
             for (state, gain) in of_errors.iter().enumerate() {
-                add(&mut known.of_given[state], -gain, row);
-                add(&mut known.covariance[state], -gain, of_errors);
+                add(&mut self.of_given[state], -gain, row);
+                add(&mut self.covariance[state], -gain, of_errors);
             }
         }
-        known
     }
 }

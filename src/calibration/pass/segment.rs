@@ -25,6 +25,8 @@ pub(in crate::calibration) struct Segment {
     /// Error models of its steps; one for all that are alike.
     pub models: Vec<Block>,
     pub steps: Vec<Standing>,
+    /// What is observed, one step after the other.
+    pub seen: Vec<Seen>,
 }
 
 /// A step of a dwell.
@@ -37,8 +39,8 @@ pub(in crate::calibration) struct Standing {
     /// By how much errors of attitude, velocity and position become more before it, since they are referred to
     /// another computed state.
     pub referred: [Vector3<f64>; 3],
-    /// What is observed at its end, in order.
-    pub seen: Box<[Seen]>,
+    /// Which of the segment's observations are of its end.
+    pub seen: Range<usize>,
 }
 
 /// An observation of three components, alike in their variance.
@@ -133,6 +135,7 @@ impl Segment {
                 .and_then(|(_, at_rest)| at_rest.dwell.axes.clone()),
             models: Vec::new(),
             steps: Vec::with_capacity(steps.len()),
+            seen: Vec::new(),
         };
         let imu = &stretch.run.recording.imu;
         let ends = steps.first().zip(steps.last());
@@ -198,14 +201,17 @@ impl Segment {
                     readings,
                 })
             });
+            let first = segment.seen.len();
+            segment.seen.extend(seen);
             segment.steps.push(Standing {
                 time: imu.time(step.samples.end),
                 model,
                 referred,
-                seen: seen.collect(),
+                seen: first..segment.seen.len(),
             });
         }
         segment.models.shrink_to_fit();
+        segment.seen.shrink_to_fit();
         segment
     }
 

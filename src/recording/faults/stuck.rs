@@ -148,9 +148,9 @@ impl Column<'_> {
         let least = 8 * SUM;
         let most = (run.len() / 2).max(least);
         // A level may be short.
-        [least, 2 * least, most]
-            .into_iter()
-            .filter(|&half| half <= most)
+        let shorter = [least, 2 * least].into_iter().filter(|&half| half < most);
+        shorter
+            .chain([most])
             .any(|half| self.is_off_level(run, half, limit))
     }
 
@@ -171,31 +171,32 @@ impl Column<'_> {
             &after[..half],
             &after[half..],
         ];
-        let [far_left, left, right, far_right] = halves.map(moments);
-        // The value was sound when it came, so that it is one of the level's.
-        let holds = |side: &[f64], (mean, variance): (f64, f64)| {
-            (value - mean).abs() <= self.step + OF_LEVEL * variance.sqrt()
-                && side.iter().any(|&other| other >= value)
-                && side.iter().any(|&other| other <= value)
-        };
-        if !holds(halves[1], left) || !holds(halves[2], right) {
-            return false;
-        }
-        let level = 0.5 * (left.0 + right.0);
+        // Most values are near the level, and the means of both sides are all that it takes to see that.
+        let [left, right] = [halves[1], halves[2]].map(mean);
+        let level = 0.5 * (left + right);
         let off = (value - level).abs() / self.step;
         let (length, beside) = (run.len() as f64, half as f64);
         let least = 1.0 / length + 1.0 / beside;
         if off <= least {
             return false;
         }
+        // The value was sound when it came, so that it is one of the level's.
+        let holds = |side: &[f64], mean: f64| {
+            (value - mean).abs() <= self.step + OF_LEVEL * variance(side, mean).sqrt()
+                && side.iter().any(|&other| other >= value)
+                && side.iter().any(|&other| other <= value)
+        };
+        if !holds(halves[1], left) || !holds(halves[2], right) {
+            return false;
+        }
         // Where a motion came to the value or left it, the rows next to the run are on their way.
-        let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(|rows| moments(rows).0);
+        let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(mean);
         let pairs = [
-            (left.0, far_left.0, beside),
-            (right.0, far_right.0, beside),
-            (left.0, right.0, beside),
-            (left.0, next[0], NEXT as f64),
-            (right.0, next[1], NEXT as f64),
+            (left, mean(halves[0]), beside),
+            (right, mean(halves[3]), beside),
+            (left, right, beside),
+            (left, next[0], NEXT as f64),
+            (right, next[1], NEXT as f64),
         ];
         // Sums of pulses are right to a step, so that means may differ by as much without a change.
         let changes = pairs.map(|(one, other, rows)| {
@@ -209,7 +210,7 @@ impl Column<'_> {
                 .chunks_exact(SUM)
                 .map(|rows| rows.iter().sum())
                 .collect();
-            moments(&sums).1
+            variance(&sums, mean(&sums))
         };
         let variance =
             halves.map(sums).iter().sum::<f64>() / (4.0 * SUM as f64 * self.step.powi(2));
@@ -251,16 +252,18 @@ impl Column<'_> {
             let lost = length * (mean + forth * slope * apart);
             (lost, variance.max(self.of_grid()) * spread)
         };
-        let led = [led(before.clone(), 1.0), led(after.clone(), -1.0)];
         // In steps, what rounding and what the lines and the cubic leave over allow.
         let is_lost = |lost: f64, variance: f64, noise: f64| {
             lost > 2.0 + limit.sigmas * (variance * length * length + noise * length).sqrt()
         };
-        let sign = led[0].0.signum();
-        if !led
-            .iter()
-            .all(|&(lost, variance)| is_lost(lost * sign, variance, 0.0))
-        {
+        let to = led(before.clone(), 1.0);
+        let sign = to.0.signum();
+        let leads_away = |(lost, variance): (f64, f64)| is_lost(lost * sign, variance, 0.0);
+        if !leads_away(to) {
+            return Some(false);
+        }
+        let from = led(after.clone(), -1.0);
+        if !leads_away(from) {
             return Some(false);
         }
         let middle = 0.5 * (run.start + run.end) as f64;
@@ -296,7 +299,7 @@ impl Column<'_> {
             + fit(&after.clone().collect::<Vec<_>>(), starts, in_steps)?.1;
         let ratio = points as f64 * (stopped.max(rounding) / crossed).ln();
         let noise = crossed / sides.len() as f64;
-        let mut all = led.into_iter().chain([(lost, 0.0)]);
+        let mut all = [to, from, (lost, 0.0)].into_iter();
         Some(ratio > limit.nats && all.all(|(lost, of)| is_lost(lost * sign, of, noise)))
     }
 }
@@ -328,12 +331,14 @@ fn line(values: &[f64]) -> (f64, f64, f64) {
     (mean, slope, squares / count)
 }
 
-/// Mean and variance.
-fn moments(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// About a mean that was measured.
+fn variance(values: &[f64], mean: f64) -> f64 {
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (mean, squares / (count - 1.0))
+    squares / (values.len() as f64 - 1.0)
 }
 
 #[cfg(test)]

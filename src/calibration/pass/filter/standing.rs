@@ -111,7 +111,7 @@ impl Filter {
             }
             local.propagate(models[*model]);
             done(Done::Step(*model));
-            for seen in seen {
+            for seen in &segment.seen[seen.clone()] {
                 let state = match seen.kind {
                     Observation::Velocity => VELOCITY,
                     Observation::Table => ATTITUDE,

@@ -307,7 +307,7 @@ impl Filter {
                 error += by;
             }
             self.propagate(&segment.models[step.model]);
-            for seen in &step.seen {
+            for seen in &segment.seen[step.seen.clone()] {
                 for axis in 0..3 {
                     let mut row = vec![match seen.kind {
                         Observation::Velocity => (VELOCITY + axis, 1.0),
