@@ -99,12 +99,21 @@ impl CsvFile {
                 "Copy what it gives into a file and name that.",
             ));
         }
-        let file = File::open(path).map_err(refused)?;
-        let file = BufReader::with_capacity(1 << 16, file);
+        let opened = || {
+            let file = File::open(path).map_err(refused)?;
+            Ok(BufReader::with_capacity(1 << 16, file))
+        };
         let source: Box<dyn BufRead> = if plain.is_some() {
-            Box::new(Ahead::of(MultiGzDecoder::new(file)).map_err(refused)?)
+            match Ahead::of(MultiGzDecoder::new(opened()?)) {
+                Ok(ahead) => Box::new(ahead),
+                // The system lets no thread be started.
+                Err(_) => {
+                    let decoder = MultiGzDecoder::new(opened()?);
+                    Box::new(BufReader::with_capacity(1 << 16, decoder))
+                }
+            }
         } else {
-            Box::new(file)
+            Box::new(opened()?)
         };
         let (lines, heading) = Lines::open(source).map_err(|stop| stopped(path, &stop))?;
         let heading = heading.ok_or_else(|| {
