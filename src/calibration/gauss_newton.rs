@@ -27,6 +27,7 @@ use super::rounding::{by_rounding, rounded};
 use super::together::{self, Joint};
 use super::unexplained::unexplained;
 use crate::imu::Sensor;
+use crate::run::Aiding;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
 ///
@@ -95,7 +96,10 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             let (stated, number) = (iterated.clone(), passes.len());
             match learn(problem, &priors, iterated, &mut passes, progress) {
                 Ok(learnt) if learnt.iterated.converged || !stated.converged => {
-                    match start.filter(|_| learnt.report.learnt) {
+                    // Where a table is read attitudes are known, and no step leads far.
+                    let may_be_astray =
+                        learnt.report.learnt && problem.model.aiding == Aiding::Velocity;
+                    match start.filter(|_| may_be_astray) {
                         Some(start) => {
                             let of = (as_stated, &*priors);
                             likelier_from(&start, learnt, of, &mut passes, progress)
