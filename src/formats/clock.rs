@@ -341,6 +341,7 @@ impl Stamps {
     /// Lets go of the first rows' stamps.
     pub fn let_go(&mut self, rows: usize) {
         self.of_rows.drain(..rows);
+        self.of_rows.shrink_to(2 * self.of_rows.len());
         self.let_go += rows;
     }
 

@@ -268,20 +268,26 @@ impl ImuLog<'_> {
             ..
         } = reading;
         let samples = match long {
-            Some(mut long) => long
-                .take(&mut held, &mut stamps, true)
-                .and_then(|()| Ok(Samples::Long(Box::new(long.finish(duplicates)?)))),
+            Some(mut long) => long.take(&mut held, &mut stamps, true).and_then(|()| {
+                drop(held);
+                Ok(Samples::Long(Box::new(long.finish(duplicates)?)))
+            }),
             None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
                 .map(|clock| Samples::Held(Box::new((held, clock)))),
         };
-        let samples = samples.map_err(|error| csv.placed(error))?;
+        let samples = match samples.map_err(|error| csv.placed(error))? {
+            Samples::Long(whole) if known.is_none() && whole.clock.wander.is_some() => {
+                let Whole { clock, .. } = *whole;
+                // What was read is let go of before it is read again.
+                drop((csv, stamps, temperature));
+                return self.content(sizes, notes, Some(&clock));
+            }
+            samples => samples,
+        };
         let clock = match &samples {
             Samples::Long(whole) => &whole.clock,
             Samples::Held(held) => &held.1,
         };
-        if known.is_none() && clock.wander.is_some() && matches!(samples, Samples::Long(_)) {
-            return self.content(sizes, notes, Some(clock));
-        }
         notes.extend(clock.uneven());
         notes.extend(csv.cut_off("It is left out"));
         notes.extend_from_slice(csv.remarks());

@@ -228,6 +228,7 @@ impl<'a> LongLog<'a> {
         held.let_go(rows);
         stamps.let_go(rows);
         self.numbers.drain(..rows);
+        self.numbers.shrink_to(2 * self.numbers.len());
         self.taken -= rows;
     }
 
