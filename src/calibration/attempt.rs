@@ -28,8 +28,8 @@ pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
 
 /// A calibration from one start, with stated noise, unless it had to be learnt there.
 pub(super) struct Attempt {
-    /// The first point of linearisation, of one recording.
-    pub start: Option<Linearisation>,
+    /// Where it began, of one recording.
+    pub start: Option<CoarseStart>,
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
     /// Of the pass with feedback, where there was one.
@@ -99,12 +99,11 @@ impl Tried {
         {
             return self.attempt;
         }
-        let CoarseStart { at, attitudes, .. } = self.start;
         let mut passes = Vec::new();
-        match learnt_at(&at, problem, &attitudes, &mut passes, progress) {
+        match learnt_at(&self.start, problem, &mut passes, progress) {
             Ok(learnt) if learnt.iterated.converged => Ok(Attempt {
-                start: Some(at),
-                priors: attitudes,
+                priors: self.start.attitudes.clone(),
+                start: Some(self.start),
                 passes,
                 feedback_history: Vec::new(),
                 iterated: learnt.iterated.clone(),
@@ -182,7 +181,7 @@ fn attempt(
     progress: Progress,
 ) -> Result<Attempt, CalibrationError> {
     let mut passes = Vec::new();
-    let priors = start.attitudes;
+    let priors = start.attitudes.clone();
     // What is fed back while heading is known to degrees only leads a pass astray; the coarse start
     // without a table is good enough for the iterations to begin from.
     let feedback = match problem.model.aiding {
@@ -218,7 +217,7 @@ fn attempt(
         None => from(start.at.clone()),
     };
     Ok(Attempt {
-        start: Some(start.at),
+        start: Some(start),
         priors,
         passes,
         feedback_history,
@@ -231,34 +230,75 @@ fn attempt(
 /// The calibration with the noise that the data show at the start. Where noise is stated far too small, what it leaves
 /// of moves pulls a step out of all that is linear; as large as it is, the step is a short one.
 fn learnt_at(
-    start: &Linearisation,
+    start: &CoarseStart,
     problem: &Problem,
-    priors: &[AttitudePrior],
     passes: &mut Vec<Pass>,
     progress: Progress,
 ) -> Result<Learnt, CalibrationError> {
-    let mut held = pass(problem, priors, start, Mode::Held(Gate::Open))?;
-    held.estimate = start.clone();
-    let here = Iterated {
-        held,
-        converged: false,
+    let CoarseStart {
+        at,
+        attitudes,
+        by_hand,
+        ..
+    } = start;
+    let here = match by_hand {
+        Some(by_hand) => {
+            let problem = &problem.with_model(by_hand.model(problem));
+            let gate = Gate::Innovations;
+            iterate(problem, attitudes, at.clone(), gate, passes, progress)?
+        }
+        None => {
+            let mut held = pass(problem, attitudes, at, Mode::Held(Gate::Open))?;
+            held.estimate = at.clone();
+            Iterated {
+                held,
+                converged: false,
+            }
+        }
     };
-    learn(problem, priors, here, passes, progress)
+    learn(problem, attitudes, here, passes, progress)
+}
+
+/// The calibration with the noise that the data show, where they contradict what is stated: learnt from where stated
+/// noise led, or, where that is likelier, at the start. The problem comes as it was stated and as it was calibrated.
+pub(super) fn learnt_or_stated(
+    start: Option<CoarseStart>,
+    (as_stated, problem): (&Problem, &Problem),
+    priors: &[AttitudePrior],
+    stated: Iterated,
+    passes: &mut Vec<Pass>,
+    progress: Progress,
+) -> Learnt {
+    let number = passes.len();
+    let learnt = match learn(problem, priors, stated.clone(), passes, progress) {
+        Ok(learnt) if learnt.iterated.converged || !stated.converged => learnt,
+        // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
+        _ => {
+            passes.truncate(number);
+            return Learnt::stated(problem, stated);
+        }
+    };
+    // Where a table is read attitudes are known, and no step leads far.
+    let may_be_astray = learnt.report.learnt && problem.model.aiding == Aiding::Velocity;
+    match start.filter(|_| may_be_astray) {
+        Some(start) => likelier_from(&start, learnt, as_stated, passes, progress),
+        None => learnt,
+    }
 }
 
 /// A calibration with learnt noise, or with what the data show of it at the start, where that is likelier: stated noise
 /// that was too small may have led to a place from which no step leads back, or to sources that others there make
 /// needless.
-pub(super) fn likelier_from(
-    start: &Linearisation,
+fn likelier_from(
+    start: &CoarseStart,
     learnt: Learnt,
-    (problem, priors): (&Problem, &[AttitudePrior]),
+    problem: &Problem,
     passes: &mut Vec<Pass>,
     progress: Progress,
 ) -> Learnt {
     let held = &learnt.iterated.held;
     let number = passes.len();
-    if let Ok(of_start) = learnt_at(start, problem, priors, passes, progress)
+    if let Ok(of_start) = learnt_at(start, problem, passes, progress)
         && of_start.iterated.converged
         && of_start.iterated.held.deviance() < held.deviance() - SETTLED
     {

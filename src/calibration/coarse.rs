@@ -17,11 +17,15 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::finding::Finding;
 use super::linearisation::{AttitudePrior, Linearisation, singular};
-use super::parameters::ParameterMatrix;
+use super::noise::{ByHand, NoisePolicy};
+use super::parameters::{ParameterMatrix, from_vector};
 use super::problem::Problem;
 use crate::attitude::exp;
 use crate::imu::{ParameterKind, Sensor, TermVector};
 use turns::Turned;
+
+/// Points of linearisation at which noise is learnt, at most.
+const ROUNDS: usize = 6;
 
 /// Where the filter begins.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +36,8 @@ pub struct CoarseStart {
     pub attitudes: Vec<AttitudePrior>,
     /// Whether the noise of the gyros hides Earth rate, so that the heading may be any.
     pub hidden: bool,
+    /// What a hand adds to the noise that is stated, where that was called for.
+    pub(super) by_hand: Option<ByHand>,
 }
 
 impl CoarseStart {
@@ -70,11 +76,15 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
             ),
             attitudes,
             hidden: false,
+            by_hand: None,
         });
     }
-    let Turned {
-        at, heading_sigma, ..
-    } = turns::triads_and_attitudes(problem, &gravity::accelerometers(problem)?)?;
+    let (
+        Turned {
+            at, heading_sigma, ..
+        },
+        by_hand,
+    ) = calibrated_as_held(problem)?;
     let gravity = problem.stretches().iter().map(|s| s.run.site.gravity);
     let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(gravity);
     let of_alignment = |((attitude, &sigma), gravity): ((&Matrix3<f64>, &f64), f64)| {
@@ -84,6 +94,7 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
         attitudes: attitudes.map(of_alignment).collect(),
         at,
         hidden: heading_sigma.into_iter().any(AttitudePrior::hides),
+        by_hand,
     })
 }
 
@@ -108,6 +119,8 @@ pub(super) struct ByGravity {
     pub estimate: Estimate,
     /// Of how far the data bring the estimate from a prior that is right.
     pub distance: ParameterMatrix,
+    /// What a hand adds to the noise that is stated, where the data show that.
+    pub by_hand: Option<ByHand>,
     /// Residuals beyond chance, by which the covariance was widened, and a drift that they follow.
     pub ringing: Vec<Finding>,
 }
@@ -115,19 +128,14 @@ pub(super) struct ByGravity {
 /// The coarse start without a table, with its covariance.
 pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
     enough(problem)?;
-    let triads = gravity::accelerometers(problem)?;
+    let (turned, by_hand) = calibrated_as_held(problem)?;
+    let prior = from_vector(problem.model.form, &problem.model.prior_mean);
+    let singular = || singular(&prior);
     let Turned {
-        at,
-        equations,
-        shared,
-        ..
-    } = turns::triads_and_attitudes(problem, &triads)?;
-    let triads = at.triads;
-    let singular = || singular(&triads);
-    let residuals = equations.residuals(&shared).ok_or_else(singular)?;
+        equations, shared, ..
+    } = &turned;
+    let residuals = equations.residuals(shared).ok_or_else(singular)?;
     let growth = residuals.growth();
-    let covariance = equations.covariance_by(&shared, growth.unwrap_or(1.0));
-    let distance = equations.covariance_of_distance(&shared, growth.unwrap_or(1.0));
     let (groups, times) = turns::dwells_and_moves(problem);
     let worst = residuals.worst(&groups);
     let mut of_equation = vec![0.0; groups.iter().map(Vec::len).sum()];
@@ -144,12 +152,34 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
         &of_equation,
         worst.without,
     );
+    // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
+    let scale = growth.unwrap_or(1.0);
+    let turned = match growth {
+        None => turned,
+        Some(growth) => {
+            let mut model = match &by_hand {
+                Some(by_hand) => by_hand.model(problem),
+                None => problem.model.clone(),
+            };
+            model.prior_sigma /= growth;
+            calibrated(&problem.with_model(model))?
+        }
+    };
+    let Turned {
+        at,
+        equations,
+        shared,
+        ..
+    } = turned;
+    let covariance = equations.covariance(&shared).ok_or_else(singular)?;
+    let distance = equations.covariance_of_distance(&shared);
     Ok(ByGravity {
         estimate: Estimate {
-            triads,
-            covariance: covariance.ok_or_else(singular)?,
+            triads: at.triads,
+            covariance: covariance * scale.powi(2),
         },
-        distance: distance.ok_or_else(singular)?,
+        distance: distance.ok_or_else(singular)? * scale.powi(2),
+        by_hand,
         ringing: growth
             .map(|growth| Finding::ResidualsLarge {
                 of: "both triads",
@@ -165,6 +195,39 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
             .chain(drift)
             .collect(),
     })
+}
+
+/// Both triads and attitudes by gravity, from the accelerometers by its magnitude.
+fn calibrated(problem: &Problem) -> Result<Turned, CalibrationError> {
+    turns::triads_and_attitudes(problem, &gravity::accelerometers(problem)?)
+}
+
+/// The same with what a hand adds to the noise that is stated, where the data show that.
+fn calibrated_as_held(problem: &Problem) -> Result<(Turned, Option<ByHand>), CalibrationError> {
+    let stated = calibrated(problem)?;
+    if problem.options.noise == NoisePolicy::Stated {
+        return Ok((stated, None));
+    }
+    let likeliest = |turned: &Turned, used: &ByHand| {
+        let (errors, mut covariance) = turned.equations.before_data(&turned.shared)?;
+        let parts = turned.equations.by_hand();
+        used.taken_from(&mut covariance, &parts);
+        ByHand::likeliest(&errors, &covariance, &parts).filter(|found| !found.is_none())
+    };
+    let with = |by_hand: &ByHand| calibrated(&problem.with_model(by_hand.model(problem)));
+    let Some(mut by_hand) = likeliest(&stated, &ByHand::default()) else {
+        return Ok((stated, None));
+    };
+    // What equations are linearised at follows noise, and noise that.
+    for _ in 0..ROUNDS {
+        let turned = with(&by_hand)?;
+        match likeliest(&turned, &by_hand) {
+            None => return Ok((stated, None)),
+            Some(here) if here.is_like(&by_hand) => return Ok((turned, Some(here))),
+            Some(here) => by_hand = here,
+        }
+    }
+    Ok((with(&by_hand)?, Some(by_hand)))
 }
 
 fn enough(problem: &Problem) -> Result<(), CalibrationError> {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::alone::Alone;
-use super::attempt::{Attempt, Progress, from_coarse_start, likelier_from};
+use super::attempt::{Attempt, Progress, from_coarse_start, learnt_or_stated};
 use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
 use super::dwell_scatter::DwellScores;
@@ -15,7 +15,7 @@ use super::innovation::{consistency, inconsistencies};
 use super::iterations::{Iterated, iterate};
 use super::layout::Layout;
 use super::linearisation::singular;
-use super::noise::{Learnt, learn};
+use super::noise::Learnt;
 use super::observability::Observability;
 use super::outcome::Outcome;
 use super::parameters::{ParameterMatrix, parameter_name};
@@ -27,7 +27,6 @@ use super::rounding::{by_rounding, rounded};
 use super::together::{self, Joint};
 use super::unexplained::unexplained;
 use crate::imu::Sensor;
-use crate::run::Aiding;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
 ///
@@ -92,28 +91,14 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             ..learnt
         },
         None if is_no_noise => Learnt::stated(problem, iterated),
-        None => {
-            let (stated, number) = (iterated.clone(), passes.len());
-            match learn(problem, &priors, iterated, &mut passes, progress) {
-                Ok(learnt) if learnt.iterated.converged || !stated.converged => {
-                    // Where a table is read attitudes are known, and no step leads far.
-                    let may_be_astray =
-                        learnt.report.learnt && problem.model.aiding == Aiding::Velocity;
-                    match start.filter(|_| may_be_astray) {
-                        Some(start) => {
-                            let of = (as_stated, &*priors);
-                            likelier_from(&start, learnt, of, &mut passes, progress)
-                        }
-                        None => learnt,
-                    }
-                }
-                // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
-                _ => {
-                    passes.truncate(number);
-                    Learnt::stated(problem, stated)
-                }
-            }
-        }
+        None => learnt_or_stated(
+            start,
+            (as_stated, problem),
+            &priors,
+            iterated,
+            &mut passes,
+            progress,
+        ),
     };
     let problem = &problem.with_model(model);
     let scores = held.posteriors.split_first();

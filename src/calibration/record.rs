@@ -139,6 +139,10 @@ impl ClosedForm {
                 m_s2: problem.run().site.gravity,
                 sigma_m_s2: problem.run().site.gravity_sigma,
             }),
+            noise: self.noise.clone().map(|report| NoiseRecord {
+                run_toml: report.run_toml(PerSensor::default()),
+                report,
+            }),
             warnings: texts(&self.findings),
             findings: self.findings.iter().map(FindingRecord::from).collect(),
             ..self

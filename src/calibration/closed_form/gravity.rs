@@ -12,12 +12,16 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationErr
     let ByGravity {
         estimate,
         distance,
+        by_hand,
         ringing,
     } = coarse::by_gravity(problem)?;
     let model = &problem.model;
     let far = far_by_data(model, &estimate, &distance);
     let hidden = hidden(model, &estimate, Reference::Gravity);
-    let findings = far.into_iter().chain(hidden).chain(ringing).collect();
+    let noise = by_hand.as_ref().map(|by_hand| by_hand.report(problem));
+    let learnt = by_hand.zip(noise.as_ref());
+    let learnt = learnt.map(|(by_hand, report)| by_hand.finding(report));
+    let findings = far.into_iter().chain(hidden).chain(learnt).chain(ringing);
     let stretches = problem.stretches();
     let time_at_rest = stretches.iter().map(|stretch| {
         let samples: usize = stretch.dwells.iter().map(|dwell| dwell.samples.len()).sum();
@@ -30,6 +34,7 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationErr
         positions: PerSensor::from_fn(|_| dwells),
         turns: dwells - stretches.len(),
         standing_time: time_at_rest.sum(),
-        findings,
+        findings: findings.collect(),
+        noise,
     })
 }

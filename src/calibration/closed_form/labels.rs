@@ -55,6 +55,7 @@ pub(super) fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationErro
     let standing: Vec<&Section> = sections.iter().filter(|s| s.stands()).collect();
     let samples: usize = standing.iter().map(|section| section.samples.len()).sum();
     Ok(ClosedForm {
+        noise: None,
         findings,
         estimate,
         reference: Reference::Labels,

@@ -3,6 +3,7 @@
 use super::super::estimate::Estimate;
 use super::super::finding::Finding;
 use super::super::model::Model;
+use super::super::noise::NoiseReport;
 use super::super::parameters::{OBSERVED_BELOW, parameter_name};
 use crate::imu::{BodyFrame, PerSensor};
 
@@ -40,6 +41,8 @@ pub struct ClosedForm {
     pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
+    /// Noise that was learnt; none where it is as stated.
+    pub noise: Option<NoiseReport>,
     /// What a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }

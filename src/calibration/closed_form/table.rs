@@ -60,6 +60,7 @@ pub fn six_position_of(
         .map(|(dwell, _)| dwell.samples.len() as f64 * run.recording.imu.period)
         .sum();
     Ok(ClosedForm {
+        noise: None,
         findings,
         estimate,
         reference: Reference::Table,

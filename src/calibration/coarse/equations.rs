@@ -8,6 +8,7 @@ use super::super::drift::Changing;
 use super::super::error::CalibrationError;
 use super::super::linearisation::singular;
 use super::super::model::Model;
+use super::super::noise::{BY_HAND, Parts};
 use super::super::parameters::{
     ParameterMatrix, ParameterVector, from_vector, parameter, sensor_and_parameter, to_vector,
 };
@@ -43,6 +44,8 @@ pub(super) struct ErrorOf {
     pub own: f64,
     /// By number, what it shares with other equations, and how much of that.
     pub shared: Vec<(usize, f64)>,
+    /// Variance by each of [`BY_HAND`] where that is one in SI and radians.
+    pub by_hand: [f64; BY_HAND.len()],
 }
 
 impl Equations {
@@ -107,7 +110,7 @@ impl Equations {
             }
             let own = ErrorOf {
                 own: variance,
-                shared: Vec::new(),
+                ..ErrorOf::default()
             };
             self.add_row(row, error[axis], variance, own);
         }
@@ -146,6 +149,34 @@ impl Equations {
         )
     }
 
+    /// Errors of the rows but the prior's as they are before these data, and their covariance: by prior and noise.
+    pub(super) fn before_data(
+        &self,
+        shared: &DMatrix<f64>,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let (design, errors) = self.of_data();
+        let prior = self.of_prior_alone().cholesky()?;
+        let pull = DVector::from_iterator(
+            self.unknown.len(),
+            self.unknown.iter().map(|&index| {
+                let rows = self.rows[..self.of_prior].iter();
+                rows.map(|(row, error)| row[index] * error).sum()
+            }),
+        );
+        let errors = errors - &design * prior.solve(&pull);
+        let spread = prior.l().solve_lower_triangular(&design.transpose())?;
+        Some((errors, spread.tr_mul(&spread) + self.errors(shared)))
+    }
+
+    /// How much of what a hand adds is in each of the same rows.
+    pub(super) fn by_hand(&self) -> Parts {
+        std::array::from_fn(|source| {
+            let parts = self.noise.iter();
+            let parts = parts.map(|(sigma, made_of)| made_of.by_hand[source] / sigma.powi(2));
+            DVector::from_iterator(self.noise.len(), parts)
+        })
+    }
+
     /// What all rows but the prior's leave, by the covariance of what their errors share.
     pub(super) fn residuals(&self, shared: &DMatrix<f64>) -> Option<Residuals> {
         let (design, errors) = self.of_data();
@@ -172,21 +203,9 @@ impl Equations {
     }
 
     /// Covariance of the unknown parameters as these weights find them, by the covariance of what errors
-    /// share, all σ but the prior's so many times as large; zero for all others. `None` if they are not
-    /// determined.
-    pub(super) fn covariance_by(
-        &self,
-        shared: &DMatrix<f64>,
-        growth: f64,
-    ) -> Option<ParameterMatrix> {
-        let (design, _) = self.of_data();
-        let of_prior = self.of_prior_alone();
-        let square = growth.powi(2);
-        let inverse = (&of_prior + design.tr_mul(&design) / square)
-            .cholesky()?
-            .inverse();
-        let of_errors = design.tr_mul(&(self.errors(shared) * &design)) / square;
-        Some(self.whole(&(&inverse * (of_prior + of_errors) * &inverse)))
+    /// share; zero for all others. `None` if they are not determined.
+    pub(super) fn covariance(&self, shared: &DMatrix<f64>) -> Option<ParameterMatrix> {
+        self.found_with(shared, |of_prior, _| Some(of_prior.clone()))
     }
 
     /// Information of the prior's rows.
@@ -199,21 +218,27 @@ impl Equations {
         })
     }
 
-    /// Covariance of how far the data bring the unknown parameters from a prior that is right; the σ of the data
-    /// so many times as large.
-    pub(super) fn covariance_of_distance(
+    /// Covariance of how far the data bring the unknown parameters from a prior that is right.
+    pub(super) fn covariance_of_distance(&self, shared: &DMatrix<f64>) -> Option<ParameterMatrix> {
+        self.found_with(shared, |of_prior, of_data| {
+            let prior = of_prior.clone().cholesky()?.inverse();
+            Some(of_data * prior * of_data)
+        })
+    }
+
+    /// Covariance of the unknown parameters by the errors of the data and what the prior adds to these, by the
+    /// information of both.
+    fn found_with(
         &self,
         shared: &DMatrix<f64>,
-        growth: f64,
+        by_prior: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Option<DMatrix<f64>>,
     ) -> Option<ParameterMatrix> {
         let (design, _) = self.of_data();
-        let of_prior = self.of_prior_alone();
-        let of_data = design.tr_mul(&design);
+        let (of_prior, of_data) = (self.of_prior_alone(), design.tr_mul(&design));
         let inverse = (&of_prior + &of_data).cholesky()?.inverse();
-        let of_errors = design.tr_mul(&(self.errors(shared) * &design)) * growth.powi(2);
-        let prior = of_prior.cholesky()?.inverse();
-        let moved = &of_data * prior * &of_data + of_errors;
-        Some(self.whole(&(&inverse * moved * &inverse)))
+        let of_errors = design.tr_mul(&(self.errors(shared) * &design));
+        let right = by_prior(&of_prior, &of_data)? + of_errors;
+        Some(self.whole(&(&inverse * right * &inverse)))
     }
 
     /// A matrix of the unknown among all parameters.

@@ -44,6 +44,7 @@ pub(super) fn add_magnitude(
             let made_of = ErrorOf {
                 own: 0.0,
                 shared: along(shared.at_rest(Sensor::Accel, number), &of_biases(&row)),
+                ..ErrorOf::default()
             };
             equations.add(&[(Sensor::Accel, row)], error, rest.variance, made_of);
             number += 1;

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 use super::super::error::CalibrationError;
 use super::super::linearisation::{Linearisation, singular};
 use super::super::model::Model;
+use super::super::noise::{BY_HAND, Source};
 use super::super::parameters::{from_vector, to_vector};
 use super::super::problem::{Problem, Stretch};
 use super::equations::{Equations, ErrorOf};
@@ -16,7 +17,7 @@ use super::shared_noise::{SharedNoise, along, of_biases};
 use crate::attitude::{exp, level, skew, tilt};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PARAMETERS, PerSensor, Sensor, TermVector, Triad};
-use crate::navigation::{Block, Navigator, State};
+use crate::navigation::{Block, Navigator, ProcessNoise, State};
 use crate::run::{Dwell, MeanOutput};
 
 /// Attitudes, heading and gyros are found in turns, each from the others. Scale factors wrong by
@@ -158,6 +159,10 @@ struct Up {
 struct Chain {
     attitudes: Vec<Matrix3<f64>>,
     turns: Vec<Turn>,
+    /// How long each dwell lasts, s.
+    durations: Vec<f64>,
+    /// Variance by which a hand turns the body in a second of a dwell, rad²/s.
+    turning: f64,
 }
 
 struct Turn {
@@ -170,7 +175,9 @@ struct Turn {
     of_after: SMatrix<f64, 3, PARAMETERS>,
     /// Variance of each of its two components, by noise and interpolation of the gyros …
     walk: f64,
-    /// … and with that of Up.
+    /// … by each of [`BY_HAND`] where that is one …
+    by_hand: [f64; BY_HAND.len()],
+    /// … and the first with that of Up.
     variance: f64,
 }
 
@@ -184,6 +191,11 @@ impl Chain {
     ) -> Result<Self, CalibrationError> {
         let (run, dwells) = (stretch.run, &stretch.dwells);
         let noise = model.process_noise();
+        let turning = model.turning_at_rest.powi(2);
+        let duration = |dwell: &Dwell| {
+            let [begin, end] = dwell.times(run);
+            end - begin
+        };
         let mut attitudes = vec![*attitude];
         let mut turns = Vec::new();
         let of_gravity =
@@ -198,19 +210,36 @@ impl Chain {
             let attitude = exp(tilt) * block.state.attitude;
             let level = -skew(Vector3::z());
             // East and North: alike but for what is interpolated.
-            let drifted = block.noise.covariance(&noise);
-            let walk = 0.5 * (drifted[(0, 0)] + drifted[(1, 1)]);
+            let level_variance = |noise: &PerSensor<ProcessNoise>| {
+                let drifted = block.noise.covariance(noise);
+                0.5 * (drifted[(0, 0)] + drifted[(1, 1)])
+            };
+            let walk = level_variance(&noise);
+            let interpolated = level_variance(&PerSensor::default());
+            // Up is that of the middle of a dwell, from whose end the gyros carry it.
+            let held = (duration(before) + duration(after)) / 3.0;
+            let by_hand = BY_HAND.map(|source| match source {
+                Source::Turning => held,
+                _ => level_variance(&source.alone()) - interpolated,
+            });
+            let walk = walk + turning * held;
             attitudes.push(attitude);
             turns.push(Turn {
                 tilt,
                 of_before: -level * start.attitude * up.0.error,
                 of_after: level * attitude * up.1.error,
                 walk,
+                by_hand,
                 variance: walk + of_gravity(before) + of_gravity(after),
                 block,
             });
         }
-        Ok(Self { attitudes, turns })
+        Ok(Self {
+            attitudes,
+            turns,
+            durations: dwells.iter().map(duration).collect(),
+            turning,
+        })
     }
 
     fn turn(&mut self, turn: &Matrix3<f64>) {
@@ -243,11 +272,11 @@ impl Chain {
         bias: &Vector3<f64>,
         rests: &[MeanOutput],
     ) -> Vec<Rest> {
-        let pairs = self.attitudes.iter().zip(rests);
-        let rest = |(attitude, rest): (&Matrix3<f64>, &MeanOutput)| Rest {
+        let pairs = self.attitudes.iter().zip(rests).zip(&self.durations);
+        let rest = |((attitude, rest), duration): ((&Matrix3<f64>, &MeanOutput), &f64)| Rest {
             attitude: *attitude,
             rate: correction * (rest.output - bias),
-            variance: rest.variance,
+            variance: rest.variance + self.turning / duration,
         };
         pairs.map(rest).collect()
     }
@@ -290,6 +319,7 @@ impl Chain {
                 let made_of = ErrorOf {
                     own: turn.walk,
                     shared: parts,
+                    by_hand: turn.by_hand,
                 };
                 let rows = [
                     (Sensor::Gyro, of_gyro),
@@ -299,6 +329,7 @@ impl Chain {
             }
         }
         for (dwell, (attitude, rest)) in self.attitudes.iter().zip(rests).enumerate() {
+            let by_turning = 1.0 / self.durations[dwell];
             let rate = correction * (rest.output - triad.bias);
             let error = rate - attitude.tr_mul(&earth_rate);
             let by_heading = attitude.tr_mul(&turned);
@@ -309,10 +340,14 @@ impl Chain {
                 let mut parts = along(at_rest, &of_biases(&row));
                 parts.push((shared.heading(number), by_heading[axis]));
                 let made_of = ErrorOf {
-                    own: 0.0,
+                    own: self.turning * by_turning,
                     shared: parts,
+                    by_hand: BY_HAND.map(|source| match source {
+                        Source::Turning => by_turning,
+                        _ => 0.0,
+                    }),
                 };
-                let variance = rest.variance + of_heading;
+                let variance = rest.variance + self.turning * by_turning + of_heading;
                 equations.add(&[(Sensor::Gyro, row)], error[axis], variance, made_of);
             }
         }

@@ -20,7 +20,7 @@ use super::selection::Selection;
 use super::source::Source;
 
 /// Chance that stated figures which are right are given up; each of the two tests has half of it.
-const FALSE_ALARM: f64 = 1e-3;
+pub(super) const FALSE_ALARM: f64 = 1e-3;
 /// Chance that the score test calls for a likelihood ratio which it does not need. The score of a variance
 /// is as skewed as χ², so it does not decide; but it costs no fit.
 const SCREEN: f64 = 0.05;
@@ -36,7 +36,7 @@ const ENOUGH: usize = 1000;
 /// and attitude from random walk at all.
 const LONGEST: usize = 10;
 /// Half of a 95 % interval in σ, and what 95 % stay below.
-const INTERVAL: f64 = 1.96;
+pub(super) const INTERVAL: f64 = 1.96;
 const ONE_SIDED: f64 = 1.645;
 
 /// A calibration with the noise of its record.

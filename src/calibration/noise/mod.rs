@@ -5,6 +5,7 @@
 //! (Patterson and Thompson 1971, Biometrika 58(3)): no degree of freedom is lost to them. What is learnt
 //! is in the [`super::Model`], so that every later pass has it.
 
+mod by_hand;
 mod events;
 mod factors;
 mod fit;
@@ -18,6 +19,7 @@ mod selection;
 mod source;
 mod uncertainty;
 
+pub(super) use by_hand::{BY_HAND, ByHand, Parts};
 pub(super) use events::{Event, Events};
 pub(super) use fit::LOG_SIGMA;
 pub(super) use learn::{Learnt, learn};

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::super::model::Model;
 use super::super::problem::Problem;
-use crate::imu::{GaussMarkov, Sensor};
+use crate::imu::{GaussMarkov, PerSensor, Sensor};
+use crate::navigation::ProcessNoise;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};
 
 /// A source of noise with one σ.
@@ -90,6 +91,21 @@ impl Source {
             Self::GyroGaussMarkov => ("deg/h", DEG_PER_H),
             Self::AccelGaussMarkov => ("ug", MICRO_G),
         }
+    }
+
+    /// White noise of it alone, one in SI and radians, where it is one of the instrument's.
+    pub(in crate::calibration) fn alone(self) -> PerSensor<ProcessNoise> {
+        let mut noise = PerSensor::<ProcessNoise>::default();
+        match self {
+            Self::AngleRandomWalk => noise.gyro.random_walk = 1.0,
+            Self::VelocityRandomWalk => noise.accel.random_walk = 1.0,
+            Self::GyroMotion => noise.gyro.by_motion = 1.0,
+            Self::AccelMotion => noise.accel.by_motion = 1.0,
+            Self::GyroMoving => noise.gyro.by_duration = 1.0,
+            Self::AccelMoving => noise.accel.by_duration = 1.0,
+            _ => {}
+        }
+        noise
     }
 
     /// Whether the run states a figure of it that is not zero.

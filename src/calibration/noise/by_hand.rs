@@ -1,0 +1,273 @@
+//! What turning and holding by hand leave, from the equations of a calibration by gravity alone.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::super::finding::Finding;
+use super::super::model::Model;
+use super::super::problem::Problem;
+use super::learn::{FALSE_ALARM, INTERVAL};
+use super::likelihood_ratio::limit;
+use super::report::{NoiseReport, SourceFigures};
+use super::source::Source;
+
+/// Longest step of ln of a variance.
+const LONGEST: f64 = 3.0;
+/// A step of ln of a variance that is nothing, over its σ.
+const SETTLED: f64 = 0.01;
+/// Steps at most.
+const STEPS: usize = 40;
+
+/// What a hand may add: to the attitude in moves, of either kind, and in dwells.
+pub(in crate::calibration) const BY_HAND: [Source; 3] =
+    [Source::GyroMotion, Source::GyroMoving, Source::Turning];
+
+/// How much of each of [`BY_HAND`] is in errors, where that is one in SI and radians.
+pub(in crate::calibration) type Parts = [DVector<f64>; BY_HAND.len()];
+
+/// Noise that makes errors likelier than what is stated does.
+///
+/// Found by maximum likelihood, the parameters being integrated out with their prior. Residuals would not show it
+/// where there are hardly more equations than parameters: these then explain any noise, by values that the prior
+/// calls unlikely.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::calibration) struct ByHand {
+    found: Vec<Found>,
+    /// −2 ln of the likelihood ratio of stated noise to this.
+    ratio: f64,
+}
+
+/// One source.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Found {
+    /// Its place in [`BY_HAND`].
+    place: usize,
+    /// Of what is beyond the stated noise, in SI and radians.
+    variance: f64,
+    /// 1σ of ln of it.
+    spread: f64,
+}
+
+impl ByHand {
+    /// Source after source as long as one more makes the errors likelier than chance does; from errors of equations
+    /// before the data, and their covariance by prior and stated noise.
+    pub fn likeliest(
+        errors: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        parts: &Parts,
+    ) -> Option<Self> {
+        let none = Likelihood::new(errors, covariance.clone())?;
+        let limit = Self::limit();
+        let (mut found, mut here) = (Vec::<Found>::new(), none.deviance);
+        loop {
+            let left = (0..BY_HAND.len()).filter(|k| found.iter().all(|one| one.place != *k));
+            let more = left.filter_map(|place| {
+                let mut with = found.clone();
+                with.push(Found {
+                    place,
+                    variance: 0.0,
+                    spread: 0.0,
+                });
+                let deviance = fitted(errors, covariance, parts, &mut with)?;
+                Some((with, deviance))
+            });
+            match more.min_by(|(_, one), (_, other)| one.total_cmp(other)) {
+                Some((with, deviance)) if here - deviance > limit => {
+                    (found, here) = (with, deviance);
+                }
+                _ => break,
+            }
+        }
+        Some(Self {
+            found,
+            ratio: none.deviance - here,
+        })
+    }
+
+    /// What −2 ln of the likelihood ratio of one source more stays below by chance.
+    fn limit() -> f64 {
+        limit(0, 1, FALSE_ALARM / BY_HAND.len() as f64)
+    }
+
+    /// Whether the data call for none.
+    pub fn is_none(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// Whether another is no other: the same sources, as large within a tenth of how well they are known.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let alike = |(one, other): (&Found, &Found)| {
+            let off = (one.variance / other.variance).ln().abs();
+            one.place == other.place && off < 0.1 * one.spread
+        };
+        self.found.len() == other.found.len() && self.found.iter().zip(&other.found).all(alike)
+    }
+
+    /// A covariance without it.
+    pub fn taken_from(&self, covariance: &mut DMatrix<f64>, parts: &Parts) {
+        for one in &self.found {
+            add(covariance, &parts[one.place], -one.variance);
+        }
+    }
+
+    /// The model of a problem with it.
+    pub fn model(&self, problem: &Problem) -> Model {
+        let mut model = problem.model.clone();
+        for one in &self.found {
+            let source = BY_HAND[one.place];
+            let sigma = source.sigma(problem).hypot(one.variance.sqrt());
+            source.set(&mut model, sigma, 0.0);
+        }
+        model
+    }
+
+    /// What it is told with.
+    pub fn finding(&self, report: &NoiseReport) -> Finding {
+        Finding::NoiseLearnt {
+            ratio: self.ratio,
+            limit: Self::limit(),
+            sources: report.sources.clone(),
+        }
+    }
+
+    /// What became of the noise of a problem with it.
+    pub fn report(&self, problem: &Problem) -> NoiseReport {
+        let figures = |one: &Found| {
+            let source = BY_HAND[one.place];
+            let (unit, value) = source.unit();
+            let stated = source.sigma(problem);
+            let used = stated.hypot(one.variance.sqrt()) / value;
+            // Of σ, half as wide as of its square.
+            let off = 0.5 * INTERVAL * one.spread;
+            SourceFigures {
+                source,
+                name: source.name().to_owned(),
+                unit: unit.to_owned(),
+                stated: (stated > 0.0).then_some(stated / value),
+                used,
+                interval: Some([-off, off].map(|off| used * off.exp())),
+            }
+        };
+        NoiseReport {
+            policy: problem.options.noise,
+            learnt: true,
+            test: None,
+            sources: self.found.iter().map(figures).collect(),
+        }
+    }
+}
+
+/// Sets the variances by which errors are likeliest, and gives −2 ln of their likelihood; `None` if one is zero. The
+/// last one begins there.
+///
+/// Source: Fisher scoring of the likelihood of components of variance, Patterson and Thompson 1971, Biometrika 58(3);
+/// of one after the other.
+fn fitted(
+    errors: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+    parts: &Parts,
+    found: &mut [Found],
+) -> Option<f64> {
+    for step in 0..STEPS {
+        let mut settled = step > 0;
+        for number in (0..found.len()).rev() {
+            let mut sum = covariance.clone();
+            for one in found.iter() {
+                add(&mut sum, &parts[one.place], one.variance);
+            }
+            let likelihood = Likelihood::new(errors, sum)?;
+            let one = &mut found[number];
+            let (score, information) = likelihood.slope(&parts[one.place]);
+            if one.variance == 0.0 {
+                if score <= 0.0 || information <= 0.0 {
+                    return None;
+                }
+                one.variance = score / information;
+                continue;
+            }
+            one.spread = 1.0 / (one.variance * information.sqrt());
+            let step = score * one.variance * one.spread.powi(2);
+            settled &= step.abs() < SETTLED * one.spread;
+            if settled && number == 0 {
+                return Some(likelihood.deviance);
+            }
+            one.variance *= step.clamp(-LONGEST, LONGEST).exp();
+        }
+    }
+    None
+}
+
+fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {
+    for (k, part) in parts.iter().enumerate() {
+        covariance[(k, k)] += part * variance;
+    }
+}
+
+/// Errors under a covariance.
+struct Likelihood {
+    /// −2 ln of it, but for a constant.
+    deviance: f64,
+    inverse: DMatrix<f64>,
+    weighted: DVector<f64>,
+}
+
+impl Likelihood {
+    fn new(errors: &DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
+        let factor = covariance.cholesky()?;
+        let weighted = factor.solve(errors);
+        let diagonal = factor.l_dirty().diagonal();
+        Some(Self {
+            deviance: errors.dot(&weighted) + 2.0 * diagonal.map(f64::ln).sum(),
+            inverse: factor.inverse(),
+            weighted,
+        })
+    }
+
+    /// Of ln of the likelihood by a variance that has these parts in the errors: gradient, and expected information.
+    fn slope(&self, parts: &DVector<f64>) -> (f64, f64) {
+        let fit = parts.dot(&self.weighted.component_mul(&self.weighted));
+        let expected = parts.dot(&self.inverse.diagonal());
+        let squares = self.inverse.component_mul(&self.inverse);
+        (0.5 * (fit - expected), 0.5 * parts.dot(&(squares * parts)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand::rngs::StdRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    /// So many errors of unit variance, and of noise of moves in the first half.
+    fn errors(seed: u64, count: usize, variance: f64) -> DVector<f64> {
+        let mut rng = StdRng::seed_from_u64(seed);
+        DVector::from_fn(count, |k, _| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            let of_moves = if 2 * k < count { variance } else { 0.0 };
+            normal * (1.0 + of_moves).sqrt()
+        })
+    }
+
+    #[test]
+    fn noise_of_moves_is_found_at_its_size_and_none_where_there_is_none() {
+        const COUNT: usize = 400;
+        let of_moves = |k: usize| if 2 * k < COUNT { 1.0 } else { 0.0 };
+        let parts = [
+            DVector::from_fn(COUNT, |k, _| of_moves(k)),
+            DVector::from_element(COUNT, 0.5),
+            DVector::from_fn(COUNT, |k, _| 1.0 - of_moves(k)),
+        ];
+        let covariance = DMatrix::identity(COUNT, COUNT);
+        let of = |variance| ByHand::likeliest(&errors(5, COUNT, variance), &covariance, &parts);
+        let found = of(8.0).unwrap();
+        assert_eq!(found.found.len(), 1, "{found:?}");
+        assert_eq!(BY_HAND[found.found[0].place], Source::GyroMotion);
+        // 1σ of a variance from 200 numbers is a tenth of it.
+        assert!(
+            (found.found[0].variance / 8.0 - 1.0).abs() < 0.35,
+            "{found:?}"
+        );
+        assert!(of(0.0).unwrap().is_none());
+    }
+}
