@@ -81,8 +81,8 @@ impl Columns {
         })
     }
 
-    /// The rows in which both triads and the time are numbers.
-    pub fn samples(&self, sheet: &Sheet) -> Option<PerSensor<Vec<Vector3<f64>>>> {
+    /// The rows in which both triads are numbers, and their samples.
+    pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, PerSensor<Vec<Vector3<f64>>>)> {
         let triads = PerSensor {
             gyro: self.triads.gyro?,
             accel: self.triads.accel?,
@@ -90,19 +90,20 @@ impl Columns {
         let at = |columns: &[usize; 3], row: usize| {
             Vector3::from(columns.map(|k| sheet.columns[k][row]))
         };
-        let mut samples = PerSensor::from_fn(|_| Vec::new());
+        let (mut rows, mut samples) = (Vec::new(), PerSensor::from_fn(|_| Vec::new()));
         for row in 0..sheet.columns[triads.gyro[0]].len() {
             let both = PerSensor::from_fn(|sensor| at(triads.get(sensor), row));
             if (both.gyro + both.accel)
                 .iter()
                 .all(|value| value.is_finite())
             {
+                rows.push(row);
                 Sensor::ALL
                     .iter()
                     .for_each(|&sensor| samples.get_mut(sensor).push(*both.get(sensor)));
             }
         }
-        (samples.gyro.len() > 1).then_some(samples)
+        (rows.len() > 1).then_some((rows, samples))
     }
 }
 

@@ -157,7 +157,7 @@ impl Draft {
             sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
         }
         let clock = Clock::find(&sheet, &mut columns);
-        let mut triads = columns.samples(&sheet);
+        let (rows, mut triads) = columns.samples(&sheet).unzip();
         let wrapped = triads.as_mut().map(registers::unwrap).unwrap_or_default();
         let whole = triads
             .as_ref()
@@ -165,7 +165,10 @@ impl Draft {
         let whole = whole.unwrap_or_default();
         let offset = triads.as_mut().map(units::centre).unwrap_or_default();
         let period = clock.period.unwrap_or(USUAL_PERIOD);
-        let mut motion = triads.as_ref().map(|triads| Motion::find(triads, period));
+        let breaks = clock.breaks(rows.as_deref().unwrap_or_default(), period, turns::STEP);
+        let mut motion = triads
+            .as_ref()
+            .map(|triads| Motion::find(triads, &breaks, period));
         let mut quantities = Quantities::find(&sheet, &columns, &clock, whole, motion.as_ref());
         let mut blocked = Vec::new();
         let mut registers = None;
@@ -175,7 +178,7 @@ impl Draft {
             let found = Registers::find(triads, period);
             let is_count = PerSensor::from_fn(|sensor| quantities.is_count(sensor));
             found.apply(triads, &mut columns, &is_count);
-            let again = motion.insert(Motion::find(triads, period));
+            let again = motion.insert(Motion::find(triads, &breaks, period));
             if let Some(axes) = &found.axes {
                 // Where gyros carry gravity from rest to rest no sections were laid end to end.
                 again.cuts = 0;

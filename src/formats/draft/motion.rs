@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
+use super::gravity::CHANCE;
 use super::turns;
 use crate::imu::PerSensor;
-use crate::statistics::{SIGMA_OF_MEDIAN, median};
+use crate::statistics::{SIGMA_OF_MEDIAN, median, student_limit};
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
@@ -34,6 +35,8 @@ pub(super) struct Motion {
     pub gravity: f64,
     /// Gyros at rest.
     pub rest: Vector3<f64>,
+    /// Whether gravity's direction changes.
+    pub is_turned: bool,
     /// Angle in rad of one unit of the gyros in one row, where turns show it; negative where the triads have
     /// opposite signs.
     pub angle: Option<f64>,
@@ -69,7 +72,8 @@ fn noise(means: &[Vector3<f64>]) -> f64 {
 }
 
 impl Motion {
-    pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, period: f64) -> Self {
+    /// Of samples before some of which, `breaks`, others are missing.
+    pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize], period: f64) -> Self {
         let length = ((WINDOW / period).round() as usize).clamp(1, samples.gyro.len().div_ceil(8));
         let gyro = means(&samples.gyro, length);
         let accel = means(&samples.accel, length);
@@ -107,13 +111,14 @@ impl Motion {
             .filter(|stretch| stretch.len() > 3)
             .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
             .collect();
-        let cuts = cuts(&samples.accel);
+        let cuts = cuts(samples, breaks);
         Self {
             longest_rest: longest.start * length..longest.end * length,
             gravity: median(&mut sizes).unwrap_or(usual),
             rest,
+            is_turned: turns::is_turned(&accel, usual),
             angle: (cuts == 0)
-                .then(|| turns::angle(samples, &settled, rest, usual, period))
+                .then(|| turns::angle(samples, breaks, &settled, rest, usual, period))
                 .flatten(),
             cuts,
             sum_variance: sum_variance(samples, &settled),
@@ -134,18 +139,50 @@ pub(super) fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
     found
 }
 
-fn cuts(accel: &[Vector3<f64>]) -> usize {
+/// Whether samples are missing between these.
+pub(super) fn is_broken(breaks: &[usize], samples: &Range<usize>) -> bool {
+    let after = breaks.partition_point(|&next| next <= samples.start);
+    breaks.get(after).is_some_and(|&next| next < samples.end)
+}
+
+/// Places where gravity's direction jumps, though no sample is missing there and the gyros do not turn it.
+fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> usize {
+    let accel = &samples.accel;
     let (mut cuts, mut next) = (0, 2 * BESIDE);
     while next + 2 * BESIDE <= accel.len() {
         let part = |from: usize| mean(&accel[from..from + BESIDE]);
         let (before, after) = (part(next - BESIDE), part(next));
         let cut = before.angle(&after) > CUT
             && part(next - 2 * BESIDE).angle(&before) < STEADY
-            && after.angle(&part(next + BESIDE)) < STEADY;
+            && after.angle(&part(next + BESIDE)) < STEADY
+            && !is_broken(breaks, &(next - BESIDE..next + BESIDE))
+            && !turn_about(
+                &before.cross(&after).normalize(),
+                &samples.gyro[next - 2 * BESIDE..next + 2 * BESIDE],
+            );
         cuts += usize::from(cut);
         next += if cut { 2 * BESIDE } else { 1 };
     }
     cuts
+}
+
+/// Whether gyros turn about an axis in the middle half of these samples, as chance hardly makes them say with their
+/// scatter in the others: in a log of few rows a second a turn takes no longer than a cut, but gyros show it.
+fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
+    let rates: Vec<f64> = gyro.iter().map(|rate| rate.dot(axis)).collect();
+    let mean = |rates: &[f64]| rates.iter().sum::<f64>() / rates.len() as f64;
+    let (before, others) = rates.split_at(BESIDE);
+    let (between, after) = others.split_at(2 * BESIDE);
+    let squares = |rates: &[f64]| {
+        let mean = mean(rates);
+        rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>()
+    };
+    let degrees = (2 * BESIDE - 2) as f64;
+    let variance = (squares(before) + squares(after)) / degrees;
+    // As many samples are between as beside.
+    let sigma = (2.0 * variance / (2 * BESIDE) as f64).sqrt();
+    let change = mean(between) - 0.5 * (mean(before) + mean(after));
+    change.abs() > student_limit(degrees, 0.5 * CHANCE) * sigma
 }
 
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {

@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 
 mod registers;
+mod turns;
 
 /// Three quarter turns about each axis in turn with rests between, at 100 Hz; `row` makes a line of time,
 /// angular rate and specific force.

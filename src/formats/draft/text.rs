@@ -147,7 +147,7 @@ impl Draft {
     }
 
     fn gaps(&self) -> String {
-        match (self.clock.gaps, self.clock.repeated) {
+        match (self.clock.gaps.len(), self.clock.repeated) {
             (0, 0) => "no gap in time".to_owned(),
             (0, repeated) => format!(
                 "no gap in time, but it stays or goes back in {}",

@@ -9,7 +9,7 @@ use crate::statistics::median;
 /// Units of time in s, with the words that `run.toml` has for them.
 const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
 /// No unit of three orders is right at two of these periods, s: 5 kHz to 5 Hz.
-const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
+pub(super) const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// A step this much longer than the usual one is a gap.
 const GAP: f64 = 1.5;
 /// Steps within this factor are those of a stated rate.
@@ -27,7 +27,7 @@ pub(super) struct Clock {
     /// Whether that is what the file states, which its times do not tell.
     pub is_stated: bool,
     /// Steps longer than the usual one.
-    pub gaps: usize,
+    pub gaps: Vec<Gap>,
     /// Steps that do not go forward.
     pub repeated: usize,
 }
@@ -89,6 +89,13 @@ impl Clock {
         }
     }
 
+    /// Which of the samples of some rows, with this period, come after a gap of so many seconds.
+    pub fn breaks(&self, rows: &[usize], period: f64, seconds: f64) -> Vec<usize> {
+        let long = |gap: &&Gap| gap.missing * period > seconds;
+        let first = |gap: &Gap| rows.partition_point(|&row| row < gap.before);
+        self.gaps.iter().filter(long).map(first).collect()
+    }
+
     /// By a counter of rows of this period, in s; without one rows follow one another.
     fn of_counter(sheet: &Sheet, columns: &mut Columns, period: f64) -> Self {
         let time = columns.time;
@@ -116,21 +123,29 @@ impl Clock {
             why: why.to_owned(),
             period,
             is_stated: period.is_some(),
-            gaps: 0,
+            gaps: Vec::new(),
             repeated: 0,
         }
     }
 }
 
+/// A step longer than the usual one.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Gap {
+    /// The row after it.
+    before: usize,
+    /// The rows that are missing.
+    missing: f64,
+}
+
 /// How times go on.
-#[derive(Clone, Copy)]
 struct Steps {
     usual: f64,
     /// Of those that are no gap.
     mean: f64,
     /// Whether those are all one.
     is_count: bool,
-    gaps: usize,
+    gaps: Vec<Gap>,
     repeated: usize,
 }
 
@@ -148,11 +163,16 @@ impl Steps {
             .copied()
             .filter(|&step| step < GAP * usual)
             .collect();
+        let gap = |before: usize| {
+            let step = stamps[before] - stamps[before - 1];
+            let missing = step / usual - 1.0;
+            (step >= GAP * usual).then_some(Gap { before, missing })
+        };
         Self {
             usual,
             mean: even.iter().sum::<f64>() / even.len().max(1) as f64,
             is_count: usual == 1.0 && even.iter().all(|&step| step == 1.0),
-            gaps: forward.len() - even.len(),
+            gaps: (1..stamps.len()).filter_map(gap).collect(),
             repeated: steps().filter(|&step| step <= 0.0).count(),
         }
     }

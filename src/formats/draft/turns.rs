@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::motion::{mean, means};
+use super::motion::{is_broken, mean, means};
 use crate::attitude::exp;
 use crate::imu::PerSensor;
 use crate::units::DEGREE;
 
 /// Length of the steps over which gravity's direction is followed, s.
-const STEP: f64 = 0.08;
+pub(super) const STEP: f64 = 0.08;
 /// Specific force within this part of gravity shows its direction.
 const NEAR_GRAVITY: f64 = 0.1;
 /// Changes of direction below this tell nothing, rad.
@@ -34,22 +34,35 @@ const FINE: f64 = 100.0;
 /// from rest to rest. Negative where the triads have opposite signs.
 pub(super) fn angle(
     samples: &PerSensor<Vec<Vector3<f64>>>,
+    breaks: &[usize],
     rests: &[Range<usize>],
     zero: Vector3<f64>,
     gravity: f64,
     period: f64,
 ) -> Option<f64> {
     let length = ((STEP / period).round() as usize).max(1);
-    let (first, correlation) = step_by_step(samples, zero, gravity, length)?;
+    let (first, correlation) = step_by_step(samples, breaks, zero, gravity, length)?;
     if correlation.abs() > CORRELATION {
         return Some(first);
     }
-    from_rest_to_rest(samples, rests, first, length.div_ceil(4))
+    from_rest_to_rest(samples, breaks, rests, first, length.div_ceil(4))
+}
+
+fn is_near(force: &Vector3<f64>, gravity: f64) -> bool {
+    (force.norm() / gravity - 1.0).abs() < NEAR_GRAVITY
+}
+
+/// Whether gravity's direction changes by enough to tell something.
+pub(super) fn is_turned(forces: &[Vector3<f64>], gravity: f64) -> bool {
+    let mut shown = forces.iter().filter(|force| is_near(force, gravity));
+    let first = shown.next();
+    first.is_some_and(|first| shown.any(|force| force.angle(first) > ENOUGH))
 }
 
 /// By least squares of `ḟ = f × ω`, wherever |f| is that of gravity; with the correlation of both sides.
 fn step_by_step(
     samples: &PerSensor<Vec<Vector3<f64>>>,
+    breaks: &[usize],
     zero: Vector3<f64>,
     gravity: f64,
     length: usize,
@@ -57,9 +70,9 @@ fn step_by_step(
     let gyro = means(&samples.gyro, length);
     let accel = means(&samples.accel, length);
     let (mut both, mut turned, mut seen) = (0.0, 0.0, 0.0);
-    for (rate, force) in gyro.windows(3).zip(accel.windows(3)) {
-        let near = |f: &Vector3<f64>| (f.norm() / gravity - 1.0).abs() < NEAR_GRAVITY;
-        if !force.iter().all(near) {
+    for (k, (rate, force)) in gyro.windows(3).zip(accel.windows(3)).enumerate() {
+        let at = k * length..(k + 3) * length;
+        if !force.iter().all(|f| is_near(f, gravity)) || is_broken(breaks, &at) {
             continue;
         }
         let angle = (0.5 * (rate[0] + rate[2]) + rate[1] - 2.0 * zero) * length as f64;
@@ -91,6 +104,7 @@ impl Carry {
 
 fn from_rest_to_rest(
     samples: &PerSensor<Vec<Vector3<f64>>>,
+    breaks: &[usize],
     rests: &[Range<usize>],
     first: f64,
     length: usize,
@@ -108,7 +122,8 @@ fn from_rest_to_rest(
                 .collect(),
         }
     };
-    let moves: Vec<Carry> = rests.windows(2).map(carry).collect();
+    let unbroken = |pair: &&[Range<usize>]| !is_broken(breaks, &(pair[0].start..pair[1].end));
+    let moves: Vec<Carry> = rests.windows(2).filter(unbroken).map(carry).collect();
     let telling = moves
         .iter()
         .filter(|carry| carry.before.angle(&carry.after) > ENOUGH)

@@ -7,7 +7,7 @@ use super::data_sheet::{Scale, likely_for_g};
 use super::motion::Motion;
 use super::name::{self, Name};
 use super::registers::Registers;
-use super::time::Clock;
+use super::time::{Clock, PERIODS};
 use crate::formats::Sheet;
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
@@ -64,7 +64,6 @@ impl Quantities {
                 .or_else(|| name::unit(&sheet.units[first]))
         });
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
-        let angle = motion.angle.map(f64::abs);
         let period = clock.period;
         found.accelerometers(
             named.accel,
@@ -73,7 +72,7 @@ impl Quantities {
             period,
             motion.sum_variance,
         );
-        found.gyros(named.gyro, whole.gyro, angle, period);
+        found.gyros(named.gyro, whole.gyro, motion, period);
         found
     }
 
@@ -208,9 +207,10 @@ impl Quantities {
         &mut self,
         named: Option<&'static str>,
         whole: bool,
-        angle: Option<f64>,
+        motion: &Motion,
         period: Option<f64>,
     ) {
+        let (angle, is_turned) = (motion.angle.map(f64::abs), motion.is_turned);
         let seconds = period.unwrap_or(f64::NAN);
         // Angle in one row of a unit of it.
         let known: &[(&'static str, f64)] = match self.output {
@@ -223,11 +223,22 @@ impl Quantities {
         } else {
             1.0
         };
-        let turns = |unit: f64| angle.map(|angle| angle / (unit * row));
+        let turns = |unit: f64| {
+            angle
+                .map(|angle| angle / (unit * row))
+                .filter(|f| f.is_finite())
+        };
         let fits =
             |unit: f64| turns(unit).is_some_and(|f| f < TURN_FACTOR && f > TURN_FACTOR.recip());
         let by_name = known.iter().find(|(word, _)| Some(*word) == named);
         let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
+        // Without a clock each unit needs a period of its own.
+        let unknown = angle.filter(|_| !row.is_finite() && !whole && named.is_none());
+        let likely = |angle: f64| {
+            let periods = known.iter().map(|&(word, unit)| (word, angle / unit));
+            let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
+            usual.next().filter(|_| usual.next().is_none())
+        };
         // Counts per second for one rad/s: rows add up to the angle.
         let measured = angle
             .map(|angle| row / angle)
@@ -249,6 +260,14 @@ impl Quantities {
                 unit.word = Some(word);
                 unit.why = "gravity turns as far".to_owned();
             }
+            _ if let Some(angle) = unknown => match likely(angle) {
+                Some((word, period)) => {
+                    unit.word = Some(word);
+                    let rate = short(period.recip());
+                    unit.why = format!("gravity turns as far at about {rate} Hz");
+                }
+                None => unit.why = "with no time from row to row turns do not show it".to_owned(),
+            },
             _ if whole || self.output == Output::Pulse || angle.is_some() || named.is_some() => {
                 unit.word = Some("count");
                 unit.why = match (whole, named) {
@@ -263,7 +282,10 @@ impl Quantities {
                     _ => measured.map(|value| Scale::of_steps(value, self.output)),
                 };
             }
-            _ => unit.why = "nothing turns, so nothing shows it".to_owned(),
+            _ if is_turned => {
+                unit.why = "gravity turns too seldom or too roughly to show it".to_owned();
+            }
+            _ => unit.why = "gravity does not turn, so nothing shows it".to_owned(),
         }
         self.units.gyro = unit;
     }
