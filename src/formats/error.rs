@@ -116,22 +116,21 @@ pub(super) fn nearest<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    let name = name.to_lowercase();
-    // Likeness takes the product of both lengths, and half of it at most twice the length.
-    let likely = |candidate: &&str| name.len() <= LONGEST && candidate.len() <= 4 * name.len();
     candidates
         .into_iter()
-        .filter(likely)
-        .map(|candidate| {
-            let lower = candidate.to_lowercase();
-            (
-                strsim::normalized_damerau_levenshtein(&name, &lower),
-                candidate,
-            )
-        })
+        .map(|candidate| (likeness(name, candidate), candidate))
         .filter(|&(likeness, _)| likeness >= 0.5)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
+}
+
+/// How much like a name another is, from 0 to 1.
+fn likeness(name: &str, other: &str) -> f64 {
+    // This takes the product of both lengths, and those of names that are alike differ little.
+    if name.len() > LONGEST || other.len() > 4 * name.len() {
+        return 0.0;
+    }
+    strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase())
 }
 
 /// `Did you mean … ?`, or else the advice given.
@@ -146,8 +145,37 @@ pub(super) fn suggestion<'a>(
     )
 }
 
+/// So many characters of names that could be meant are shown.
+const ROOM: usize = 2 * LONGEST;
+
+/// All names that could be meant, where there is room for them; else those most like the one that is wanted first,
+/// and how many others there are.
+pub(super) fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    let all = list(names.iter().copied());
+    if all.chars().count() <= ROOM {
+        return all;
+    }
+    let alike = names.iter().map(|name| (likeness(wanted, name), *name));
+    let mut alike: Vec<(f64, &str)> = alike.collect();
+    alike.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut room = ROOM;
+    let has_room = |(_, name): &&(f64, &str)| {
+        let length = list([*name]).chars().count() + ", ".len();
+        let has_room = length <= room;
+        room = room.saturating_sub(length);
+        has_room
+    };
+    let shown: Vec<&str> = alike.iter().take_while(has_room).map(|of| of.1).collect();
+    let others = names.len() - shown.len();
+    format!("{} and {others} more", list(shown))
+}
+
 /// Names in backquotes, separated by commas.
 pub(super) fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
-    let quoted: Vec<String> = names.into_iter().map(|name| format!("`{name}`")).collect();
+    let quoted: Vec<String> = names
+        .into_iter()
+        .map(|name| format!("`{}`", excerpt(name)))
+        .collect();
     quoted.join(", ")
 }

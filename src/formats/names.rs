@@ -1,6 +1,6 @@
 //! Names of columns, each of which means one quantity.
 
-use super::error::{list, nearest};
+use super::error::{choice, nearest};
 use crate::shown::excerpt;
 
 /// The names of a file's columns, and which of them are taken.
@@ -54,8 +54,8 @@ impl Names {
                 advice: "Rename one of them.".to_owned(),
             }),
             (None, _) => Err(Wrong {
-                found: format!("the columns {}", list(header())),
-                expected: format!("a column named `{}`", excerpt(name)),
+                found: format!("no column `{}`", excerpt(name)),
+                expected: format!("one of {}", choice(name, header())),
                 advice: match nearest(name, header()) {
                     Some(like) => {
                         format!(
@@ -66,5 +66,34 @@ impl Names {
                 },
             }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn expected(names: &[String], wanted: &str) -> String {
+        let wrong = Names::new(names).find(wanted).unwrap_err();
+        assert_eq!(wrong.found, format!("no column `{wanted}`"));
+        wrong.expected
+    }
+
+    #[test]
+    fn a_name_that_is_none_is_answered_by_all_or_by_those_like_it_first() {
+        let six = ["t", "gx", "gy", "gz", "ax", "ay", "az"].map(str::to_owned);
+        assert_eq!(
+            expected(&six, "gyro_x"),
+            "one of `t`, `gx`, `gy`, `gz`, `ax`, `ay`, `az`"
+        );
+        let flags = (0..60).map(|k| format!("status_flag_{k}"));
+        let many: Vec<String> = flags.chain(["gyro_x".to_owned()]).collect();
+        let shown = expected(&many, "gyr_x");
+        assert!(shown.starts_with("one of `gyro_x`, `"), "{shown}");
+        let count = shown.matches("status_flag").count();
+        assert!(
+            count > 10 && shown.ends_with(&format!("` and {} more", 60 - count)),
+            "{shown}"
+        );
     }
 }

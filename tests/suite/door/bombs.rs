@@ -156,7 +156,7 @@ fn a_message_shows_little_of_a_long_name() {
     refused(
         here,
         "check run.toml",
-        &["imu.csv, line 1", "a column named"],
+        &["imu.csv, line 1", "found no column"],
     );
     let text = fs::read_to_string(here.join("run.toml")).unwrap();
     fs::write(here.join("run.toml"), text + &format!("\n[{long}]\n")).unwrap();
