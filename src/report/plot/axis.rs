@@ -190,11 +190,16 @@ impl Scale {
                 true => (x, number::tick(x, 10f64.powi(k))),
                 false => (x, number::power_of_ten(k)),
             };
+            let mut ticks: Vec<(f64, String)> = ticks.map(label).collect();
+            if ticks.len() < 2 {
+                // So short an axis is hardly curved.
+                ticks = Self::linear(low, high, None).ticks;
+            }
             return Self {
                 kind: Kind::Log,
                 low,
                 high,
-                ticks: ticks.map(label).collect(),
+                ticks,
             };
         }
         let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
@@ -216,10 +221,17 @@ impl Scale {
         };
         let extent = if extent.is_finite() { extent } else { 0.0 }.max(4.0 * linear);
         let mut ticks = vec![(0.0, "0".to_owned())];
-        for k in decades(linear.log10().ceil() as i32, extent.log10().floor() as i32) {
-            let label = number::power_of_ten(k);
-            ticks.push((-(10f64.powi(k)), format!("−{label}")));
-            ticks.push((10f64.powi(k), label));
+        let decades = decades(linear.log10().ceil() as i32, extent.log10().floor() as i32);
+        let mut beside: Vec<_> = decades
+            .map(|k| (10f64.powi(k), number::power_of_ten(k)))
+            .collect();
+        if beside.is_empty() {
+            let even = Self::linear(linear, extent, None).ticks;
+            beside.extend(even.into_iter().next_back());
+        }
+        for (value, label) in beside {
+            ticks.push((-value, format!("−{label}")));
+            ticks.push((value, label));
         }
         Self {
             kind: Kind::Symlog(linear),
@@ -288,6 +300,25 @@ mod tests {
         let narrow = Axis::log("").scale([0.3, 4.0]);
         assert!(narrow.low < 0.3 && narrow.high > 4.0);
         assert!(narrow.ticks.iter().any(|(_, label)| label == "0.5"));
+    }
+
+    #[test]
+    fn a_log_axis_has_two_numbers_at_least_however_short_it_is() {
+        for low in [0.0021, 0.3, 1.05, 2e4, 2.1e4, 6e4, 9.7e4] {
+            for factor in [1.0, 1.01, 1.3, 2.0, 20.0, 300.0, 1e6] {
+                let free = Axis::log("").scale([low, low * factor]);
+                let fixed = Axis::log("").between(low, low * factor * 1.001).scale([]);
+                for scale in [free, fixed, Axis::symlog(low).scale([low * factor])] {
+                    let mut labels: Vec<&String> = scale.ticks.iter().map(|tick| &tick.1).collect();
+                    labels.sort();
+                    labels.dedup();
+                    assert!(labels.len() > 1, "{scale:?}");
+                    assert_eq!(labels.len(), scale.ticks.len(), "{scale:?}");
+                    let ends = scale.low..=scale.high;
+                    assert!(scale.ticks.iter().all(|tick| ends.contains(&tick.0)));
+                }
+            }
+        }
     }
 
     #[test]
