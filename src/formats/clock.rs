@@ -88,7 +88,7 @@ impl<'a> Clock<'a> {
             column: self.column.map(|name| csv.column(name)).transpose()?,
             nanoseconds: self.nanoseconds.map(|name| csv.column(name)).transpose()?,
             unit: self.unit,
-            period: self.period.unwrap_or(1.0),
+            period: self.period,
             breaks: self.breaks,
             number: None,
             first: None,
@@ -129,8 +129,8 @@ pub(super) struct Stamps {
     column: Option<usize>,
     nanoseconds: Option<usize>,
     unit: TimeUnit,
-    /// s a count
-    period: f64,
+    /// s from row to row, if it is stated; always of counts
+    period: Option<f64>,
     breaks: Breaks,
     /// The number in the row before.
     number: Option<f64>,
@@ -162,7 +162,7 @@ impl Stamps {
     pub fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
         let end = self.of_rows.len();
         let Some(column) = self.column else {
-            let time = (self.let_go + end) as f64 * self.period;
+            let time = (self.let_go + end) as f64 * self.period();
             self.of_rows.push((time, csv.line()));
             return Ok(Stamp::New(end));
         };
@@ -172,6 +172,12 @@ impl Stamps {
         }
         if self.unit == TimeUnit::Count && number.fract() != 0.0 {
             return Err(csv.not(column, "a whole number of samples"));
+        }
+        if number + self.usual_step() == number {
+            return Err(csv.not(
+                column,
+                "a time, not a number so large that the next row would have the same",
+            ));
         }
         if let Some(before) = self.number {
             let step = number - before;
@@ -208,7 +214,7 @@ impl Stamps {
     fn time(&self, number: f64) -> f64 {
         match self.unit {
             TimeUnit::PerSecond(many) => (number + self.ahead) / many,
-            TimeUnit::Count => (number + self.ahead) * self.period,
+            TimeUnit::Count => (number + self.ahead) * self.period(),
         }
     }
 
@@ -231,11 +237,24 @@ impl Stamps {
         Stamp::New(place)
     }
 
+    fn period(&self) -> f64 {
+        self.period.unwrap_or(1.0)
+    }
+
+    /// The step that is stated, or else the longest so far; before any, that of a second.
+    fn usual_step(&self) -> f64 {
+        match self.period {
+            Some(period) => period * self.a_second(),
+            None if self.longest > 0.0 => self.longest,
+            None => self.a_second(),
+        }
+    }
+
     /// What numbers go on by in a second.
     fn a_second(&self) -> f64 {
         match self.unit {
             TimeUnit::PerSecond(many) => many,
-            TimeUnit::Count => self.period.recip(),
+            TimeUnit::Count => self.period().recip(),
         }
     }
 
@@ -375,7 +394,7 @@ impl Stamps {
                     "Rows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing \
                      at each place, or several times as many, and all after it be as much too early. Give a time that \
                      does not wrap, or split the record there.",
-                    nanoseconds(size * self.period)
+                    nanoseconds(size * self.period())
                 )
             }),
         }));

@@ -291,6 +291,19 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
             assert!(number == 0 || imu.edge(stretch.start - 100.0) == begin as f64 - 1.0);
         }
     }
+    // Nothing goes on from a time of so many digits, wherever it stands.
+    for garbage in [0, 1, 5000, 9999] {
+        let damaged = |k: usize| match k == garbage {
+            true => 10u64.pow(18),
+            false => 10 * k as u64,
+        };
+        let refused = read(&damaged, 1e3, Breaks::Settings).unwrap_err();
+        let said = format!(
+            "line {}, column `t`: found `1000000000000000000`",
+            garbage + 2
+        );
+        assert!(refused.to_string().contains(&said), "{refused}");
+    }
     // Milliseconds of a second are no time.
     let of_second = |k: usize| 10 * (k % 100) as u64;
     assert!(read(&of_second, 1e3, Breaks::Settings).is_err());
