@@ -10,6 +10,7 @@ mod segment;
 mod series;
 mod temperature;
 
+pub(crate) use faults::Slower;
 pub use faults::{Bridge, Fault, FaultKind};
 pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
 pub(crate) use near::Near;

@@ -8,6 +8,7 @@ mod interpolation;
 mod notes;
 mod repair;
 mod saturated;
+mod slower;
 mod sound;
 mod spikes;
 mod stuck;
@@ -23,6 +24,7 @@ use clipped::clipped;
 use held::held;
 pub(crate) use notes::notes;
 pub(crate) use repair::{Repaired, Rows};
+pub(crate) use slower::Slower;
 use spikes::spikes;
 
 /// Samples of a record that are not what the instrument sensed.

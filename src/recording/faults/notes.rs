@@ -1,15 +1,18 @@
 //! Faults in words.
 
-use super::{Fault, FaultKind};
+use super::{Fault, FaultKind, Slower};
 use crate::recording::ImuSamples;
 
-/// A sentence for each kind of fault that a record has.
+/// A sentence for each part of a lower rate and for each kind of fault that a record has beside.
 pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
+    let slower = imu.slower();
+    let is_beside = |fault: &&Fault| !slower.iter().any(|part| part.holds(fault));
     let note = |kind| {
         let faults: Vec<&Fault> = imu
             .faults
             .iter()
             .filter(|fault| fault.kind == kind)
+            .filter(is_beside)
             .collect();
         let first = faults.iter().min_by_key(|fault| fault.samples.start)?;
         let count: usize = faults.iter().map(|fault| fault.samples.len()).sum();
@@ -36,10 +39,34 @@ pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
             first.line
         ))
     };
-    FaultKind::ALL.into_iter().filter_map(note).collect()
+    let of_parts = slower.iter().map(|part| imu.of_rate(part));
+    of_parts
+        .chain(FaultKind::ALL.into_iter().filter_map(note))
+        .collect()
 }
 
 impl ImuSamples {
+    /// How rows come in a part of a lower rate, and what becomes of it.
+    fn of_rate(&self, part: &Slower) -> String {
+        let [from, to] = [part.samples.start, part.samples.end].map(|k| self.time(k));
+        let [usual, step] = [1, part.step].map(|samples| 1e3 * self.period * samples as f64);
+        let done = match part.places - part.bridged {
+            0 => {
+                "the samples between are interpolated, with the error of that in the σ.".to_owned()
+            }
+            unbridged => format!(
+                "the samples between are interpolated, but at {unbridged} of {} places attitude and velocity start anew, \
+                 and dwells and moves are lost. Split the log where its rate changes, and calibrate its parts together \
+                 as a campaign.",
+                part.places
+            ),
+        };
+        format!(
+            "From line {}, {from:.2} s, to {to:.2} s rows come every {step:.3} ms, elsewhere every {usual:.3} ms: {done}",
+            part.line
+        )
+    }
+
     /// So many rows or samples, the columns of the latter, and what is wrong with them.
     fn what<'a>(
         &self,

@@ -5,7 +5,7 @@ use super::super::number::{count, or_dash, sigma, three_digits, value, whole};
 use super::words::{degrees, direction, of_label, signed, way_up};
 use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
-use crate::recording::{Fault, LabelledMotion};
+use crate::recording::{Fault, LabelledMotion, Slower};
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::Survey;
@@ -68,6 +68,7 @@ fn exactly(x: f64) -> String {
 
 pub(super) fn faults(run: &Run) -> Table {
     let imu = &run.recording.imu;
+    let slower = imu.slower();
     let row = |fault: &Fault| {
         let column = column_of(run, fault).unwrap_or("rows");
         cells![
@@ -79,12 +80,28 @@ pub(super) fn faults(run: &Run) -> Table {
             if fault.bridged { "yes" } else { "no" },
         ]
     };
+    let of_part = |part: &Slower| {
+        cells![
+            "lower rate",
+            "rows",
+            count(part.line as usize),
+            value(imu.time(part.samples.start), 0.1),
+            count(part.missing()),
+            match part.places - part.bridged {
+                0 => "yes".to_owned(),
+                _ => format!("{} of {}", count(part.bridged), count(part.places)),
+            },
+        ]
+    };
+    let is_beside = |fault: &&Fault| !slower.iter().any(|part| part.holds(fault));
+    let beside = || imu.faults.iter().filter(is_beside);
     let table = Table::new(
         "Faults",
         ["what", "column", "line", "at, s", "samples", "bridged"],
     )
-    .section(imu.faults.iter().take(LISTED).map(row));
-    match imu.faults.len().saturating_sub(LISTED) {
+    .section(slower.iter().map(of_part))
+    .section(beside().take(LISTED).map(row));
+    match beside().count().saturating_sub(LISTED) {
         0 => table,
         more => table.note(format!("And {} more.", count(more))),
     }
