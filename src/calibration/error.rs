@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::mounting::Mounting;
 use crate::imu::Sensor;
+use crate::run::LONG_ENOUGH;
 use crate::run::motion::ContradictedLabel;
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
@@ -42,7 +43,7 @@ pub enum CalibrationError {
     /// Nothing at rest.
     #[error(
         "no dwell was found, expected: one at least, better one with each axis up and each down; the \
-         instrument must stand for a second or more between turns; check the table's log, and \
+         instrument must stand for {LONG_ENOUGH} s or more between turns; check the table's log, and \
          reading_sigma_arcsec if it is noisier than stated; without a log, the gyros' prior bias and noise \
          figures"
     )]

@@ -13,7 +13,7 @@ use super::standstill::{FLOOR, stillness};
 use crate::attitude::to_tilt_and_heading;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
-use crate::run::{Aiding, Dwell, Run};
+use crate::run::{Aiding, Dwell, LONG_ENOUGH, Run};
 use crate::statistics::chi_square_limit;
 
 /// 1σ of the initial velocity of a body at rest, m/s, beside that with which it sways.
@@ -222,7 +222,7 @@ impl<'a> Problem<'a> {
             });
         let left_out = self.left_out.iter().map(|name| {
             format!(
-                "{name}: left out, since no dwell was found in it; the instrument must stand for a second or more \
+                "{name}: left out, since no dwell was found in it; the instrument must stand for {LONG_ENOUGH} s or more \
                  between turns."
             )
         });

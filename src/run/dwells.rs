@@ -4,6 +4,8 @@
 mod imu;
 mod table;
 
+pub use imu::LONG_ENOUGH;
+
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
@@ -400,6 +402,30 @@ mod tests {
             assert!(dwells.len() > 3);
             assert_eq!(dwells[0].samples.start, known.start);
             assert!(dwells[dwells.len() - 1].samples.end <= known.end);
+        }
+    }
+
+    #[test]
+    fn what_stands_as_long_as_is_said_is_found_wherever_it_lies() {
+        let mut run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
+        run.recording.table = None;
+        let (period, turn) = (0.01, 100);
+        let stand = (LONG_ENOUGH / period).round() as usize;
+        for early in 0..25 {
+            let mut up = Vector3::z();
+            let mut gyro = Vec::new();
+            let mut accel = Vec::new();
+            let moves = (0..8).flat_map(|_| {
+                std::iter::repeat_n(0.0, stand).chain(std::iter::repeat_n(1.0, turn))
+            });
+            for rate in moves.skip(early) {
+                let angle = Vector3::x() * rate * 60.0 * DEGREE * period;
+                up = exp(-angle) * up;
+                gyro.push(angle);
+                accel.push(up * run.site.gravity * period);
+            }
+            run.recording.imu = ImuSamples::made(0.0, period, gyro, accel);
+            assert_eq!(run.dwells(Aiding::Velocity).len(), 8, "{early}");
         }
     }
 

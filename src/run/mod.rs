@@ -8,7 +8,7 @@ mod doubts;
 mod dwells;
 pub mod motion;
 
-pub use dwells::{Dwell, MeanOutput, Position};
+pub use dwells::{Dwell, LONG_ENOUGH, MeanOutput, Position};
 
 use serde::{Deserialize, Serialize};
 

@@ -3,8 +3,8 @@
 use super::super::number::{count, three_digits, value};
 use crate::calibration::Mounting;
 use crate::imu::{AXES, Sensor};
-use crate::run::Run;
 use crate::run::motion::{LabelCheck, Turn};
+use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
 use crate::units::DEGREE;
 
@@ -229,11 +229,10 @@ pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
 fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
-        findings.push(
-            "There are fewer than two dwells: leave the instrument stationary for a second or more between turns; if it was, \
-             check bias_sigma of the gyros and the noise figures."
-                .to_owned(),
-        );
+        findings.push(format!(
+            "There are fewer than two dwells: leave the instrument stationary for {LONG_ENOUGH} s or more between turns; \
+             if it was, check bias_sigma of the gyros and the noise figures."
+        ));
         return findings;
     }
     let missing: Vec<String> = survey

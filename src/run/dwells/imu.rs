@@ -15,6 +15,9 @@ use crate::statistics::{SIGMA_OF_MEDIAN, chi_square_limit, median};
 const WINDOW: f64 = 0.25;
 /// Windows in a row that make a standstill: after a hand has let go a sensor still swings.
 const FEWEST: usize = 4;
+/// A standstill of so many seconds between two moves is found wherever it lies: a window may lie across either end
+/// of it, the next one has not the same beside it, and the one after that is left out as too gentle a move.
+pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
 /// Means of a window at rest differ by less than this many σ of their noise …
 const STILL_SIGMAS: f64 = 6.0;
 /// … and specific force by this much more, m/s²: a turn of 0.02°.
