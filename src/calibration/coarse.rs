@@ -202,10 +202,13 @@ fn calibrated(problem: &Problem) -> Result<Turned, CalibrationError> {
     turns::triads_and_attitudes(problem, &gravity::accelerometers(problem)?)
 }
 
-/// The same with what a hand adds to the noise that is stated, where the data show that.
+/// The same with what a hand adds to the noise that is stated, where the data show that and residuals cannot.
 fn calibrated_as_held(problem: &Problem) -> Result<(Turned, Option<ByHand>), CalibrationError> {
     let stated = calibrated(problem)?;
-    if problem.options.noise == NoisePolicy::Stated {
+    // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
+    let residuals = stated.equations.residuals(&stated.shared);
+    let tell = residuals.is_none_or(|residuals| residuals.growth().is_some());
+    if tell || problem.options.noise == NoisePolicy::Stated {
         return Ok((stated, None));
     }
     let likeliest = |turned: &Turned, used: &ByHand| {

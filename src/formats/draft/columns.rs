@@ -36,6 +36,9 @@ const MOST_INSTANCES: usize = 8;
 /// Part of the steps of a time that go forward.
 const FORWARD: f64 = 0.9;
 
+/// Of both triads, row by row.
+type Samples = PerSensor<Vec<Vector3<f64>>>;
+
 impl Columns {
     pub fn find(sheet: &Sheet) -> Self {
         let names: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
@@ -82,7 +85,7 @@ impl Columns {
     }
 
     /// The rows in which both triads are numbers, and their samples.
-    pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, PerSensor<Vec<Vector3<f64>>>)> {
+    pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
         let triads = PerSensor {
             gyro: self.triads.gyro?,
             accel: self.triads.accel?,
