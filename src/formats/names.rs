@@ -54,7 +54,7 @@ impl Names {
                 advice: "Rename one of them.".to_owned(),
             }),
             (None, _) => Err(Wrong {
-                found: format!("no column `{}`", excerpt(name)),
+                found: format!("no column named `{}`", excerpt(name)),
                 expected: format!("one of {}", choice(name, header())),
                 advice: match nearest(name, header()) {
                     Some(like) => {
@@ -75,7 +75,7 @@ mod tests {
 
     fn expected(names: &[String], wanted: &str) -> String {
         let wrong = Names::new(names).find(wanted).unwrap_err();
-        assert_eq!(wrong.found, format!("no column `{wanted}`"));
+        assert_eq!(wrong.found, format!("no column named `{wanted}`"));
         wrong.expected
     }
 
