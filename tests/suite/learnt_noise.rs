@@ -72,6 +72,7 @@ fn what_was_learnt_and_is_then_stated_gives_the_same_calibration() {
 #[test]
 #[ignore = "slow: two hand-turned records and parts of them"]
 fn a_short_part_of_a_hand_turned_record_agrees_with_the_whole() {
+    let mut learnt = 0;
     for (record, begins) in [("real-mems-lot-0", [36, 99]), ("real-mems-lot-1", [27, 36])] {
         let Some(whole) = shared(record) else { return };
         let calibrated = |directory: &Path| {
@@ -90,7 +91,11 @@ fn a_short_part_of_a_hand_turned_record_agrees_with_the_whole() {
             assert!(outcome.converged, "{record} {begin}");
             let run = read(here.path());
             let closed_form = six_position(&Problem::new(&run, &Options::default())).unwrap();
-            for estimate in [&outcome.estimate, &closed_form.estimate] {
+            // In one of these parts what the hand adds is too little to contradict what is stated.
+            let of_hand = closed_form.noise.is_some();
+            learnt += usize::from(of_hand);
+            let closed_form = Some(&closed_form.estimate).filter(|_| of_hand);
+            for estimate in [&outcome.estimate].into_iter().chain(closed_form) {
                 let off = estimate.vector() - of_whole.vector();
                 let known: Vec<usize> = estimate.estimated().collect();
                 let n = known.len();
@@ -105,4 +110,5 @@ fn a_short_part_of_a_hand_turned_record_agrees_with_the_whole() {
             }
         }
     }
+    assert_eq!(learnt, 3);
 }
