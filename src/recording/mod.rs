@@ -10,8 +10,7 @@ mod segment;
 mod series;
 mod temperature;
 
-pub(crate) use faults::Slower;
-pub use faults::{Bridge, Fault, FaultKind};
+pub use faults::{Bridge, Fault, FaultKind, Slower};
 pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
 pub(crate) use near::Near;
 pub(crate) use samples::stretches_between;

@@ -24,7 +24,7 @@ use clipped::clipped;
 use held::held;
 pub(crate) use notes::notes;
 pub(crate) use repair::{Repaired, Rows};
-pub(crate) use slower::Slower;
+pub use slower::Slower;
 use spikes::spikes;
 
 /// Samples of a record that are not what the instrument sensed.

@@ -9,7 +9,7 @@ use crate::recording::ImuSamples;
 
 /// A part of a record in which rows come at a lower rate.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Slower {
+pub struct Slower {
     /// From the first sample without a row to the last.
     pub samples: Range<usize>,
     /// Of the row before them.
@@ -37,7 +37,7 @@ impl Slower {
 impl ImuSamples {
     /// Where holes of one length lie between single rows, in a longer succession than chance makes even where every
     /// other row is missing by it.
-    pub(crate) fn slower(&self) -> Vec<Slower> {
+    pub fn slower(&self) -> Vec<Slower> {
         let of_kind = |fault: &&Fault| fault.kind == FaultKind::Missing;
         let mut holes: Vec<&Fault> = self.faults.iter().filter(of_kind).collect();
         holes.sort_by_key(|hole| hole.samples.start);
