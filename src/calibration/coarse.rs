@@ -24,6 +24,9 @@ use crate::attitude::exp;
 use crate::imu::{ParameterKind, Sensor, TermVector};
 use turns::Turned;
 
+/// So many equations, of a hundred dwells, leave no noise to parameters; their covariance is factorised whole, which takes
+/// the cube of their number.
+const MOST_EQUATIONS: usize = 600;
 /// Points of linearisation at which noise is learnt, at most.
 const ROUNDS: usize = 6;
 
@@ -205,6 +208,9 @@ fn calibrated(problem: &Problem) -> Result<Turned, CalibrationError> {
 /// The same with what a hand adds to the noise that is stated, where the data show that and residuals cannot.
 fn calibrated_as_held(problem: &Problem) -> Result<(Turned, Option<ByHand>), CalibrationError> {
     let stated = calibrated(problem)?;
+    if stated.equations.count() > MOST_EQUATIONS {
+        return Ok((stated, None));
+    }
     // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
     let residuals = stated.equations.residuals(&stated.shared);
     let tell = residuals.is_none_or(|residuals| residuals.growth().is_some());

@@ -149,6 +149,11 @@ impl Equations {
         )
     }
 
+    /// How many rows there are but the prior's.
+    pub(super) fn count(&self) -> usize {
+        self.noise.len()
+    }
+
     /// Errors of the rows but the prior's as they are before these data, and their covariance: by prior and noise.
     pub(super) fn before_data(
         &self,
