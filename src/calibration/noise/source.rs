@@ -93,16 +93,12 @@ impl Source {
         }
     }
 
-    /// White noise of it alone, one in SI and radians, where it is one of the instrument's.
+    /// White noise of it alone, one in SI and radians, where it is one of the gyros' in moves.
     pub(in crate::calibration) fn alone(self) -> PerSensor<ProcessNoise> {
         let mut noise = PerSensor::<ProcessNoise>::default();
         match self {
-            Self::AngleRandomWalk => noise.gyro.random_walk = 1.0,
-            Self::VelocityRandomWalk => noise.accel.random_walk = 1.0,
             Self::GyroMotion => noise.gyro.by_motion = 1.0,
-            Self::AccelMotion => noise.accel.by_motion = 1.0,
             Self::GyroMoving => noise.gyro.by_duration = 1.0,
-            Self::AccelMoving => noise.accel.by_duration = 1.0,
             _ => {}
         }
         noise
