@@ -24,24 +24,22 @@ pub(super) struct StepModel<const M: usize> {
 pub(super) struct Courses<const M: usize, const G: usize> {
     models: Vec<StepModel<M>>,
     points: Vec<Point<M, G>>,
-    observations: Vec<Observation<M, G>>,
+    gains: Vec<Gain<M, G>>,
 }
 
 /// A point of a course.
 struct Point<const M: usize, const G: usize> {
-    known: Box<Known<M, G>>,
-    /// The last observation before it.
-    observation: usize,
-    /// Where each thing that may happen next leads.
-    next: Vec<(Event, usize)>,
-}
-
-/// An observation of a course.
-struct Observation<const M: usize, const G: usize> {
-    /// How it is taken in.
-    gain: Gain<M, G>,
-    /// Information of `g` by it and all observations before it, and by nothing else.
-    information: [[f64; G]; G],
+    /// The point before it, and what happened since.
+    from: usize,
+    event: Event,
+    /// How the last observation before it is taken in.
+    gain: usize,
+    /// A point that follows it, and another one that follows the point before it.
+    next: Option<usize>,
+    beside: Option<usize>,
+    /// What is known there. It goes on with the course; where one ends it stays.
+    known: Option<Box<Known<M, G>>>,
+    end: bool,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -62,17 +60,19 @@ pub(super) struct Gain<const M: usize, const G: usize> {
     pub of_errors: [[f64; M]; 3],
 }
 
-/// What is known of navigation errors `U g + m` where `g` is given.
+/// What is known of navigation errors `U g + m` where `g` is given, and of `g`.
 #[derive(Clone)]
 pub(super) struct Known<const M: usize, const G: usize> {
     /// U
     pub of_given: [[f64; G]; M],
     /// Of m.
     pub covariance: [[f64; M]; M],
+    /// Information of `g` by the observations so far, and by nothing else.
+    pub information: [[f64; G]; G],
 }
 
-/// So many bytes of points and observations are kept before a part begins: those of a few courses.
-const MOST: usize = 2 << 20;
+/// So many bytes of points and gains are kept before a part begins: those of a few courses.
+const MOST: usize = 1 << 20;
 
 impl<const M: usize, const G: usize> Courses<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
@@ -88,24 +88,35 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         let known = Known {
             of_given,
             covariance: [[0.0; M]; M],
+            information: [[0.0; G]; G],
+        };
+        let begin = Point {
+            from: Self::BEGIN,
+            event: Event::Step(0),
+            gain: 0,
+            next: None,
+            beside: None,
+            known: Some(Box::new(known)),
+            end: true,
         };
         Self {
             models: Vec::new(),
-            points: vec![Point::new(Box::new(known), 0)],
-            observations: vec![Observation::none()],
+            points: vec![begin],
+            gains: vec![Gain::none()],
         }
     }
 
     /// Forgets what is kept where that is too much.
     pub fn tidy(&mut self) {
-        let of_point = size_of::<Point<M, G>>() + size_of::<Known<M, G>>();
-        let of_points = self.points.len() * of_point;
-        let of_observations = self.observations.len() * size_of::<Observation<M, G>>();
-        if of_points + of_observations > MOST {
+        let of_points = self.points.len() * size_of::<Point<M, G>>();
+        let known = self.points.iter().filter(|point| point.known.is_some());
+        let of_known = known.count() * size_of::<Known<M, G>>();
+        let of_gains = self.gains.len() * size_of::<Gain<M, G>>();
+        if of_points + of_known + of_gains > MOST {
             self.models.clear();
             self.points.truncate(1);
-            self.points[Self::BEGIN].next.clear();
-            self.observations.truncate(1);
+            self.points[Self::BEGIN].next = None;
+            self.gains.truncate(1);
         }
     }
 
@@ -122,30 +133,23 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         &self.models[number]
     }
 
-    /// What is known at a point of navigation errors …
-    pub fn known(&self, point: usize) -> &Known<M, G> {
-        &self.points[point].known
-    }
-
-    /// … and of `g`.
-    pub fn information(&self, point: usize) -> &[[f64; G]; G] {
-        &self.observations[self.points[point].observation].information
+    /// What is known where a course ends.
+    pub fn end(&mut self, point: usize) -> &Known<M, G> {
+        self.points[point].end = true;
+        self.known(point)
     }
 
     /// How the last observation before a point was taken in.
     pub fn gain(&self, point: usize) -> &Gain<M, G> {
-        &self.observations[self.points[point].observation].gain
+        &self.gains[self.points[point].gain]
     }
 
     /// Where a step leads.
     pub fn step(&mut self, from: usize, model: usize) -> usize {
-        self.reached(from, Event::Step(model)).unwrap_or_else(|| {
-            let Point {
-                known, observation, ..
-            } = &self.points[from];
-            let known = Box::new(known.propagated(&self.models[model]));
-            let to = Point::new(known, *observation);
-            self.leads(from, Event::Step(model), to)
+        let event = Event::Step(model);
+        self.reached(from, event).unwrap_or_else(|| {
+            let gain = self.points[from].gain;
+            self.leads(from, event, gain)
         })
     }
 
@@ -156,60 +160,95 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         if let Some(reached) = self.reached(from, event) {
             return Some(reached);
         }
-        let mut known = self.points[from].known.clone();
-        let gain = known.gain(state, variance)?;
-        known.tell(&gain);
-        let mut information = *self.information(from);
-        for row in &gain.rows {
-            for (of_component, weight) in information.iter_mut().zip(row) {
-                add(of_component, *weight, row);
-            }
-        }
-        let to = Point::new(known, self.observations.len());
-        self.observations.push(Observation { gain, information });
-        Some(self.leads(from, event, to))
+        let gain = self.known(from).gain(state, variance)?;
+        self.gains.push(gain);
+        Some(self.leads(from, event, self.gains.len() - 1))
     }
 
     fn reached(&self, from: usize, event: Event) -> Option<usize> {
-        let next = &self.points[from].next;
-        let (_, to) = next.iter().find(|(known, _)| *known == event)?;
-        Some(*to)
+        let mut point = self.points[from].next;
+        while let Some(number) = point {
+            let Point {
+                event: of_point,
+                beside,
+                ..
+            } = &self.points[number];
+            if *of_point == event {
+                return point;
+            }
+            point = *beside;
+        }
+        None
     }
 
-    fn leads(&mut self, from: usize, event: Event, to: Point<M, G>) -> usize {
+    fn leads(&mut self, from: usize, event: Event, gain: usize) -> usize {
         let number = self.points.len();
-        self.points.push(to);
-        self.points[from].next.push((event, number));
+        let beside = self.points[from].next.replace(number);
+        self.points.push(Point {
+            from,
+            event,
+            gain,
+            next: None,
+            beside,
+            known: None,
+            end: false,
+        });
         number
+    }
+
+    /// What is known at a point.
+    fn known(&mut self, point: usize) -> &Known<M, G> {
+        let known = match self.points[point].known.take() {
+            Some(known) => known,
+            None => self.brought(point),
+        };
+        self.points[point].known.insert(known)
+    }
+
+    /// What is known at a point, brought there from the last before it where it is kept.
+    fn brought(&mut self, point: usize) -> Box<Known<M, G>> {
+        let mut way = Vec::new();
+        let mut at = point;
+        let mut known = loop {
+            if let Some(known) = self.points[at].leave() {
+                break known;
+            }
+            way.push(at);
+            at = self.points[at].from;
+        };
+        for at in way.into_iter().rev() {
+            match self.points[at].event {
+                Event::Step(model) => known.propagate(&self.models[model]),
+                Event::Observed(..) => known.tell(self.gain(at)),
+            }
+        }
+        known
     }
 }
 
 impl<const M: usize, const G: usize> Point<M, G> {
-    fn new(known: Box<Known<M, G>>, observation: usize) -> Self {
-        Self {
-            known,
-            observation,
-            next: Vec::new(),
+    /// What is known there, to go on with.
+    fn leave(&mut self) -> Option<Box<Known<M, G>>> {
+        match self.end {
+            true => self.known.clone(),
+            false => self.known.take(),
         }
     }
 }
 
-impl<const M: usize, const G: usize> Observation<M, G> {
+impl<const M: usize, const G: usize> Gain<M, G> {
     /// Nothing is observed.
     fn none() -> Self {
         Self {
-            gain: Gain {
-                root: Matrix3::identity(),
-                rows: [[0.0; G]; 3],
-                of_errors: [[0.0; M]; 3],
-            },
-            information: [[0.0; G]; G],
+            root: Matrix3::identity(),
+            rows: [[0.0; G]; 3],
+            of_errors: [[0.0; M]; 3],
         }
     }
 }
 
 impl<const M: usize, const G: usize> Known<M, G> {
-    fn propagated(&self, model: &StepModel<M>) -> Self {
+    fn propagate(&mut self, model: &StepModel<M>) {
         let mut of_given = [[0.0; G]; M];
         let mut half = [[0.0; M]; M];
         for &(row, column, phi) in &model.transition {
@@ -225,10 +264,8 @@ impl<const M: usize, const G: usize> Known<M, G> {
                 sum[at] += phi * half[row][column];
             }
         }
-        Self {
-            of_given,
-            covariance,
-        }
+        self.of_given = of_given;
+        self.covariance = covariance;
     }
 
     fn gain(&self, state: usize, variance: f64) -> Option<Gain<M, G>> {
@@ -254,6 +291,67 @@ impl<const M: usize, const G: usize> Known<M, G> {
                 add(&mut self.of_given[state], -gain, row);
                 add(&mut self.covariance[state], -gain, of_errors);
             }
+            for (of_component, weight) in self.information.iter_mut().zip(row) {
+                add(of_component, *weight, row);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn courses() -> Courses<9, 12> {
+        let begins = [0, 1, 2, 3, 4, 5].map(Some);
+        let mut courses = Courses::new(std::array::from_fn(|k| begins.get(k).copied().flatten()));
+        let mut noise = [[0.0; 9]; 9];
+        (0..9).for_each(|k| noise[k][k] = 1.0 + k as f64);
+        let mut transition: Vec<_> = (0..9).map(|k| (k, k, 1.0)).collect();
+        transition.extend([(3, 1, -0.98), (4, 0, 0.98)]);
+        courses.number(StepModel {
+            noise,
+            transition,
+            driven: vec![(0, 6, 0.1), (3, 9, 0.1)],
+        });
+        courses
+    }
+
+    /// Through a step and an observation so many times; where each observation leads.
+    fn go(courses: &mut Courses<9, 12>, mut at: usize, times: usize, variance: f64) -> Vec<usize> {
+        let each = (0..times).map(|_| {
+            let stepped = courses.step(at, 0);
+            at = courses
+                .observe(stepped, 3, variance)
+                .expect("it is positive definite");
+            at
+        });
+        each.collect()
+    }
+
+    #[test]
+    fn what_is_known_is_the_same_whichever_course_came_before() {
+        let mut shared = courses();
+        let long = go(&mut shared, Courses::<9, 12>::BEGIN, 20, 0.5);
+        shared.end(long[19]);
+        // One that branches off where nothing is kept any more, and one that ends on the way.
+        let branch = go(&mut shared, long[9], 5, 2.0)[4];
+        for (point, variances) in [
+            (branch, [(10, 0.5), (5, 2.0)]),
+            (long[14], [(15, 0.5), (0, 0.0)]),
+        ] {
+            let mut alone = courses();
+            let mut at = Courses::<9, 12>::BEGIN;
+            for (times, variance) in variances {
+                at = go(&mut alone, at, times, variance)
+                    .last()
+                    .copied()
+                    .unwrap_or(at);
+            }
+            let (shared, alone) = (shared.end(point).clone(), alone.end(at).clone());
+            assert_eq!(shared.of_given, alone.of_given);
+            assert_eq!(shared.covariance, alone.covariance);
+            assert_eq!(shared.information, alone.information);
         }
     }
 }

@@ -43,6 +43,7 @@ impl<const G: usize> Given<G> {
     }
 
     /// What of three independent scalars of σ 1, rows H of `g`, is not expected; `None` if that is not finite.
+    #[inline]
     pub fn look(&self, rows: &[[f64; G]; 3], scalars: &Vector3<f64>) -> Option<Unexpected<G>> {
         let mut by_root = [[0.0; G]; 3];
         for (by_root, row) in by_root.iter_mut().zip(rows) {
@@ -64,6 +65,7 @@ impl<const G: usize> Given<G> {
 
     /// Takes it in: Potter's form of three scalars at once, `S − S Bᵀ L⁻ᵀ (L + 1)⁻¹ B` (Andrews 1968, "A square
     /// root formulation of the Kalman covariance equations", AIAA Journal 6(6)).
+    #[inline]
     pub fn take(&mut self, unexpected: &Unexpected<G>) {
         let Unexpected {
             whitened,

@@ -85,6 +85,8 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     }
 
     /// The innovation of an observation; `None` if it is not finite or its covariance not positive definite.
+    // A look is half a kilobyte, which would be copied on its way out.
+    #[inline(always)]
     pub fn look(&mut self, observed: &Observed) -> Option<Look<G>> {
         let to = self
             .courses
@@ -109,6 +111,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     }
 
     /// Takes an innovation in.
+    #[inline]
     pub fn take(&mut self, look: &Look<G>) {
         self.at = look.to;
         let gain = self.courses.gain(look.to);
@@ -121,15 +124,15 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
 
     /// Rows of what is measured of `g`, each with the component that it took out: the rows after it have
     /// none of that.
-    pub fn measured(&self) -> Vec<(usize, [f64; G])> {
-        let information = *self.courses.information(self.at);
+    pub fn measured(&mut self) -> Vec<(usize, [f64; G])> {
+        let information = self.courses.end(self.at).information;
         let rows = factor(information, self.vector);
         rows.map(|(pivot, row, _)| (pivot, row)).collect()
     }
 
     pub fn outcome(self) -> Outcome {
-        let known = self.courses.known(self.at);
-        let rows = factor(*self.courses.information(self.at), self.vector);
+        let known = self.courses.end(self.at);
+        let rows = factor(known.information, self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         Outcome {
             measured: matrix(&rows),

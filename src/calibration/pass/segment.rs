@@ -53,9 +53,9 @@ pub(in crate::calibration) struct Seen {
     pub readings: usize,
 }
 
-/// Steps of a dwell that are taken in at once, of the length of its first: 5 s of them, in which a body that is
+/// Steps of a dwell that are taken in at once, of the length of its first: 10 s of them, in which a body that is
 /// held by hand keeps its attitude, too.
-const STEPS: usize = 50;
+const STEPS: usize = 100;
 
 /// Where the linearisation follows the estimates, a part of a dwell is so many times as long as the one before:
 /// what a dwell tells first changes them most.
