@@ -7,6 +7,7 @@ use super::outcome::Pass;
 use super::parameters::to_vector;
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::problem::Problem;
+use crate::imu::Sensor;
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
 /// of its own linearised problem only, so a small rise means nothing.
@@ -17,6 +18,9 @@ const SHRINKS: f64 = 0.8;
 const DECIDED_AFTER: usize = 4;
 /// More than this part of all observations beyond the gate are no outliers.
 const MOST_OUTLIERS: f64 = 0.05;
+
+/// A step that leads where no pass can be made is shortened by half so many times at most: to a thousandth.
+const MOST_SHORTENED: usize = 10;
 
 /// The last pass, and whether it moved nothing.
 #[derive(Clone)]
@@ -42,10 +46,21 @@ pub(super) fn iterate(
     let mut at = from;
     let mut before: Option<PassResult> = None;
     let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
+    let mut shortened = 0;
     loop {
         let gate_now = decision.as_deref().map_or(gate, Gate::As);
         let decided = matches!(gate_now, Gate::As(_));
-        let result = pass(problem, priors, &at, Mode::Held(gate_now))?;
+        let mut result = match (pass(problem, priors, &at, Mode::Held(gate_now)), &before) {
+            (Ok(result), _) => result,
+            // Where no pass can be made, the step that led there was too long.
+            (Err(_), Some(before)) if shortened < MOST_SHORTENED => {
+                shortened += 1;
+                at = before.at.towards(&at, 0.5);
+                continue;
+            }
+            (Err(error), _) => return Err(error),
+        };
+        shortened = 0;
         let summary = summary(&result, &at, false);
         progress(&summary);
         passes.push(summary);
@@ -57,6 +72,10 @@ pub(super) fn iterate(
         let doubtful = !given && beyond(&result, problem.gate()) > MOST_OUTLIERS;
         let finished = settled && (gate == Gate::Open || !doubtful);
         if finished || passes.len() >= most {
+            // What no pass can be made with is no place to end at; the one before it is.
+            if !usable(&result.estimate) {
+                result.estimate = at;
+            }
             return Ok(Iterated {
                 held: result,
                 converged: settled,
@@ -84,6 +103,12 @@ pub(super) fn iterate(
         };
         before = Some(too_far.unwrap_or(result));
     }
+}
+
+/// Whether the sensitivity of both triads can be inverted.
+fn usable(at: &Linearisation) -> bool {
+    let usable = |sensor| at.triads.get(sensor).correction().is_some();
+    Sensor::ALL.into_iter().all(usable)
 }
 
 /// Whether two passes let the same observations in.
