@@ -14,7 +14,7 @@ use super::form::{FormTest, form_test};
 use super::innovation::{consistency, inconsistencies};
 use super::iterations::{Iterated, iterate};
 use super::layout::Layout;
-use super::linearisation::singular;
+use super::linearisation::not_invertible;
 use super::noise::Learnt;
 use super::observability::Observability;
 use super::outcome::Outcome;
@@ -109,9 +109,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         held.widen(&Layout::new(&problem.model), &widened);
         held.both_triads().covariance - estimate.covariance
     });
-    let usable = |sensor| estimate.triads.get(sensor).correction().is_some();
-    if !Sensor::ALL.into_iter().all(usable) {
-        return Err(singular(&estimate.triads));
+    if let Some(sensor) = not_invertible(&estimate.triads) {
+        return Err(CalibrationError::Singular { sensor });
     }
     let rounding = by_rounding(problem, &estimate.triads);
     let model = &problem.model;

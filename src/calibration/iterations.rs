@@ -2,12 +2,11 @@
 
 use super::error::CalibrationError;
 use super::innovation::Innovation;
-use super::linearisation::{AttitudePrior, Linearisation};
+use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
 use super::outcome::Pass;
 use super::parameters::to_vector;
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::problem::Problem;
-use crate::imu::Sensor;
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
 /// of its own linearised problem only, so a small rise means nothing.
@@ -27,6 +26,16 @@ const MOST_SHORTENED: usize = 10;
 pub(super) struct Iterated {
     pub held: PassResult,
     pub converged: bool,
+}
+
+impl Iterated {
+    /// Ended with a pass: at its estimate, or where it was made if that cannot be inverted.
+    fn ended(mut held: PassResult, converged: bool) -> Self {
+        if not_invertible(&held.estimate.triads).is_some() {
+            held.estimate = held.at.clone();
+        }
+        Self { held, converged }
+    }
 }
 
 /// Passes from a first point on, each linearised at the estimate of the one before; and whether they
@@ -50,15 +59,23 @@ pub(super) fn iterate(
     loop {
         let gate_now = decision.as_deref().map_or(gate, Gate::As);
         let decided = matches!(gate_now, Gate::As(_));
-        let mut result = match (pass(problem, priors, &at, Mode::Held(gate_now)), &before) {
-            (Ok(result), _) => result,
+        let result = match (
+            pass(problem, priors, &at, Mode::Held(gate_now)),
+            before.take(),
+        ) {
+            (Ok(result), previous) => {
+                before = previous;
+                result
+            }
             // Where no pass can be made, the step that led there was too long.
-            (Err(_), Some(before)) if shortened < MOST_SHORTENED => {
+            (Err(_), Some(previous)) if shortened < MOST_SHORTENED => {
                 shortened += 1;
-                at = before.at.towards(&at, 0.5);
+                at = previous.at.towards(&at, 0.5);
+                before = Some(previous);
                 continue;
             }
-            (Err(error), _) => return Err(error),
+            (Err(_), Some(previous)) => return Ok(Iterated::ended(previous, false)),
+            (Err(error), None) => return Err(error),
         };
         shortened = 0;
         let summary = summary(&result, &at, false);
@@ -72,14 +89,7 @@ pub(super) fn iterate(
         let doubtful = !given && beyond(&result, problem.gate()) > MOST_OUTLIERS;
         let finished = settled && (gate == Gate::Open || !doubtful);
         if finished || passes.len() >= most {
-            // What no pass can be made with is no place to end at; the one before it is.
-            if !usable(&result.estimate) {
-                result.estimate = at;
-            }
-            return Ok(Iterated {
-                held: result,
-                converged: settled,
-            });
+            return Ok(Iterated::ended(result, settled));
         }
         // Where many observations contradict the model it is the model that is wrong, and leaving
         // them out would only hide that.
@@ -103,12 +113,6 @@ pub(super) fn iterate(
         };
         before = Some(too_far.unwrap_or(result));
     }
-}
-
-/// Whether the sensitivity of both triads can be inverted.
-fn usable(at: &Linearisation) -> bool {
-    let usable = |sensor| at.triads.get(sensor).correction().is_some();
-    Sensor::ALL.into_iter().all(usable)
 }
 
 /// Whether two passes let the same observations in.

@@ -106,13 +106,17 @@ impl Linearisation {
     }
 }
 
+/// The first triad whose sensitivity cannot be inverted.
+pub(super) fn not_invertible(triads: &PerSensor<Triad>) -> Option<Sensor> {
+    let singular = |&sensor: &Sensor| triads.get(sensor).correction().is_none();
+    Sensor::ALL.into_iter().find(singular)
+}
+
 /// The error that names the triad whose sensitivity is singular.
 pub(super) fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
-    let sensor = Sensor::ALL
-        .into_iter()
-        .find(|&sensor| triads.get(sensor).correction().is_none())
-        .unwrap_or(Sensor::Gyro);
-    CalibrationError::Singular { sensor }
+    CalibrationError::Singular {
+        sensor: not_invertible(triads).unwrap_or(Sensor::Gyro),
+    }
 }
 
 /// What is known of the attitude at the first sample of a stretch before the filter runs.
