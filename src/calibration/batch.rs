@@ -45,7 +45,7 @@ const NO_SOURCE: f64 = 1e-14;
 /// [`CalibrationError`] where the problem is not the one of the outcome, or has on what the batch does not know:
 /// an error term, what follows temperature or differs between recordings.
 pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
-    let problem = &outcome.with_noise(problem);
+    let problem = &outcome.as_calibrated(problem);
     let model = &problem.model;
     let on = ErrorTerm::ALL.into_iter().find(|&term| model.has(term));
     if let Some(term) = on {

@@ -68,7 +68,9 @@ pub(super) fn six_position_by(
     closed_form.findings.splice(0..0, notes);
     let unexplained = unexplained_residuals(&closed_form.findings);
     closed_form.findings.extend(unexplained);
-    closed_form.findings.extend(scatter_at_rest(problem));
+    closed_form
+        .findings
+        .extend(scatter_at_rest(problem, &closed_form.estimate.triads));
     let rounding = by_rounding(problem, &closed_form.estimate.triads);
     let covariance = &mut closed_form.estimate.covariance;
     *covariance += rounding;

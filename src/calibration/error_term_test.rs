@@ -118,9 +118,9 @@ pub fn test_error_terms(
     problem: &Problem,
     outcome: &Outcome,
 ) -> Result<(Vec<ErrorTermTest>, Option<ParameterMatrix>), CalibrationError> {
-    let of_record = Tested::new(&outcome.with_noise(problem), outcome)?;
+    let of_record = Tested::new(&outcome.as_calibrated(problem), outcome)?;
     if outcome.noise.learnt {
-        let stated = Tested::new(problem, outcome)?;
+        let stated = Tested::new(&outcome.with_prior(problem), outcome)?;
         let likeliest = stated.tests.iter().find(|t| t.role == Role::Likeliest);
         if likeliest.is_some_and(|test| test.significance > significance_of_noise(outcome)) {
             let left_off = of_record.left_off(&stated);

@@ -222,7 +222,7 @@ fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
             sources: noise.sources.clone(),
         });
     }
-    findings.extend(scatter_at_rest(problem));
+    findings.extend(scatter_at_rest(problem, &outcome.estimate.triads));
     let covariance = &outcome.estimate.covariance;
     findings.extend(rounded(
         problem,

@@ -109,12 +109,20 @@ impl Outcome {
         4.0 * of_run > HEADING_SEEN
     }
 
-    /// The problem with the noise that was used, where that was learnt.
-    pub(super) fn with_noise<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
-        if !self.noise.learnt {
-            return problem.clone();
+    /// The problem as it was calibrated: with the noise that was learnt, and a prior that the data do not contradict.
+    pub(super) fn as_calibrated<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        let problem = self.with_prior(problem);
+        match self.noise.learnt {
+            true => problem.with_model(problem.model.with_noise_of(&self.model)),
+            false => problem,
         }
-        problem.with_model(problem.model.with_noise_of(&self.model))
+    }
+
+    /// The problem with that prior, and noise as it is stated.
+    pub(super) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        let mut model = problem.model.clone();
+        model.prior_sigma = self.model.prior_sigma;
+        problem.with_model(model)
     }
 
     /// A part of the covariance of the estimate that no pass knows of; zero where there is none of it.

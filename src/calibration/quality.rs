@@ -75,7 +75,7 @@ impl Outcome {
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the outcome.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
-        let problem = &self.with_noise(problem);
+        let problem = &self.as_calibrated(problem);
         let estimate = Linearisation {
             triads: self.estimate.triads,
             terms: self.auxiliary.terms(),

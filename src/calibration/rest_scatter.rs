@@ -1,11 +1,12 @@
 //! How much the rows scatter at rest, beside what the stated noise makes of them.
 
+use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::finding::Finding;
 use super::problem::Problem;
 use super::schedule::step_length;
-use crate::imu::{NoiseKeys, Sensor};
+use crate::imu::{AXES, NoiseKeys, PerSensor, Sensor, Triad};
 use crate::run::{Dwell, Run};
 
 /// Chance that a triad of right noise rings, on either side.
@@ -14,18 +15,21 @@ const FALSE_ALARM: f64 = 1e-3 / 4.0;
 /// pulse at most.
 const PULSES: f64 = 2.0;
 
-/// Triads that scatter at rest by more or less than their noise says, as findings.
+/// Triads that scatter at rest by more or less than their noise says, as findings; of inputs as calibrated, for a prior
+/// scale that is off is no noise.
 ///
 /// A step lasts a tenth of a second, as the filter's: what is faster averages out, and slower than that
 /// only random walk, bias and a mount that shakes are seen. Nothing is changed by it, for it does not tell
 /// them apart.
-pub(super) fn scatter_at_rest(problem: &Problem) -> Vec<Finding> {
+pub(super) fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));
     let found = each.filter_map(|(recording, run, sensor)| {
         let stretches = problem.stretches().iter();
         let of_run = stretches.filter(|stretch| stretch.recording == recording);
-        of_triad(run, sensor, of_run.flat_map(|stretch| &stretch.dwells))
+        let correction = calibrated.get(sensor).correction()?;
+        let dwells = of_run.flat_map(|stretch| &stretch.dwells);
+        of_triad(run, sensor, &correction, dwells)
     });
     found.collect()
 }
@@ -33,6 +37,7 @@ pub(super) fn scatter_at_rest(problem: &Problem) -> Vec<Finding> {
 fn of_triad<'a>(
     run: &Run,
     sensor: Sensor,
+    correction: &Matrix3<f64>,
     dwells: impl Iterator<Item = &'a Dwell>,
 ) -> Option<Finding> {
     let imu = &run.recording.imu;
@@ -43,7 +48,7 @@ fn of_triad<'a>(
         // Pairs that have no step in common, so that each is new.
         let mut sums = imu.of(sensor).sums(dwell.samples.clone(), length);
         while let (Some(before), Some(after)) = (sums.next(), sums.next()) {
-            squares += (after - before).norm_squared();
+            squares += (correction * (after - before)).norm_squared();
             count += 3;
         }
     }
@@ -55,7 +60,8 @@ fn of_triad<'a>(
             - noise.covariance_of_means(spans[0], spans[1]));
     let stillness = run.standstill.sigma.get(sensor).unwrap_or(0.0);
     let least = by_noise + 6.0 * stillness.powi(2);
-    let most = least + (PULSES * imu.pulse.get(sensor)).powi(2);
+    let pulses = (PULSES * imu.pulse.get(sensor)).powi(2);
+    let most = least + pulses * correction.norm_squared() / AXES.len() as f64;
     let limit = |chance: f64| {
         let chi2 = ChiSquared::new(count as f64).ok()?;
         Some(chi2.inverse_cdf(chance) / count as f64)
@@ -77,6 +83,7 @@ fn of_triad<'a>(
 mod tests {
     use super::*;
     use crate::calibration::Options;
+    use crate::imu::InstallationForm;
     use crate::simulation::Scenario;
 
     /// The factors by which triads scatter more than stated, noise being stated at this part of it.
@@ -86,7 +93,9 @@ mod tests {
             let mut run = scenario.simulate(1, number).unwrap().run;
             run.instrument.noise.gyro.random_walk *= part;
             run.instrument.noise.accel.random_walk *= part;
-            scatter_at_rest(&Problem::new(&run, &Options::default()))
+            let problem = Problem::new(&run, &Options::default());
+            let prior = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+            scatter_at_rest(&problem, &prior)
         };
         let findings = (0..runs).flat_map(of_run);
         findings

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::calibration::{
-    Finding, NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector, Problem,
-    estimate, to_vector,
+    Finding, Method, NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector,
+    Problem, estimate, to_vector,
 };
 use turncal::imu::Sensor;
 use turncal::run::Run;
@@ -178,4 +178,40 @@ fn a_prior_that_is_wrong_makes_no_outliers_and_is_named_itself() {
     assert!((spoilt - clean).amax() < 0.1);
     let named = |finding: &Finding| matches!(finding, Finding::FarFromPrior { .. });
     assert!(wrong.findings.iter().any(named));
+}
+
+/// Between moves that a bias prior 20 σ off turns into others, and with a scale that is off by as much, noise and error
+/// terms are told of the instrument as it is calibrated.
+#[test]
+fn a_prior_that_is_wrong_is_neither_noise_nor_an_error_term() {
+    let wrong = |scenario: &str, spoil: fn(&mut Run)| {
+        let mut run = Scenario::load(scenario).unwrap().simulate(SEED, 0).unwrap();
+        spoil(&mut run.run);
+        let problem = Problem::new(&run.run, &Options::default());
+        let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let assessment = solution.assess(&problem).unwrap();
+        assert!(solution.converged());
+        solution.findings(&assessment)
+    };
+    fn by_scale(rows: &mut [Vector3<f64>], sigma: &Vector3<f64>) {
+        let scale = sigma.map(|sigma| 1.0 + 20.0 * sigma);
+        rows.iter_mut()
+            .for_each(|row| row.component_mul_assign(&scale));
+    }
+    let mems = wrong("mems", |run| {
+        let prior = &mut run.instrument.prior;
+        prior.gyro.bias += prior.gyro.bias_sigma * 20.0;
+        by_scale(run.recording.imu.accel.to_mut(), &prior.accel.scale_sigma);
+    });
+    let positions = wrong("nineteen-position", |run| {
+        let prior = &run.instrument.prior;
+        by_scale(run.recording.imu.gyro.to_mut(), &prior.gyro.scale_sigma);
+    });
+    for findings in [mems, positions] {
+        let far = |finding: &Finding| matches!(finding, Finding::FarFromPrior { .. });
+        assert!(
+            !findings.is_empty() && findings.iter().all(far),
+            "{findings:?}"
+        );
+    }
 }

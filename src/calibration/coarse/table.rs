@@ -10,6 +10,7 @@ use super::super::model::Model;
 use super::super::parameters::from_vector;
 use super::super::problem::{Problem, Stretch};
 use super::equations::{Equations, gauss_newton};
+use super::gyro_bias_at_rest;
 use crate::attitude::log;
 use crate::imu::{PerSensor, Sensor, Triad};
 use crate::navigation::{Block, Navigator, State};
@@ -19,8 +20,9 @@ use crate::navigation::{Block, Navigator, State};
 /// The prior ties down what these do not see.
 pub(super) fn from_table(problem: &Problem) -> Result<PerSensor<Triad>, CalibrationError> {
     let model = &problem.model;
-    let prior = from_vector(model.form, &model.prior_mean);
-    gauss_newton(prior, |triads| {
+    let mut first = from_vector(model.form, &model.prior_mean);
+    first.gyro.bias = gyro_bias_at_rest(problem);
+    gauss_newton(first, |triads| {
         let mut equations = Equations::new(model, triads, &Sensor::ALL);
         for stretch in problem.stretches() {
             add_legs(&mut equations, model, stretch, triads)?;

@@ -12,6 +12,7 @@ use super::super::parameters::{from_vector, to_vector};
 use super::super::problem::{Problem, Stretch};
 use super::equations::{Equations, ErrorOf};
 use super::gravity::{add_magnitude, input_errors};
+use super::gyro_bias_at_rest;
 use super::heading::{Heading, Rest, gyrocompass};
 use super::shared_noise::{SharedNoise, along, of_biases};
 use crate::attitude::{exp, level, skew, tilt};
@@ -64,9 +65,7 @@ pub(super) fn triads_and_attitudes(
     let initial = directions(triads)?;
     let initial = initial.iter().map(|up| level(&up[0].direction)).collect();
     let mut at = Linearisation::new(*triads, TermVector::zeros(), initial);
-    // Within Earth rate the output at rest is the bias.
-    let outputs: Vector3<f64> = rests.iter().flatten().map(|rest| rest.output).sum();
-    at.triads.gyro.bias = outputs / rests.iter().map(Vec::len).sum::<usize>() as f64;
+    at.triads.gyro.bias = gyro_bias_at_rest(problem);
     let mut round = 0;
     loop {
         let mut chains = Vec::new();

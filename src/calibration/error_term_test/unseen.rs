@@ -45,7 +45,7 @@ pub fn unseen_variation(
         return Ok(None);
     }
     let stated = &problem.model.noise;
-    let problem = &outcome.with_noise(problem);
+    let problem = &outcome.as_calibrated(problem);
     let constant = |&sensor: &Sensor| problem.model.noise.get(sensor).gauss_markov.is_none();
     let sensors: Vec<Sensor> = Sensor::ALL.into_iter().filter(constant).collect();
     if sensors.is_empty() {
