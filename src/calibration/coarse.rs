@@ -134,10 +134,10 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
     let (turned, by_hand) = calibrated_as_held(problem)?;
     let prior = from_vector(problem.model.form, &problem.model.prior_mean);
     let singular = || singular(&prior);
-    let Turned {
-        equations, shared, ..
-    } = &turned;
-    let residuals = equations.residuals(shared).ok_or_else(singular)?;
+    let equations = &turned.equations;
+    let residuals = equations
+        .residuals(&turned.shared(problem))
+        .ok_or_else(singular)?;
     let growth = residuals.growth();
     let (groups, times) = turns::dwells_and_moves(problem);
     let worst = residuals.worst(&groups);
@@ -168,12 +168,8 @@ pub(super) fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationErro
             calibrated(&problem.with_model(model))?
         }
     };
-    let Turned {
-        at,
-        equations,
-        shared,
-        ..
-    } = turned;
+    let shared = turned.shared(problem);
+    let Turned { at, equations, .. } = turned;
     let covariance = equations.covariance(&shared).ok_or_else(singular)?;
     let distance = equations.covariance_of_distance(&shared);
     Ok(ByGravity {
@@ -212,13 +208,14 @@ fn calibrated_as_held(problem: &Problem) -> Result<(Turned, Option<ByHand>), Cal
         return Ok((stated, None));
     }
     // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
-    let residuals = stated.equations.residuals(&stated.shared);
+    let residuals = stated.equations.residuals(&stated.shared(problem));
     let tell = residuals.is_none_or(|residuals| residuals.growth().is_some());
     if tell || problem.options.noise == NoisePolicy::Stated {
         return Ok((stated, None));
     }
     let likeliest = |turned: &Turned, used: &ByHand| {
-        let (errors, mut covariance) = turned.equations.before_data(&turned.shared)?;
+        let shared = turned.shared(problem);
+        let (errors, mut covariance) = turned.equations.before_data(&shared)?;
         let parts = turned.equations.by_hand();
         used.taken_from(&mut covariance, &parts);
         ByHand::likeliest(&errors, &covariance, &parts).filter(|found| !found.is_none())
@@ -229,14 +226,20 @@ fn calibrated_as_held(problem: &Problem) -> Result<(Turned, Option<ByHand>), Cal
     };
     // What equations are linearised at follows noise, and noise that.
     for _ in 0..ROUNDS {
-        let turned = with(&by_hand)?;
+        // What noise on trial leads nowhere with is not the noise of this record.
+        let Ok(turned) = with(&by_hand) else {
+            return Ok((stated, None));
+        };
         match likeliest(&turned, &by_hand) {
             None => return Ok((stated, None)),
             Some(here) if here.is_like(&by_hand) => return Ok((turned, Some(here))),
             Some(here) => by_hand = here,
         }
     }
-    Ok((with(&by_hand)?, Some(by_hand)))
+    Ok(match with(&by_hand) {
+        Ok(turned) => (turned, Some(by_hand)),
+        Err(_) => (stated, None),
+    })
 }
 
 /// Bias of the gyros within Earth rate: what they put out at rest. From a prior that is off by so much that a move turns

@@ -68,11 +68,18 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let problem = with_noise.as_ref().unwrap_or(&problem);
     let widened = widened(&problem.model, &iterated.held.both_triads());
     let with_wide_prior = widened.map(|model| problem.with_model(model));
-    let problem = with_wide_prior.as_ref().unwrap_or(problem);
-    if with_wide_prior.is_some() {
-        let (from, gate) = (iterated.held.estimate, Gate::Innovations);
-        iterated = iterate(problem, &priors, from, gate, &mut passes, progress)?;
-    }
+    let again = with_wide_prior.as_ref().and_then(|wide| {
+        let (from, gate) = (iterated.held.estimate.clone(), Gate::Innovations);
+        let again = iterate(wide, &priors, from, gate, &mut passes, progress);
+        again.ok().map(|again| (wide, again))
+    });
+    let problem = match again {
+        Some((wide, again)) => {
+            iterated = again;
+            wide
+        }
+        None => problem,
+    };
     let form_test = form_test(problem, &priors, &iterated.held)?;
     // Noise that makes up for angles that are missing is no noise.
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);

@@ -137,7 +137,8 @@ pub(super) fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -
         largest_step: step
             .iter()
             .zip(&sigma)
-            .filter(|&(_, &sigma)| sigma > 0.0)
+            // What is not estimated has none; one that is no number is no step to end with.
+            .filter(|&(_, &sigma)| sigma != 0.0)
             .map(|(step, sigma)| (step / sigma).abs())
             .max_by(f64::total_cmp)
             .unwrap_or(0.0),

@@ -15,7 +15,7 @@
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
 //! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
-//! | table base | 3 | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where σ of them are stated |
+//! | table base | one for each of East, North, Up that is on | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where a σ of it is stated |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
 use super::day_to_day::OwnState;
@@ -53,7 +53,8 @@ pub(super) struct Layout {
     table: bool,
     /// Whether the turn at rest is.
     turn: bool,
-    base: bool,
+    /// The axis of East-North-Up about which each error of the table's base is.
+    base: Vec<usize>,
     /// The error of the table's axes that each state is.
     axes: Vec<usize>,
     /// Auxiliary parameters that are no states but tried.
@@ -84,7 +85,9 @@ impl Layout {
                 .collect(),
             table: model.position_sigma > 0.0,
             turn: model.aiding == Aiding::Velocity,
-            base: model.geometry.base.amax() > 0.0,
+            base: (0..3)
+                .filter(|&axis| model.geometry.base[axis] > 0.0)
+                .collect(),
             axes: (0..AXIS_ERRORS)
                 .filter(|&k| model.geometry.axes[k] > 0.0)
                 .collect(),
@@ -153,8 +156,7 @@ impl Layout {
 
     /// The states that are the same constants throughout a recording.
     pub fn constants(&self) -> impl Iterator<Item = usize> + use<> {
-        let after_initial = self.initial_attitude() + 3;
-        (NAVIGATION..self.varying_begin()).chain(after_initial..self.size())
+        (NAVIGATION..self.varying_begin()).chain(self.base_begin()..self.size())
     }
 
     /// Error of the table's position, if it is a state.
@@ -172,9 +174,9 @@ impl Layout {
         self.dwell_begin() + 3 * usize::from(self.table || self.turn)
     }
 
-    /// Error of the table's base, if it is a state.
-    pub fn table_base(&self) -> Option<usize> {
-        self.base.then(|| self.initial_attitude() + 3)
+    /// State and axis of each error of the table's base.
+    pub fn table_base(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        placed(self.base_begin(), &self.base)
     }
 
     /// State and index among [`AXIS_ERRORS`] of each error of the table's axes.
@@ -206,8 +208,12 @@ impl Layout {
         self.own_begin() + self.own.len()
     }
 
+    fn base_begin(&self) -> usize {
+        self.initial_attitude() + 3
+    }
+
     fn axes_begin(&self) -> usize {
-        self.initial_attitude() + 3 + 3 * usize::from(self.base)
+        self.base_begin() + self.base.len()
     }
 }
 
@@ -217,6 +223,8 @@ fn placed<T: Copy>(begin: usize, members: &[T]) -> impl Iterator<Item = (usize, 
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::calibration::{ErrorTerm, Options};
     use crate::imu::Term;
@@ -233,6 +241,10 @@ mod tests {
         assert_eq!(with(ErrorTerm::Instrument(Term::SizeEffect)), 6);
         assert_eq!(with(ErrorTerm::GaussMarkovBias), 6);
         assert_eq!(with(ErrorTerm::TableBase), 3);
+        let mut level = run.clone();
+        level.table.geometry.base = Vector3::new(1e-5, 1e-5, 0.0);
+        let level = Layout::new(&Model::new(&level, &Options::default()));
+        assert_eq!(level.size(), plain + 2);
         // Three parameters fix the body frame.
         let velocity = size(Options::default().aiding(Aiding::Velocity));
         assert_eq!(velocity, 9 + 21 + 3 + 3);

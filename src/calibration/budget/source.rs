@@ -159,7 +159,8 @@ impl BudgetSource {
         if (VELOCITY..POSITION + 3).contains(&state) {
             return Self::Place;
         }
-        if let Some(axis) = within(layout.table_base()) {
+        let of_base = |&(base, _): &(usize, usize)| base == state;
+        if let Some((_, axis)) = layout.table_base().find(of_base) {
             return match axis {
                 2 => Self::TableNorth,
                 _ => Self::TableLevel,

@@ -6,7 +6,6 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::super::drift::Changing;
 use super::super::error::CalibrationError;
-use super::super::linearisation::singular;
 use super::super::model::Model;
 use super::super::noise::{BY_HAND, Parts};
 use super::super::parameters::{
@@ -125,14 +124,21 @@ impl Equations {
     /// Covariance of the errors of all rows but the prior's, each over its σ, by that of what they share.
     fn errors(&self, shared: &DMatrix<f64>) -> DMatrix<f64> {
         let count = self.noise.len();
-        let mut parts = DMatrix::zeros(count, shared.ncols());
+        let mut covariance = DMatrix::zeros(count, count);
         for (row, (sigma, made_of)) in self.noise.iter().enumerate() {
+            // Of all that is shared an equation has ten parts at most.
+            let mut with_shared = DVector::zeros(shared.nrows());
             for &(number, part) in &made_of.shared {
-                parts[(row, number)] += part / sigma;
+                with_shared.axpy(part / sigma, &shared.column(number), 1.0);
             }
-        }
-        let mut covariance = &parts * shared * parts.transpose();
-        for (row, (sigma, made_of)) in self.noise.iter().enumerate() {
+            for (column, (sigma, made_of)) in self.noise[..=row].iter().enumerate() {
+                let parts = made_of.shared.iter();
+                let sum: f64 = parts
+                    .map(|&(number, part)| part * with_shared[number])
+                    .sum();
+                covariance[(row, column)] = sum / sigma;
+                covariance[(column, row)] = sum / sigma;
+            }
             covariance[(row, row)] += (made_of.own + ROUNDING.powi(2)) / sigma.powi(2);
         }
         covariance
@@ -257,8 +263,8 @@ impl Equations {
         whole
     }
 
-    /// The step δθ of least squares.
-    pub(super) fn solve(&self) -> ParameterVector {
+    /// The step δθ of least squares; an error that names the triad where it is no number.
+    pub(super) fn solve(&self) -> Result<ParameterVector, CalibrationError> {
         let a = Mat::from_fn(self.rows.len(), self.unknown.len(), |i, j| {
             self.rows[i].0[self.unknown[j]]
         });
@@ -268,7 +274,12 @@ impl Equations {
         for (j, &index) in self.unknown.iter().enumerate() {
             step[index] = solution[(j, 0)];
         }
-        step
+        match step.iter().position(|value| !value.is_finite()) {
+            None => Ok(step),
+            Some(index) => Err(CalibrationError::Singular {
+                sensor: sensor_and_parameter(index).0,
+            }),
+        }
     }
 }
 
@@ -279,10 +290,7 @@ pub(super) fn gauss_newton(
 ) -> Result<PerSensor<Triad>, CalibrationError> {
     let mut triads = from;
     for _ in 0..STEPS {
-        let step = equations(&triads)?.solve();
-        if !step.iter().all(|v| v.is_finite()) {
-            return Err(singular(&from));
-        }
+        let step = equations(&triads)?.solve()?;
         triads = from_vector(triads.gyro.form, &(to_vector(&triads) + step));
         if step.amax() < SMALL {
             break;

@@ -39,8 +39,9 @@ pub(super) fn add_magnitude(
         for dwell in &stretch.dwells {
             let rest = dwell.mean(Sensor::Accel, stretch.run);
             let force = correction * (rest.output - triad.bias);
-            let row = input_errors(triad, &correction, &force).tr_mul(&force.normalize());
-            let error = force.norm() - stretch.run.site.gravity;
+            let size = size_of_force(&force)?;
+            let row = input_errors(triad, &correction, &force).tr_mul(&(force / size));
+            let error = size - stretch.run.site.gravity;
             let made_of = ErrorOf {
                 own: 0.0,
                 shared: along(shared.at_rest(Sensor::Accel, number), &of_biases(&row)),
@@ -51,6 +52,14 @@ pub(super) fn add_magnitude(
         }
     }
     Ok(())
+}
+
+/// Magnitude of a specific force in m/s², which is not zero where accelerometers sense gravity.
+pub(super) fn size_of_force(force: &Vector3<f64>) -> Result<f64, CalibrationError> {
+    let sensor = Sensor::Accel;
+    Some(force.norm())
+        .filter(|&size| size > 0.0)
+        .ok_or(CalibrationError::Singular { sensor })
 }
 
 /// Error of a triad's computed input, estimated − true, by the error of each of its parameters.

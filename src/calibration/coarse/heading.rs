@@ -34,7 +34,8 @@ pub(super) struct Gyrocompass {
 
 /// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest
 /// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other.
-pub(super) fn gyrocompass(stretches: &[(Site, Vec<Rest>)]) -> Gyrocompass {
+/// None where a rate is no number.
+pub(super) fn gyrocompass(stretches: &[(Site, Vec<Rest>)]) -> Option<Gyrocompass> {
     // Unknown: b, and for each stretch Earth rate along its two level axes. Before any rate is observed
     // none exceeds Earth rate by much: b is what is left of a bias taken from these very rates.
     let n = 3 + 2 * stretches.len();
@@ -62,10 +63,7 @@ pub(super) fn gyrocompass(stretches: &[(Site, Vec<Rest>)]) -> Gyrocompass {
             }
         }
     }
-    // Positive definite by its first summand.
-    let covariance = information
-        .cholesky()
-        .map_or_else(|| DMatrix::zeros(n, n), |factor| factor.inverse());
+    let covariance = information.cholesky()?.inverse();
     let found = &covariance * vector;
     let heading = |(number, (site, _)): (usize, &(Site, Vec<Rest>))| {
         let first = 3 + 2 * number;
@@ -76,8 +74,8 @@ pub(super) fn gyrocompass(stretches: &[(Site, Vec<Rest>)]) -> Gyrocompass {
             sigma: level.symmetric_eigenvalues().max().sqrt() / site.earth_rate_n().y.abs(),
         }
     };
-    Gyrocompass {
+    Some(Gyrocompass {
         headings: stretches.iter().enumerate().map(heading).collect(),
         bias: found.fixed_rows::<3>(0).into_owned(),
-    }
+    })
 }

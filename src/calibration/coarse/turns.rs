@@ -11,7 +11,7 @@ use super::super::noise::{BY_HAND, Source};
 use super::super::parameters::{from_vector, to_vector};
 use super::super::problem::{Problem, Stretch};
 use super::equations::{Equations, ErrorOf};
-use super::gravity::{add_magnitude, input_errors};
+use super::gravity::{add_magnitude, input_errors, size_of_force};
 use super::gyro_bias_at_rest;
 use super::heading::{Heading, Rest, gyrocompass};
 use super::shared_noise::{SharedNoise, along, of_biases};
@@ -35,8 +35,19 @@ pub(super) struct Turned {
     pub heading_sigma: Vec<f64>,
     /// What they are found from, made at them.
     pub equations: Equations,
-    /// Covariance of what their errors share.
-    pub shared: DMatrix<f64>,
+}
+
+impl Turned {
+    /// Covariance of what the errors of the equations share.
+    pub fn shared(&self, problem: &Problem) -> DMatrix<f64> {
+        let headings: Vec<f64> = self
+            .heading_sigma
+            .iter()
+            .copied()
+            .map(known_heading)
+            .collect();
+        SharedNoise::of(problem).covariance(problem, &headings)
+    }
 }
 
 /// The gyros and the attitudes, and with them the accelerometers, whose installation the magnitude of
@@ -81,7 +92,7 @@ pub(super) fn triads_and_attitudes(
         let compass: Vec<_> = of_chains
             .map(|((chain, rests), s)| (s.run.site, chain.rests(&correction, &bias, rests)))
             .collect();
-        let compass = gyrocompass(&compass);
+        let compass = gyrocompass(&compass).ok_or_else(|| singular(&at.triads))?;
         for ((chain, heading), attitude) in chains
             .iter_mut()
             .zip(&compass.headings)
@@ -112,18 +123,13 @@ pub(super) fn triads_and_attitudes(
         }
         if round == ROUNDS {
             let heading_sigma: Vec<f64> = compass.headings.iter().map(|h| h.sigma).collect();
-            let known: Vec<f64> = heading_sigma.iter().copied().map(known_heading).collect();
             return Ok(Turned {
                 at,
                 heading_sigma,
-                shared: place.shared.covariance(problem, &known),
                 equations,
             });
         }
-        let step = equations.solve();
-        if !step.iter().all(|v| v.is_finite()) {
-            return Err(singular(triads));
-        }
+        let step = equations.solve()?;
         at.triads = from_vector(at.triads.gyro.form, &(to_vector(&at.triads) + step));
         round += 1;
     }
@@ -139,12 +145,13 @@ fn gravity_directions(
     let direction = |dwell: &Dwell| {
         let output = dwell.mean(Sensor::Accel, stretch.run).output;
         let force = correction * (output - triad.bias);
-        Up {
-            direction: force.normalize(),
-            error: input_errors(triad, &correction, &force) / force.norm(),
-        }
+        let size = size_of_force(&force)?;
+        Ok(Up {
+            direction: force / size,
+            error: input_errors(triad, &correction, &force) / size,
+        })
     };
-    Ok(stretch.dwells.iter().map(direction).collect())
+    stretch.dwells.iter().map(direction).collect()
 }
 
 /// Up, along body axes.

@@ -21,7 +21,7 @@ pub(super) struct Factors(pub [f64; SOURCES]);
 pub(super) struct Scale {
     /// Reference variance of each source in SI and radians; zero where the run cannot have it.
     reference: [f64; SOURCES],
-    /// Whether a figure that is not zero is stated.
+    /// Whether a figure that is not zero is stated, of what the run can have.
     stated: [bool; SOURCES],
     /// What the problem has.
     initial: Factors,
@@ -78,7 +78,7 @@ impl Scale {
         }
         Self {
             reference,
-            stated: Source::ALL.map(|source| source.stated(problem)),
+            stated: std::array::from_fn(|k| reference[k] > 0.0 && Source::ALL[k].stated(problem)),
             initial,
             correlation_time: durations.fold(step, f64::max),
         }

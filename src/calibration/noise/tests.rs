@@ -39,6 +39,12 @@ fn an_angle_random_walk_stated_at_a_third_is_found() {
     run.instrument.noise.gyro.random_walk /= 3.0;
     let outcome = estimated(&run, NoisePolicy::Auto);
     assert!(outcome.noise.learnt && outcome.converged);
+    // What a run states of which a table's readings leave nothing to be told is no part of it.
+    run.standstill.turning = 1e-8;
+    assert_eq!(
+        estimated(&run, NoisePolicy::Auto).noise.test,
+        outcome.noise.test
+    );
     let walk = figures(&outcome, Source::AngleRandomWalk);
     let truth = 3.0 * walk.stated.unwrap();
     let [low, high] = walk.interval.unwrap();

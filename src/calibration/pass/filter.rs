@@ -77,10 +77,8 @@ impl Filter {
                 p[(state, state)] = coefficient.of(&thermal.sigma).powi(2);
             }
         }
-        if let Some(base) = layout.table_base() {
-            for axis in 0..3 {
-                p[(base + axis, base + axis)] = model.geometry.base[axis].powi(2);
-            }
+        for (state, axis) in layout.table_base() {
+            p[(state, state)] = model.geometry.base[axis].powi(2);
         }
         for (state, k) in layout.table_axes() {
             p[(state, state)] = model.geometry.axes[k].powi(2);

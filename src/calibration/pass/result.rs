@@ -298,8 +298,7 @@ fn thermal(filter: &Filter, at: &PerSensor<ThermalCoefficients>, model: &Model) 
 
 /// State and index among the auxiliary parameters of each that is on.
 fn auxiliary_states(layout: &Layout) -> Vec<(usize, usize)> {
-    let base = layout.table_base().into_iter();
-    let base = base.flat_map(|first| (0..3).map(move |axis| (first + axis, axis)));
+    let base = layout.table_base();
     let axes = layout.table_axes().map(|(state, k)| (state, 3 + k));
     let terms = layout.terms();
     let terms = terms.map(|(state, k)| (state, TABLE_GEOMETRY + k));

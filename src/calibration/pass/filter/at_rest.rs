@@ -86,11 +86,10 @@ impl Filter {
     /// By how much the attitude of the table is off.
     fn table_map(&self, segment: &Segment) -> Linear {
         let mut table = self.none(3);
-        let errors = self.layout.table_position().into_iter();
-        for error in errors.chain(self.layout.table_base()) {
-            for axis in 0..3 {
-                table.states[(axis, error + axis)] = 1.0;
-            }
+        let position = self.layout.table_position().into_iter();
+        let position = position.flat_map(|first| (0..3).map(move |axis| (first + axis, axis)));
+        for (state, axis) in position.chain(self.layout.table_base()) {
+            table.states[(axis, state)] = 1.0;
         }
         let response = segment.axes.as_deref();
         for axis in 0..3 {

@@ -315,9 +315,11 @@ impl Filter {
                         Observation::Attitude => (turn.unwrap() + axis, 1.0),
                     }];
                     if seen.kind == Observation::Table {
-                        let errors = self.layout.table_position().into_iter();
-                        let errors = errors.chain(self.layout.table_base());
-                        row.extend(errors.map(|first| (first + axis, -1.0)));
+                        let position = self.layout.table_position().into_iter();
+                        row.extend(position.map(|first| (first + axis, -1.0)));
+                        let base = self.layout.table_base();
+                        let base = base.filter(|&(_, about)| about == axis);
+                        row.extend(base.map(|(state, _)| (state, -1.0)));
                     }
                     let mut h = DVector::zeros(self.x.len());
                     row.iter().for_each(|&(state, weight)| h[state] = weight);
