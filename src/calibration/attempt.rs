@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::coarse::{CoarseStart, coarse_start};
 use super::error::CalibrationError;
 use super::group::Group;
@@ -124,9 +126,11 @@ impl Tried {
     ) -> (Self, ParameterMatrix) {
         let heading = |tried: &Self| Heading::of(tried.attempt.as_ref().ok()?);
         let mut headings: Vec<Heading> = heading(&self).into_iter().collect();
-        let others = self.start.other_headings(stretches);
-        let best = others.into_iter().fold(self, |best, start| {
-            let other = Self::new(problem, start, progress);
+        let others = self.start.other_headings(stretches).into_par_iter();
+        let others: Vec<Self> = others
+            .map(|start| Self::new(problem, start, progress))
+            .collect();
+        let best = others.into_iter().fold(self, |best, other| {
             headings.extend(heading(&other));
             better(best, other)
         });

@@ -242,20 +242,6 @@ fn calibrated_as_held(problem: &Problem) -> Result<(Turned, Option<ByHand>), Cal
     })
 }
 
-/// Bias of the gyros within Earth rate: what they put out at rest. From a prior that is off by so much that a move turns
-/// into another, no step leads back.
-fn gyro_bias_at_rest(problem: &Problem) -> Vector3<f64> {
-    let mut outputs = Vector3::zeros();
-    let mut count = 0.0;
-    for stretch in problem.stretches() {
-        for dwell in &stretch.dwells {
-            outputs += dwell.mean(Sensor::Gyro, stretch.run).output;
-            count += 1.0;
-        }
-    }
-    outputs / count
-}
-
 fn enough(problem: &Problem) -> Result<(), CalibrationError> {
     match problem.dwells().count() {
         0 => Err(CalibrationError::NoDwells),

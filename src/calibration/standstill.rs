@@ -10,7 +10,7 @@ use crate::run::{Dwell, Run};
 /// random walk makes of a tenth of a second in the best of instruments, lest the innovations be smaller
 /// than they claim.
 pub(super) const FLOOR: PerSensor<f64> = PerSensor {
-    gyro: 1e-8,
+    gyro: 1e-9,
     accel: 1e-7,
 };
 /// Excess below this many of its own standard errors is chance.

@@ -98,6 +98,7 @@ impl<'a> Clock<'a> {
             wraps_at: None,
             pauses: Vec::new(),
             set: Vec::new(),
+            set_before: None,
             out_of_order: None,
             behind: 0,
             of_rows: Vec::new(),
@@ -147,6 +148,8 @@ pub(super) struct Stamps {
     pauses: Vec<Pause>,
     /// Where the clock was set, in some sentences each.
     set: Vec<String>,
+    /// Number of rows before the last such place.
+    set_before: Option<usize>,
     /// Rows that were put before others, and the line of the first.
     out_of_order: Option<(usize, u64)>,
     /// Rows since the latest one that come behind it.
@@ -166,10 +169,7 @@ impl Stamps {
             self.of_rows.push((time, csv.line()));
             return Ok(Stamp::New(end));
         };
-        let mut number = csv.number(column)?;
-        if let Some(column) = self.nanoseconds {
-            number += 1e-9 * csv.number(column)?;
-        }
+        let number = self.number_of(csv, column)?;
         if self.unit == TimeUnit::Count && number.fract() != 0.0 {
             return Err(csv.not(column, "a whole number of samples"));
         }
@@ -181,16 +181,23 @@ impl Stamps {
         }
         if let Some(before) = self.number {
             let step = number - before;
+            if let Some(unit) = self.other_unit(step) {
+                return Err(csv.error_here(
+                    format_args!("times that go on by {step} from row to row"),
+                    format_args!("{} s, as sample_period_s says", self.period()),
+                    &format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
+                ));
+            }
             if step == 0.0 {
                 return Ok(Stamp::Again(end));
             }
             let is_back = step < 0.0 && !self.wraps(step);
-            if is_back && let Some(place) = self.place(self.time(number)) {
+            if is_back && let Some(late) = self.late(self.time(number), csv.line()) {
                 self.behind += 1;
                 if self.behind > REACH {
                     return Err(self.goes_back(csv, before, step));
                 }
-                return Ok(self.put(place, self.time(number), csv.line()));
+                return Ok(late);
             }
             if is_back {
                 self.is_set(csv, before, step)?;
@@ -203,11 +210,46 @@ impl Stamps {
                 }
             }
         }
+        self.go_on(number, csv.line());
+        Ok(Stamp::New(end))
+    }
+
+    /// The unit in which the first two steps are as long as is stated, if that is not the one of `run.toml`.
+    fn other_unit(&self, step: f64) -> Option<&'static str> {
+        let (TimeUnit::PerSecond(_), Some(period)) = (self.unit, self.period) else {
+            return None;
+        };
+        let first = self
+            .first
+            .zip(self.number)
+            .map(|(first, last)| last - first);
+        let [second, first] = match self.let_go == 0 && self.of_rows.len() == 2 {
+            true => [step, first?],
+            false => return None,
+        };
+        let fits = |&(_, unit): &(&str, TimeUnit)| match unit {
+            TimeUnit::PerSecond(many) if unit != self.unit => {
+                let is_period = |step: f64| (step / many - period).abs() < 0.5 * period;
+                is_period(first) && is_period(second)
+            }
+            _ => false,
+        };
+        TimeUnit::WORDS
+            .iter()
+            .find(|word| fits(word))
+            .map(|word| word.0)
+    }
+
+    fn number_of(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
+        let nanoseconds = self.nanoseconds.map(|column| csv.number(column));
+        Ok(csv.number(column)? + 1e-9 * nanoseconds.transpose()?.unwrap_or(0.0))
+    }
+
+    fn go_on(&mut self, number: f64, line: u64) {
         self.behind = 0;
         self.number = Some(number);
         self.first.get_or_insert(number);
-        self.of_rows.push((self.time(number), csv.line()));
-        Ok(Stamp::New(end))
+        self.of_rows.push((self.time(number), line));
     }
 
     /// s
@@ -225,16 +267,36 @@ impl Stamps {
         (place > last).then_some(place)
     }
 
-    /// Puts a row that comes late in its place.
-    fn put(&mut self, place: usize, time: f64, line: u64) -> Stamp {
+    /// Puts a row that comes late in its place, if there is one: where a row is missing, or at the time of another.
+    /// Those of a clock that was set back find theirs taken.
+    fn late(&mut self, time: f64, line: u64) -> Option<Stamp> {
+        let place = self.place(time)?;
         if self.of_rows[place - 1].0 == time {
-            return Stamp::Again(place);
+            return Some(Stamp::Again(place));
+        }
+        if !self.misses_a_row(place) {
+            return None;
         }
         let first = self.out_of_order.map_or(line, |(_, first)| first);
         let count = self.out_of_order.map_or(0, |(count, _)| count);
         self.out_of_order = Some((count + 1, first));
         self.of_rows.insert(place, (time, line));
-        Stamp::New(place)
+        Some(Stamp::New(place))
+    }
+
+    /// Whether a row is missing before this place: whether the step there is nearer to two than to one of the usual ones
+    /// of the last rows, of which half are no longer.
+    fn misses_a_row(&self, place: usize) -> bool {
+        let step = |rows: &[(f64, u64)]| rows[1].0 - rows[0].0;
+        let last = &self.of_rows[self.of_rows.len().saturating_sub(REACH)..];
+        let mut steps: Vec<f64> = last.windows(2).map(step).collect();
+        let half = steps.len() / 2;
+        let usual = match steps.is_empty() {
+            true => 0.0,
+            false => *steps.select_nth_unstable_by(half, f64::total_cmp).1,
+        };
+        let ends = self.of_rows.get(place - 1..=place);
+        ends.is_some_and(|ends| step(ends) > 1.5 * usual)
     }
 
     fn period(&self) -> f64 {
@@ -312,10 +374,13 @@ impl Stamps {
 
     /// Takes what follows for a part of its own, a little later.
     fn is_set(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
-        // Where rows come behind later ones a time that steps back is of no clock.
-        if self.breaks < Breaks::Settings || self.behind > 0 {
+        // Where rows come behind later ones, or it happens again and again, a time that steps back is of no clock.
+        let row = self.let_go + self.of_rows.len();
+        let again = self.set_before.is_some_and(|before| row - before < REACH);
+        if self.breaks < Breaks::Settings || self.behind > 0 || again {
             return Err(self.goes_back(csv, before, step));
         }
+        self.set_before = Some(row);
         let (from, to) = (self.words(before), self.words(before + step));
         self.ahead += self.cut_to() - step;
         self.without_rows += self.cut_to();
@@ -344,12 +409,25 @@ impl Stamps {
         }
     }
 
-    /// Takes the row for another one at the time of the row before this place.
-    pub fn again(&mut self, place: usize, csv: &LogRows) {
+    /// Takes the row for another one at the time of the row before this place; if that is one of many rows back and no
+    /// row is missing there, for the first one of a clock that was set. Behind how many of the rows it is then.
+    pub fn again(&mut self, place: usize, csv: &LogRows) -> Result<usize, FileError> {
+        let end = self.of_rows.len();
+        if place < end && !self.misses_a_row(place) {
+            let number = self.column.map(|column| self.number_of(csv, column));
+            if let (Some(number), Some(before)) = (number.transpose()?, self.number) {
+                // Those before it that a set clock put back may have had the same values.
+                self.behind = 0;
+                self.is_set(csv, before, number - before)?;
+                self.go_on(number, csv.line());
+                return Ok(end);
+            }
+        }
         let before = place.checked_sub(1).and_then(|row| self.of_rows.get(row));
         if let Some(&(time, _)) = before {
             self.of_rows.insert(place, (time, csv.line()));
         }
+        Ok(place)
     }
 
     /// Whether rows are counted, each with a number of its own.

@@ -265,9 +265,10 @@ impl CsvFile {
             .ok_or_else(|| self.not(column, "a text"))
     }
 
-    /// Whether nothing stands in a column of the row.
+    /// Whether nothing stands in a column of the row, or what loggers write for that.
     pub fn is_blank(&self, column: usize) -> bool {
-        self.bytes(column).is_empty()
+        let bytes = self.bytes(column);
+        bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
     }
 
     fn bytes(&self, column: usize) -> &[u8] {

@@ -233,8 +233,7 @@ impl Track {
                     if stamps.is_count() {
                         return Err(Stamps::same(&rows));
                     }
-                    stamps.again(place, &rows);
-                    place
+                    stamps.again(place, &rows)?
                 }
             };
             for (column, value) in columns.iter_mut().zip(row) {

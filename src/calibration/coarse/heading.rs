@@ -2,8 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
+use super::super::problem::Problem;
 use crate::attitude::exp;
 use crate::earth::{ROTATION_RATE, Site};
+use crate::imu::Sensor;
 
 /// What the gyros say at rest.
 pub(super) struct Rest {
@@ -30,6 +32,20 @@ pub(super) struct Gyrocompass {
     pub headings: Vec<Heading>,
     /// Error of the rate along body axes, rad/s.
     pub bias: Vector3<f64>,
+}
+
+/// Bias of the gyros within Earth rate: what they put out at rest. From a prior that is off by so much that a move turns
+/// into another, no step leads back.
+pub(super) fn gyro_bias_at_rest(problem: &Problem) -> Vector3<f64> {
+    let mut outputs = Vector3::zeros();
+    let mut count = 0.0;
+    for stretch in problem.stretches() {
+        for dwell in &stretch.dwells {
+            outputs += dwell.mean(Sensor::Gyro, stretch.run).output;
+            count += 1.0;
+        }
+    }
+    outputs / count
 }
 
 /// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest

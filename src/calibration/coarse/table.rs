@@ -10,7 +10,7 @@ use super::super::model::Model;
 use super::super::parameters::from_vector;
 use super::super::problem::{Problem, Stretch};
 use super::equations::{Equations, gauss_newton};
-use super::gyro_bias_at_rest;
+use super::heading::gyro_bias_at_rest;
 use crate::attitude::log;
 use crate::imu::{PerSensor, Sensor, Triad};
 use crate::navigation::{Block, Navigator, State};

@@ -179,12 +179,14 @@ impl<'a> Reading<'a> {
         if self.stamps.is_count() {
             return Err(Stamps::same(csv));
         }
-        if self.at_once.0 == 0 {
-            self.at_once.1 = csv.line();
+        let taken = self.stamps.again(place, csv)?;
+        if taken == place {
+            if self.at_once.0 == 0 {
+                self.at_once.1 = csv.line();
+            }
+            self.at_once.0 += 1;
         }
-        self.at_once.0 += 1;
-        self.stamps.again(place, csv);
-        Ok(Some(place))
+        Ok(Some(taken))
     }
 
     /// What was made of rows that are no samples, or too many, a sentence each.

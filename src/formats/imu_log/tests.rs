@@ -278,6 +278,16 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     assert_eq!(samples, [0..7000, 7099..10_099]);
     let said = "imu.csv, line 7002: time goes from 69.99 s to 5 s: the clock was set";
     assert!(notes.contains(said), "{notes}");
+    // However little it was set back by, in whole samples or not: rows that come late find a place.
+    for back in [50, 55, 503, 1000] {
+        let a_little = |k: usize| 10 * k as u64 - if k < 7000 { 0 } else { back };
+        let (imu, notes) = read(&a_little, 1e3, Breaks::Settings).unwrap();
+        assert_eq!(imu.stretches.len(), 2, "{back}: {notes}");
+        assert!(
+            notes.contains("line 7002: time goes from 69.99 s to"),
+            "{notes}"
+        );
+    }
     // However often nothing is recorded for however long, a stretch begins when it does.
     let paused = |k: usize| 10 * k as u64 + 600_000 * (k / 500) as u64;
     for breaks in [Breaks::Pauses, Breaks::Settings] {
@@ -304,6 +314,12 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
         );
         assert!(refused.to_string().contains(&said), "{refused}");
     }
+    // Whoever forgot the unit is told it.
+    let in_microseconds = |k: usize| 10_000 * k as u64;
+    let refused = read(&in_microseconds, 1.0, Breaks::Settings).unwrap_err();
+    let said = "line 4: found times that go on by 10000 from row to row, expected 0.01 s, as sample_period_s says. Give \
+                time_unit = \"us\"";
+    assert!(refused.to_string().contains(said), "{refused}");
     // Milliseconds of a second are no time.
     let of_second = |k: usize| 10 * (k % 100) as u64;
     assert!(read(&of_second, 1e3, Breaks::Settings).is_err());

@@ -299,8 +299,8 @@ fn each_wrong_row_or_column_has_its_message() {
         (
             "imu.csv",
             "\n0.50,1,",
-            "\n0.50,NaN,",
-            "line 51, column `gx` & `NaN` & finite",
+            "\n0.50,inf,",
+            "line 51, column `gx` & `inf` & finite",
         ),
         (
             "imu.csv",
