@@ -185,7 +185,7 @@ impl Stamps {
                 return Err(csv.error_here(
                     format_args!("times that go on by {step} from row to row"),
                     format_args!("{} s, as sample_period_s says", self.period()),
-                    &format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
+                    format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
                 ));
             }
             if step == 0.0 {
