@@ -48,14 +48,14 @@ pub(super) fn roots<const N: usize>(covariance: [[f64; N]; N]) -> Vec<[f64; N]> 
 
 /// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector, each after the component
 /// that it takes out: Cholesky's factorisation, the largest of what is left first, until rounding is all that is left
-/// (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8). What is no number comes out as that.
+/// (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).
 pub(super) fn factor<const N: usize>(
     mut matrix: [[f64; N]; N],
     mut vector: [f64; N],
 ) -> impl Iterator<Item = (usize, [f64; N], f64)> {
     let diagonal: [f64; N] = std::array::from_fn(|k| matrix[k][k]);
     let mut left: Vec<usize> = (0..N)
-        .filter(|&k| diagonal[k] > 0.0 || diagonal[k].is_nan())
+        .filter(|&k| diagonal[k] > 0.0)
         .collect();
     std::iter::from_fn(move || {
         let part = |k: usize| matrix[k][k] / diagonal[k];
