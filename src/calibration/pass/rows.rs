@@ -54,9 +54,7 @@ pub(super) fn factor<const N: usize>(
     mut vector: [f64; N],
 ) -> impl Iterator<Item = (usize, [f64; N], f64)> {
     let diagonal: [f64; N] = std::array::from_fn(|k| matrix[k][k]);
-    let mut left: Vec<usize> = (0..N)
-        .filter(|&k| diagonal[k] > 0.0)
-        .collect();
+    let mut left: Vec<usize> = (0..N).filter(|&k| diagonal[k] > 0.0).collect();
     std::iter::from_fn(move || {
         let part = |k: usize| matrix[k][k] / diagonal[k];
         let largest = |&a: &usize, &b: &usize| part(left[a]).total_cmp(&part(left[b]));
