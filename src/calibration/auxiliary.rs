@@ -14,7 +14,7 @@ pub const AUXILIARY: usize = TABLE_GEOMETRY + TERM_PARAMETERS;
 pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
 
 /// Index among the auxiliary parameters of the first of the table's axes.
-pub(super) const OF_AXES: usize = TABLE_GEOMETRY - AXIS_ERRORS;
+pub const OF_AXES: usize = TABLE_GEOMETRY - AXIS_ERRORS;
 
 /// Which kind of parameter stands at an index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,7 +132,7 @@ impl Auxiliary {
     }
 
     /// Index among the parameters of error terms of an auxiliary parameter that is one.
-    pub(super) fn of_terms(index: usize) -> Option<usize> {
+    pub(in crate::calibration) fn of_terms(index: usize) -> Option<usize> {
         index.checked_sub(TABLE_GEOMETRY)
     }
 

@@ -14,7 +14,6 @@ use std::ops::Range;
 use faer::{Mat, MatRef, Side};
 use nalgebra::{Matrix3, Vector3};
 
-use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::error_term::ErrorTerm;
 use super::estimate::Estimate;
@@ -26,8 +25,9 @@ use super::parameters::{
     ParameterMatrix, ParameterVector, from_vector, sensor_and_parameter, to_vector,
 };
 use super::problem::{Problem, Stretch};
-use super::schedule::AtRest;
 use crate::attitude::{log, skew, to_tilt_and_heading};
+use crate::calibration::budget::curvature::curvature;
+use crate::calibration::record::schedule::AtRest;
 use crate::imu::{PerSensor, Triad};
 use crate::navigation::{Block, BlockMatrix, Navigator, ProcessNoise, State};
 use crate::run::Aiding;

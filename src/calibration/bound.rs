@@ -3,13 +3,13 @@
 use nalgebra::DVector;
 
 use super::auxiliary::Auxiliary;
-use super::coarse::initial_attitudes;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::linearisation::Linearisation;
 use super::parameters::PARAMETERS;
 use super::pass::{Epoch, Gate, Mode, pass};
 use super::problem::Problem;
+use crate::calibration::start::coarse::initial_attitudes;
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
 /// What no estimator of a run can beat.

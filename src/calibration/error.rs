@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::mounting::Mounting;
+use crate::calibration::start::mounting::Mounting;
 use crate::imu::Sensor;
 use crate::run::LONG_ENOUGH;
 use crate::run::motion::ContradictedLabel;

@@ -36,7 +36,7 @@ impl Estimate {
 }
 
 /// By how much the σ that grew most did, of variances before and after.
-pub(super) fn largest_growth(before: &[f64], after: &[f64]) -> f64 {
+pub fn largest_growth(before: &[f64], after: &[f64]) -> f64 {
     let known = before
         .iter()
         .zip(after)

@@ -3,29 +3,29 @@
 
 use std::collections::BTreeMap;
 
-use super::alone::Alone;
-use super::attempt::{Attempt, Progress, from_coarse_start, learnt_or_stated};
 use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
-use super::dwell_scatter::DwellScores;
 use super::error::CalibrationError;
-use super::finding::Finding;
-use super::form::{FormTest, form_test};
-use super::innovation::{consistency, inconsistencies};
 use super::iterations::{Iterated, iterate};
 use super::layout::Layout;
 use super::linearisation::not_invertible;
 use super::noise::Learnt;
-use super::observability::Observability;
 use super::outcome::Outcome;
 use super::parameters::{ParameterMatrix, parameter_name};
 use super::pass::Gate;
-use super::prior_distance::{far_from_prior, widened};
 use super::problem::Problem;
-use super::rest_scatter::scatter_at_rest;
-use super::rounding::{by_rounding, rounded};
-use super::together::{self, Joint};
-use super::unexplained::unexplained;
+use super::several::{self, Joint};
+use crate::calibration::checks::dwell_scatter::DwellScores;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::form::{FormTest, form_test};
+use crate::calibration::checks::innovation::{consistency, inconsistencies};
+use crate::calibration::checks::observability::Observability;
+use crate::calibration::checks::prior_distance::{far_from_prior, widened};
+use crate::calibration::checks::rest_scatter::scatter_at_rest;
+use crate::calibration::checks::rounding::{by_rounding, rounded};
+use crate::calibration::checks::unexplained::unexplained;
+use crate::calibration::several::alone::Alone;
+use crate::calibration::start::attempt::{Attempt, Progress, from_coarse_start, learnt_or_stated};
 use crate::imu::Sensor;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
@@ -44,7 +44,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         alone,
         findings: of_recordings,
     } = match problem.varies() || problem.runs().nth(1).is_some() {
-        true => Solved::of(together::solve(problem, progress)?),
+        true => Solved::of(several::solve(problem, progress)?),
         false => Solved {
             attempt: from_coarse_start(problem, progress)?,
             problem: problem.clone(),

@@ -1,12 +1,12 @@
 //! Gauss–Newton iterations: passes with the linearisation held until nothing moves.
 
 use super::error::CalibrationError;
-use super::innovation::Innovation;
 use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
 use super::outcome::Pass;
 use super::parameters::to_vector;
 use super::pass::{Gate, Mode, PassResult, pass};
 use super::problem::Problem;
+use crate::calibration::checks::innovation::Innovation;
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
 /// of its own linearised problem only, so a small rise means nothing.
@@ -23,7 +23,7 @@ const MOST_SHORTENED: usize = 10;
 
 /// The last pass, and whether it moved nothing.
 #[derive(Clone)]
-pub(super) struct Iterated {
+pub struct Iterated {
     pub held: PassResult,
     pub converged: bool,
 }
@@ -40,7 +40,7 @@ impl Iterated {
 
 /// Passes from a first point on, each linearised at the estimate of the one before; and whether they
 /// converged. `gate` is decided already, or by innovations.
-pub(super) fn iterate(
+pub fn iterate(
     problem: &Problem,
     priors: &[AttitudePrior],
     from: Linearisation,
@@ -129,7 +129,7 @@ fn beyond(result: &PassResult, gate: f64) -> f64 {
     result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
 }
 
-pub(super) fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -> Pass {
+pub fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -> Pass {
     let sigma = result.covariance.diagonal().map(f64::sqrt);
     let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
     Pass {

@@ -11,33 +11,33 @@
 //! | temperature | one for each coefficient that is on | true − estimated, see [`crate::imu::ThermalModel`] |
 //! | gravity | 1 | true − stated magnitude of gravity, m/s²; where it has a σ |
 //! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
-//! | of the recording | one for each parameter that is not common to all, and 3 of its mounting, rad | by how much it differs in this recording, see [`super::day_to_day::Difference`] |
+//! | of the recording | one for each parameter that is not common to all, and 3 of its mounting, rad | by how much it differs in this recording, see [`crate::calibration::several::day_to_day::Difference`] |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
 //! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, kept as constants, rad |
 //! | table base | one for each of East, North, Up that is on | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where a σ of it is stated |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
-use super::day_to_day::OwnState;
 use super::model::Model;
 use super::parameters::PARAMETERS;
-use super::thermal::Coefficient;
+use crate::calibration::several::day_to_day::OwnState;
+use crate::calibration::several::thermal::Coefficient;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
 use crate::run::Aiding;
 use crate::turntable::{AXIS_ERRORS, TABLE_GEOMETRY};
 
 /// Attitude error φ.
-pub(super) const ATTITUDE: usize = 0;
+pub const ATTITUDE: usize = 0;
 /// Velocity error δV.
-pub(super) const VELOCITY: usize = 3;
+pub const VELOCITY: usize = 3;
 /// Position error δp.
-pub(super) const POSITION: usize = 6;
+pub const POSITION: usize = 6;
 /// Number of navigation states, the only ones that move with the body.
-pub(super) const NAVIGATION: usize = 9;
+pub const NAVIGATION: usize = 9;
 
 /// Where each group of states is.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Layout {
+pub struct Layout {
     /// The parameter of both triads that each state from [`NAVIGATION`] on is.
     parameters: Vec<usize>,
     /// The parameter of the error terms that each of the states after them is.

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::day_to_day::Difference;
 use super::error::CalibrationError;
 use super::model::Model;
 use super::parameters::{from_vector, parameter, to_vector};
 use crate::attitude::{exp, log};
+use crate::calibration::several::day_to_day::Difference;
 use crate::imu::{
     PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, TermVector, ThermalCoefficients,
     Triad,
@@ -58,7 +58,7 @@ impl Linearisation {
     }
 
     /// The instrument in a recording, told with its number, at the temperature in the middle of these samples.
-    pub(super) fn instrument(
+    pub(in crate::calibration) fn instrument(
         &self,
         model: &Model,
         (run, recording): (&Run, usize),
@@ -78,12 +78,12 @@ impl Linearisation {
     }
 
     /// By how much a recording differs from what all have in common.
-    pub(super) fn own(&self, recording: usize) -> Difference {
+    pub(in crate::calibration) fn own(&self, recording: usize) -> Difference {
         self.own.get(recording).copied().unwrap_or_default()
     }
 
     /// The point a fraction of the way to another.
-    pub(super) fn towards(&self, other: &Self, fraction: f64) -> Self {
+    pub(in crate::calibration) fn towards(&self, other: &Self, fraction: f64) -> Self {
         let from = to_vector(&self.triads);
         let attitudes = self.initial_attitudes.iter().zip(&other.initial_attitudes);
         Self {
@@ -107,13 +107,13 @@ impl Linearisation {
 }
 
 /// The first triad whose sensitivity cannot be inverted.
-pub(super) fn not_invertible(triads: &PerSensor<Triad>) -> Option<Sensor> {
+pub fn not_invertible(triads: &PerSensor<Triad>) -> Option<Sensor> {
     let singular = |&sensor: &Sensor| triads.get(sensor).correction().is_none();
     Sensor::ALL.into_iter().find(singular)
 }
 
 /// The error that names the triad whose sensitivity is singular.
-pub(super) fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
+pub fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
     CalibrationError::Singular {
         sensor: not_invertible(triads).unwrap_or(Sensor::Gyro),
     }
@@ -144,7 +144,7 @@ const IN_QUADRANT: f64 = 90.0 * DEGREE / 3.464_101_615_137_754_6;
 
 impl AttitudePrior {
     /// From a reading of a table.
-    pub(super) fn of_reading(table: &TableAccuracy, mean: Matrix3<f64>) -> Self {
+    pub(in crate::calibration) fn of_reading(table: &TableAccuracy, mean: Matrix3<f64>) -> Self {
         // The one reading that gave it has all errors.
         let known = table.position_sigma.hypot(table.reading_sigma);
         let known = known.hypot(table.geometry.base.max());
@@ -156,7 +156,7 @@ impl AttitudePrior {
 
     /// From a coarse alignment that knows its heading to this 1σ, and its level to what accelerometers of this model
     /// say.
-    pub(super) fn of_alignment(
+    pub(in crate::calibration) fn of_alignment(
         mean: Matrix3<f64>,
         heading_sigma: f64,
         model: &Model,
@@ -176,7 +176,7 @@ impl AttitudePrior {
     }
 
     /// Whether noise of the gyros hides a heading of this 1σ, so that it may be any.
-    pub(super) fn hides(heading_sigma: f64) -> bool {
+    pub(in crate::calibration) fn hides(heading_sigma: f64) -> bool {
         HEADING_SIGMAS * heading_sigma > HIDDEN
     }
 }
@@ -200,7 +200,7 @@ fn known_level(model: &Model, gravity: f64) -> f64 {
 
 /// Uncertainty at the first sample of a stretch, 1σ, and the mean of its attitude error.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Start {
+pub struct Start {
     /// Mean of φ₀, rad.
     pub attitude: Vector3<f64>,
     /// East, North and Up, rad.

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::day_to_day::DayToDay;
 use super::error_term::ErrorTerm;
 use super::options::Options;
 use super::parameters::{ParameterVector, parameter, to_vector};
-use super::standstill::FLOOR;
+use crate::calibration::record::standstill::FLOOR;
+use crate::calibration::several::day_to_day::DayToDay;
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
     TermVector, ThermalModel,
@@ -101,7 +101,7 @@ impl Model {
     }
 
     /// What drives the navigation errors.
-    pub(super) fn process_noise(&self) -> PerSensor<ProcessNoise> {
+    pub(in crate::calibration) fn process_noise(&self) -> PerSensor<ProcessNoise> {
         PerSensor::from_fn(|sensor| {
             let MotionNoise {
                 by_motion,
@@ -116,13 +116,13 @@ impl Model {
     }
 
     /// Sets the variance at standstill over the least that is ever taken, rad² or m²/s².
-    pub(super) fn set_unrest(&mut self, sensor: Sensor, variance: f64) {
+    pub(in crate::calibration) fn set_unrest(&mut self, sensor: Sensor, variance: f64) {
         let sigma = (variance + FLOOR.get(sensor).powi(2)).sqrt();
         *self.stillness.get_mut(sensor) = Some(sigma);
     }
 
     /// The same with the noise of another model.
-    pub(super) fn with_noise_of(&self, other: &Self) -> Self {
+    pub(in crate::calibration) fn with_noise_of(&self, other: &Self) -> Self {
         Self {
             noise: other.noise,
             motion_noise: other.motion_noise,
@@ -135,7 +135,7 @@ impl Model {
     }
 
     /// The same parameters in another form.
-    pub(super) fn in_form(&self, run: &Run, form: InstallationForm) -> Self {
+    pub(in crate::calibration) fn in_form(&self, run: &Run, form: InstallationForm) -> Self {
         let mut model = self.clone();
         model.set_form(run, form);
         model

@@ -4,22 +4,22 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::alone::Alone;
 use super::auxiliary::Auxiliary;
 use super::budget::BudgetSource;
-use super::dwell_scatter::DwellScatter;
 use super::estimate::{Estimate, largest_growth};
-use super::finding::Finding;
-use super::form::FormTest;
-use super::innovation::{Consistency, Innovation};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::model::Model;
 use super::noise::NoiseReport;
-use super::observability::Observability;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::pass::{Epoch, Own};
 use super::problem::Problem;
-use super::thermal::Thermal;
+use crate::calibration::checks::dwell_scatter::DwellScatter;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::form::FormTest;
+use crate::calibration::checks::innovation::{Consistency, Innovation};
+use crate::calibration::checks::observability::Observability;
+use crate::calibration::several::alone::Alone;
+use crate::calibration::several::thermal::Thermal;
 use crate::run::Aiding;
 
 /// χ² by which opposite headings differ where a run observes the heading.
@@ -110,7 +110,7 @@ impl Outcome {
     }
 
     /// The problem as it was calibrated: with the noise that was learnt, and a prior that the data do not contradict.
-    pub(super) fn as_calibrated<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+    pub(in crate::calibration) fn as_calibrated<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let problem = self.with_prior(problem);
         match self.noise.learnt {
             true => problem.with_model(problem.model.with_noise_of(&self.model)),
@@ -119,7 +119,7 @@ impl Outcome {
     }
 
     /// The problem with that prior, and noise as it is stated.
-    pub(super) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+    pub(in crate::calibration) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let mut model = problem.model.clone();
         model.prior_sigma = self.model.prior_sigma;
         problem.with_model(model)
@@ -131,13 +131,13 @@ impl Outcome {
     }
 
     /// Adds such a part to the covariance of the estimate, in the place of what it had of it.
-    pub(super) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
+    pub(in crate::calibration) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
         self.estimate.covariance += part - self.part(source);
         self.beside.insert(source, part);
     }
 
     /// How many times larger the σ of a parameter are, at most, for such a part.
-    pub(super) fn growth_by(&self, source: BudgetSource) -> f64 {
+    pub(in crate::calibration) fn growth_by(&self, source: BudgetSource) -> f64 {
         let with = self.estimate.covariance;
         let without = with - self.part(source);
         let variances = [without, with].map(|covariance| covariance.diagonal());

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use super::innovation::Observation;
 use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
-use super::schedule::{Step, first_reading, steps};
-use super::standstill::{FLOOR, stillness};
 use crate::attitude::to_tilt_and_heading;
+use crate::calibration::checks::innovation::Observation;
+use crate::calibration::record::schedule::{Step, first_reading, steps};
+use crate::calibration::record::standstill::{FLOOR, stillness};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Run};
@@ -27,7 +27,7 @@ const INITIAL_VELOCITY: f64 = 1e-3;
 pub struct Problem<'a> {
     /// What is estimated, and what is known of it beforehand.
     pub model: Model,
-    pub(super) options: Options,
+    pub(in crate::calibration) options: Options,
     run: &'a Run,
     others: Vec<&'a Run>,
     stretches: Arc<[Stretch<'a>]>,
@@ -37,7 +37,7 @@ pub struct Problem<'a> {
 
 /// Part of a recording without a break, from its first dwell to its last.
 #[derive(Debug, Clone)]
-pub(super) struct Stretch<'a> {
+pub struct Stretch<'a> {
     pub run: &'a Run,
     /// The table's readings, where they are observed.
     pub table: Option<&'a TableLog>,
@@ -52,7 +52,7 @@ pub(super) struct Stretch<'a> {
 
 /// Variance of each observation per axis.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Variance {
+pub struct Variance {
     /// Of the computed velocity: a pulse's worth.
     pub pulse: f64,
     pub position: f64,
@@ -92,7 +92,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Some of its recordings, at least one, told by number.
-    pub(super) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
+    pub(in crate::calibration) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
         let mut runs = self.runs().enumerate().filter(|&(number, _)| which(number));
         let first = runs.next();
         let others = runs.map(|(_, run)| run).collect();
@@ -112,7 +112,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Without the recordings that have no dwell, of which it says so; as it is where none has.
-    pub(super) fn of_dwells(self) -> Self {
+    pub(in crate::calibration) fn of_dwells(self) -> Self {
         let has = |number: usize| {
             let mut of = self.stretches.iter().filter(|of| of.recording == number);
             of.any(|stretch| !stretch.dwells.is_empty())
@@ -139,7 +139,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The same observed in some of its dwells only, told by number.
-    pub(super) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
+    pub(in crate::calibration) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
         let mut number = 0;
         let stretches = self.stretches.iter().map(|stretch| {
             let dwells = stretch.dwells.iter().filter(|_| {
@@ -164,7 +164,7 @@ impl<'a> Problem<'a> {
 
     /// The same observed at the end of so many steps of a dwell, with the mean of what a table read
     /// meanwhile.
-    pub(super) fn observed_every(&self, steps_of_dwell: usize) -> Self {
+    pub(in crate::calibration) fn observed_every(&self, steps_of_dwell: usize) -> Self {
         let stretches = self.stretches.iter().map(|stretch| Stretch {
             steps: steps(stretch.run, stretch.table, &stretch.dwells, steps_of_dwell),
             ..stretch.clone()
@@ -175,13 +175,13 @@ impl<'a> Problem<'a> {
         }
     }
 
-    pub(super) fn stretches(&self) -> &[Stretch<'a>] {
+    pub(in crate::calibration) fn stretches(&self) -> &[Stretch<'a>] {
         &self.stretches
     }
 
     /// Variance at standstill over the least that is ever taken, of attitude in rad² (gyros) or velocity in
     /// m²/s²; of several stretches the mean.
-    pub(super) fn unrest(&self, sensor: Sensor) -> f64 {
+    pub(in crate::calibration) fn unrest(&self, sensor: Sensor) -> f64 {
         let of = |stretch: &Stretch| {
             let sigma = stretch.stillness(&self.model, sensor);
             (sigma.powi(2) - FLOOR.get(sensor).powi(2)).max(0.0)
@@ -196,13 +196,13 @@ impl<'a> Problem<'a> {
     }
 
     /// All runs, in order.
-    pub(super) fn runs(&self) -> impl Iterator<Item = &'a Run> {
+    pub(in crate::calibration) fn runs(&self) -> impl Iterator<Item = &'a Run> {
         std::iter::once(self.run).chain(self.others.iter().copied())
     }
 
     /// What the readers of the runs' files found, once, with the name of the run where it is not of all; and which
     /// recordings are left out.
-    pub(super) fn notes(&self) -> Vec<String> {
+    pub(in crate::calibration) fn notes(&self) -> Vec<String> {
         let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
         for run in self.runs() {
             let name = run.recording.name.as_str();
@@ -230,7 +230,10 @@ impl<'a> Problem<'a> {
     }
 
     /// What is observed at the end of a step, in order.
-    pub(super) fn observed(&self, step: &Step) -> impl Iterator<Item = Observation> + use<> {
+    pub(in crate::calibration) fn observed(
+        &self,
+        step: &Step,
+    ) -> impl Iterator<Item = Observation> + use<> {
         let at_rest = step.at_rest.as_ref();
         let reading = at_rest.is_some_and(|rest| rest.reading.is_some());
         let still = self.model.aiding == Aiding::Velocity;
@@ -249,7 +252,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Squared whitened innovation of three components beyond which an observation is an outlier.
-    pub(super) fn gate(&self) -> f64 {
+    pub(in crate::calibration) fn gate(&self) -> f64 {
         let steps = self.stretches.iter().flat_map(|stretch| &stretch.steps);
         let observations: usize = steps.map(|step| self.observed(step).count()).sum();
         let of_each = self.options.false_rejection / observations.max(1) as f64;

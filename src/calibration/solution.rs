@@ -1,18 +1,20 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
-use super::attempt::Progress;
 use super::budget::{Budget, BudgetSource};
-use super::closed_form::{ClosedForm, six_position};
 use super::error::CalibrationError;
-use super::error_term_test::{ErrorTermTest, test_error_terms, unseen_variation};
 use super::estimate::Estimate;
-use super::finding::Finding;
 use super::gauss_newton::estimate;
-use super::mounting::Mounting;
 use super::outcome::Outcome;
 use super::problem::Problem;
-use super::quality::Quality;
 use super::result::{Calibration, Method, Provenance};
+use crate::calibration::checks::error_term_test::{
+    ErrorTermTest, test_error_terms, unseen_variation,
+};
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::quality::Quality;
+use crate::calibration::start::attempt::Progress;
+use crate::calibration::start::closed_form::{ClosedForm, six_position};
+use crate::calibration::start::mounting::Mounting;
 use crate::imu::PerSensor;
 use crate::room;
 use crate::run::Run;

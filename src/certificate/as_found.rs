@@ -1,7 +1,7 @@
 //! How the instrument was found: what its earlier calibration is off now.
 
 use super::results::{Quantity, nominal};
-use crate::calibration::frame::{Canonical, free_parameters};
+use crate::calibration::result::frame::{Canonical, free_parameters};
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, Group, parameter_name};
 use crate::imu::{BodyFrame, InstallationForm, ParameterKind};

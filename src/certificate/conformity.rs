@@ -6,7 +6,7 @@ use statrs::function::erf::erfc;
 
 use super::laboratory::DecisionRule;
 use super::results::nominal;
-use crate::calibration::frame::Canonical;
+use crate::calibration::result::frame::Canonical;
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, parameter_name};
 use crate::imu::InstallationForm;

@@ -1,6 +1,6 @@
 use super::conformity::decide;
 use super::*;
-use crate::calibration::frame::tests::{record, with_covariance};
+use crate::calibration::result::frame::tests::{record, with_covariance};
 use crate::calibration::result::{EQUATION_WITH_TERMS, InputFile, TermRecord};
 use crate::calibration::{BudgetRecord, RangeRecord, ThermalRecord};
 use crate::formats::digest_of_bytes;

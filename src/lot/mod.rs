@@ -16,8 +16,8 @@ mod unit;
 
 use nalgebra::Vector3;
 
-use crate::calibration::frame::{Canonical, free_parameters};
 use crate::calibration::result::Calibration;
+use crate::calibration::result::frame::{Canonical, free_parameters};
 use crate::imu::{BodyFrame, Nominal, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::median;
 

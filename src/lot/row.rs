@@ -3,7 +3,7 @@
 use super::limits::{Check, Verdict};
 use super::quantity::{Quantity, Sample};
 use super::unit::Unit;
-use crate::calibration::frame::Canonical;
+use crate::calibration::result::frame::Canonical;
 use crate::imu::{Nominal, PerSensor, Sensor};
 use crate::noise::RestNoise;
 

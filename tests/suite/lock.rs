@@ -98,10 +98,7 @@ impl Figures {
         if let Some(consistency) = &record.consistency {
             others.insert("nis".to_owned(), rounded(consistency.all.nis));
         }
-        let kinds = record
-            .findings
-            .iter()
-            .map(|finding| finding.kind.clone());
+        let kinds = record.findings.iter().map(|finding| finding.kind.clone());
         Self {
             parameters,
             others,

@@ -1,23 +1,23 @@
 //! A pass whose operations are kept, and its way back.
 
-use super::super::error::CalibrationError;
-use super::super::innovation::Observation;
-use super::super::linearisation::{AttitudePrior, Linearisation};
-use super::super::model::Model;
-use super::super::noise::{Event, Events};
-use super::super::pass::{
+use super::source::BudgetSource;
+use super::sums::Sums;
+use crate::calibration::checks::innovation::Observation;
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::{AttitudePrior, Linearisation};
+use crate::calibration::model::Model;
+use crate::calibration::noise::{Event, Events};
+use crate::calibration::pass::{
     Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Seen,
     Taken, Told, Verdict, begin,
 };
-use super::super::problem::{Problem, Stretch};
-use super::source::BudgetSource;
-use super::sums::Sums;
+use crate::calibration::problem::{Problem, Stretch};
 use crate::imu::Sensor;
 use crate::navigation::Block;
 
 /// A pass with the linearisation held.
 #[derive(Clone, Copy)]
-pub(super) struct Held<'a> {
+pub struct Held<'a> {
     pub problem: &'a Problem<'a>,
     /// What was known of the initial attitude of each stretch.
     pub priors: &'a [AttitudePrior],
@@ -27,7 +27,7 @@ pub(super) struct Held<'a> {
 }
 
 /// A pass that was made, and where it was before each part of it.
-pub(super) struct Passed<'a> {
+pub struct Passed<'a> {
     held: Held<'a>,
     filter: Filter,
     dwells: Dwells,

@@ -1,7 +1,7 @@
 //! How well the variance of a source is known.
 
-use super::super::outcome::Outcome;
 use super::source::BudgetSource;
+use crate::calibration::outcome::Outcome;
 
 /// The end of a 95 % interval, in σ.
 const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;
@@ -10,7 +10,7 @@ impl BudgetSource {
     /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2), Δu from the upper
     /// end of the interval of what was learnt, for the lower one may be nothing at all; of several the
     /// least, and not less than one.
-    pub(super) fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
+    pub(in crate::calibration) fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
         if self == Self::DwellScatter {
             let parameters = outcome.estimate.estimated().count().max(1);
             let scores = outcome.dwell_scatter.map_or(0, |scatter| scatter.count);

@@ -5,17 +5,19 @@
 //! of one σ of each does so much to every parameter; the squares of all that is of one source are its part of
 //! the covariance, and the parts of all sources are the covariance, whatever the gains of the filter are.
 
+pub mod curvature;
+
 mod follow;
 mod freedom;
 mod record;
 mod source;
 mod sums;
 
-use super::curvature::curvature;
 use super::error::CalibrationError;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix};
 use super::problem::Problem;
+use crate::calibration::budget::curvature::curvature;
 use crate::statistics::student_limit;
 use follow::Held;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
@@ -88,7 +90,11 @@ impl Budget {
     }
 
     /// With one part more, of what is exactly known.
-    pub(super) fn and(mut self, source: BudgetSource, covariance: ParameterMatrix) -> Self {
+    pub(in crate::calibration) fn and(
+        mut self,
+        source: BudgetSource,
+        covariance: ParameterMatrix,
+    ) -> Self {
         self.parts.push(BudgetPart {
             source,
             covariance,

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::error_term_test::ErrorTermTest;
-use super::super::parameters::ParameterVector;
 use super::Budget;
+use crate::calibration::checks::error_term_test::ErrorTermTest;
+use crate::calibration::parameters::ParameterVector;
 
 /// Standard uncertainties of the estimated parameters by source, in their order and units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ pub struct LeftOffRecord {
 
 impl Budget {
     /// As a record of these parameters, each with the factor that brings it to the file's unit.
-    pub(in super::super) fn record(
+    pub(in crate::calibration) fn record(
         &self,
         estimated: &[usize],
         factor: impl Fn(usize) -> f64,

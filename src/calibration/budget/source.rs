@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::layout::{Layout, POSITION, VELOCITY};
-use super::super::noise::Source;
-use super::super::pass::Driver;
+use crate::calibration::layout::{Layout, POSITION, VELOCITY};
+use crate::calibration::noise::Source;
+use crate::calibration::pass::Driver;
 use crate::imu::{Sensor, Term};
 use crate::turntable::AxisError;
 
@@ -146,7 +146,7 @@ impl BudgetSource {
     }
 
     /// What draws a state anew, or is known of it before.
-    pub(super) fn of_state(layout: &Layout, state: usize) -> Self {
+    pub(in crate::calibration) fn of_state(layout: &Layout, state: usize) -> Self {
         let within = |first: Option<usize>| {
             first.and_then(|first| state.checked_sub(first).filter(|&axis| axis < 3))
         };
@@ -214,7 +214,7 @@ impl BudgetSource {
         }
     }
 
-    pub(super) fn of_driver(driver: Driver) -> Self {
+    pub(in crate::calibration) fn of_driver(driver: Driver) -> Self {
         match driver {
             Driver::White(Sensor::Gyro) => Self::GyroNoise,
             Driver::White(Sensor::Accel) => Self::AccelNoise,
@@ -228,7 +228,7 @@ impl BudgetSource {
     }
 
     /// What is learnt of it from a record, if anything is.
-    pub(super) fn learnt(self) -> &'static [Source] {
+    pub(in crate::calibration) fn learnt(self) -> &'static [Source] {
         match self {
             Self::GyroNoise => &[Source::AngleRandomWalk],
             Self::AccelNoise => &[Source::VelocityRandomWalk],

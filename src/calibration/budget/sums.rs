@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use super::super::parameters::{PARAMETERS, ParameterMatrix};
-use super::super::pass::Effect;
 use super::source::BudgetSource;
+use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
+use crate::calibration::pass::Effect;
 
 /// Effects that are multiplied out at once.
 const AT_ONCE: usize = 256;
 
 /// What independent errors of unit variance do, by source.
 #[derive(Default)]
-pub(super) struct Sums(BTreeMap<BudgetSource, Sum>);
+pub struct Sums(BTreeMap<BudgetSource, Sum>);
 
 struct Sum {
     /// Effects not yet in the covariance, a column each.

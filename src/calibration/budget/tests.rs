@@ -1,8 +1,8 @@
-use super::super::innovation::Innovation;
-use super::super::model::Model;
-use super::super::pass::{Gate, Mode, PassResult, pass};
-use super::super::{ErrorTerm, NoisePolicy, Options, estimate};
 use super::*;
+use crate::calibration::checks::innovation::Innovation;
+use crate::calibration::model::Model;
+use crate::calibration::pass::{Gate, Mode, PassResult, pass};
+use crate::calibration::{ErrorTerm, NoisePolicy, Options, estimate};
 use crate::imu::{Sensor, Term};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;

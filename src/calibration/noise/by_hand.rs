@@ -2,13 +2,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::finding::Finding;
-use super::super::model::Model;
-use super::super::problem::Problem;
 use super::learn::{FALSE_ALARM, INTERVAL};
 use super::likelihood_ratio::limit;
 use super::report::{NoiseReport, SourceFigures};
 use super::source::Source;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::model::Model;
+use crate::calibration::problem::Problem;
 
 /// Longest step of ln of a variance.
 const LONGEST: f64 = 3.0;
@@ -18,11 +18,10 @@ const SETTLED: f64 = 0.01;
 const STEPS: usize = 40;
 
 /// What a hand may add: to the attitude in moves, of either kind, and in dwells.
-pub(in crate::calibration) const BY_HAND: [Source; 3] =
-    [Source::GyroMotion, Source::GyroMoving, Source::Turning];
+pub const BY_HAND: [Source; 3] = [Source::GyroMotion, Source::GyroMoving, Source::Turning];
 
 /// How much of each of [`BY_HAND`] is in errors, where that is one in SI and radians.
-pub(in crate::calibration) type Parts = [DVector<f64>; BY_HAND.len()];
+pub type Parts = [DVector<f64>; BY_HAND.len()];
 
 /// Noise that makes errors likelier than what is stated does.
 ///
@@ -30,7 +29,7 @@ pub(in crate::calibration) type Parts = [DVector<f64>; BY_HAND.len()];
 /// where there are hardly more equations than parameters: these then explain any noise, by values that the prior
 /// calls unlikely.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::calibration) struct ByHand {
+pub struct ByHand {
     found: Vec<Found>,
     /// −2 ln of the likelihood ratio of stated noise to this.
     ratio: f64,

@@ -1,24 +1,24 @@
 //! The variance of every source, over a reference.
 
-use super::super::model::Model;
-use super::super::problem::Problem;
-use super::super::schedule::step_length;
 use super::replay::Moves;
 use super::source::Source;
+use crate::calibration::model::Model;
+use crate::calibration::problem::Problem;
+use crate::calibration::record::schedule::step_length;
 use crate::imu::Sensor;
 use crate::run::Aiding;
 
 /// Number of sources.
-pub(super) const SOURCES: usize = Source::ALL.len();
+pub const SOURCES: usize = Source::ALL.len();
 
 /// Variance of each source over its reference, in the order of [`Source::ALL`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Factors(pub [f64; SOURCES]);
+pub struct Factors(pub [f64; SOURCES]);
 
 /// What variances are counted in: what is stated; for what is not, as much as the stated random walks
 /// make of the same.
 #[derive(Debug, Clone)]
-pub(super) struct Scale {
+pub struct Scale {
     /// Reference variance of each source in SI and radians; zero where the run cannot have it.
     reference: [f64; SOURCES],
     /// Whether a figure that is not zero is stated, of what the run can have.

@@ -8,13 +8,13 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::error::CalibrationError;
-use super::super::problem::Problem;
 use super::factors::{Factors, SOURCES, Scale};
 use super::replay::{Replay, Script};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::problem::Problem;
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
-pub(in crate::calibration) const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
+pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 /// Step of ln σ, or of a variance that is zero over its reference, for differences.
 const DIFFERENCE: f64 = 1e-3;
 /// A variance that is not stated and below this of its reference is none.
@@ -29,7 +29,7 @@ const SHORTEST: f64 = 0.01;
 const STEPS: usize = 40;
 
 /// The likelihood of noise at one point of linearisation.
-pub(super) struct Likelihood<'a> {
+pub struct Likelihood<'a> {
     pub problem: &'a Problem<'a>,
     pub script: &'a Script<'a>,
     pub scale: &'a Scale,
@@ -39,7 +39,7 @@ pub(super) struct Likelihood<'a> {
 
 /// A point with gradient and expected information of −½ of the deviance, by ln σ of a factor that is
 /// above zero, else by its variance over its reference.
-pub(super) struct Slope {
+pub struct Slope {
     pub here: Replay,
     pub score: DVector<f64>,
     pub information: DMatrix<f64>,
@@ -47,7 +47,7 @@ pub(super) struct Slope {
 
 /// The factors of largest posterior density.
 #[derive(Debug, Clone)]
-pub(super) struct Fit {
+pub struct Fit {
     pub factors: Factors,
     /// −2 ln of the likelihood there, without the prior of factors.
     pub deviance: f64,

@@ -1,15 +1,5 @@
 //! From a calibration with stated noise to one with the noise that its data show.
 
-use super::super::error::CalibrationError;
-use super::super::innovation::{Innovation, Observation};
-use super::super::iterations::{Iterated, iterate};
-use super::super::linearisation::AttitudePrior;
-use super::super::model::Model;
-use super::super::outcome::Pass;
-use super::super::parameters::ParameterMatrix;
-use super::super::pass::Gate;
-use super::super::problem::Problem;
-use super::super::schedule::Step;
 use super::factors::{Factors, Scale};
 use super::fit::{Fit, Likelihood};
 use super::likelihood_ratio::limit;
@@ -18,9 +8,19 @@ use super::replay::Script;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
 use super::selection::Selection;
 use super::source::Source;
+use crate::calibration::checks::innovation::{Innovation, Observation};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::iterations::{Iterated, iterate};
+use crate::calibration::linearisation::AttitudePrior;
+use crate::calibration::model::Model;
+use crate::calibration::outcome::Pass;
+use crate::calibration::parameters::ParameterMatrix;
+use crate::calibration::pass::Gate;
+use crate::calibration::problem::Problem;
+use crate::calibration::record::schedule::Step;
 
 /// Chance that stated figures which are right are given up; each of the two tests has half of it.
-pub(super) const FALSE_ALARM: f64 = 1e-3;
+pub const FALSE_ALARM: f64 = 1e-3;
 /// Chance that the score test calls for a likelihood ratio which it does not need. The score of a variance
 /// is as skewed as χ², so it does not decide; but it costs no fit.
 const SCREEN: f64 = 0.05;
@@ -36,11 +36,11 @@ const ENOUGH: usize = 1000;
 /// and attitude from random walk at all.
 const LONGEST: usize = 10;
 /// Half of a 95 % interval in σ, and what 95 % stay below.
-pub(super) const INTERVAL: f64 = 1.96;
+pub const INTERVAL: f64 = 1.96;
 const ONE_SIDED: f64 = 1.645;
 
 /// A calibration with the noise of its record.
-pub(in crate::calibration) struct Learnt {
+pub struct Learnt {
     pub model: Model,
     pub iterated: Iterated,
     pub report: NoiseReport,
@@ -61,7 +61,7 @@ impl Learnt {
 }
 
 /// Keeps stated noise or learns it, as the problem's options say, from what converged with it.
-pub(in crate::calibration) fn learn(
+pub fn learn(
     problem: &Problem,
     priors: &[AttitudePrior],
     stated: Iterated,

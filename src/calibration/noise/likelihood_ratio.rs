@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// either way and `one_sided` ones are at zero, which they cannot go below: a mixture of χ², in which
 /// each of the latter counts half of the time (Self and Liang 1987, J. Am. Stat. Assoc. 82(398), case 9,
 /// with factors that are not correlated).
-pub(super) fn limit(two_sided: usize, one_sided: usize, false_alarm: f64) -> f64 {
+pub fn limit(two_sided: usize, one_sided: usize, false_alarm: f64) -> f64 {
     let beyond = |limit: f64| -> f64 {
         let mut weight = 0.5f64.powi(one_sided as i32);
         let mut chance = 0.0;

@@ -6,7 +6,6 @@
 //! is in the [`super::Model`], so that every later pass has it.
 
 mod by_hand;
-mod events;
 mod factors;
 mod fit;
 mod learn;
@@ -19,10 +18,10 @@ mod selection;
 mod source;
 mod uncertainty;
 
-pub(super) use by_hand::{BY_HAND, ByHand, Parts};
-pub(super) use events::{Event, Events};
-pub(super) use fit::LOG_SIGMA;
-pub(super) use learn::{Learnt, learn};
+pub use crate::calibration::record::events::{Event, Events};
+pub use by_hand::{BY_HAND, ByHand, Parts};
+pub use fit::LOG_SIGMA;
+pub use learn::{Learnt, learn};
 pub use policy::NoisePolicy;
 pub use report::{NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;

@@ -1,19 +1,19 @@
 //! A pass with the linearisation held, of which navigation is done once and the filter as often as noise
 //! is tried.
 
-use super::super::error::CalibrationError;
-use super::super::linearisation::{AttitudePrior, Linearisation};
-use super::super::model::Model;
-use super::super::pass::{
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::{AttitudePrior, Linearisation};
+use crate::calibration::model::Model;
+use crate::calibration::pass::{
     Dwells, Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict,
     begin,
 };
-use super::super::problem::{Problem, Stretch};
-use super::events::{Event, Events, Rest};
+use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::record::events::{Event, Events, Rest};
 use crate::imu::{PerSensor, Sensor};
 
 /// What a pass does at one point of linearisation, whatever the noise.
-pub(in crate::calibration) struct Script<'a> {
+pub struct Script<'a> {
     at: &'a Linearisation,
     priors: &'a [AttitudePrior],
     /// Of each stretch.
@@ -22,7 +22,7 @@ pub(in crate::calibration) struct Script<'a> {
 
 /// What the noise of moves grows with, over all moves.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::calibration) struct Moves {
+pub struct Moves {
     /// s
     pub duration: f64,
     /// ∫|ω − ω_ie|² dt and ∫|f + g|² dt.
@@ -30,7 +30,7 @@ pub(in crate::calibration) struct Moves {
 }
 
 /// A replay's innovations.
-pub(in crate::calibration) struct Replay {
+pub struct Replay {
     /// Of observations that were let in, in order.
     pub scalars: Vec<ScalarInnovation>,
     /// Squared whitened innovation of every observation of three components, let in or not.

@@ -70,7 +70,7 @@ pub struct SourceFigures {
 
 impl NoiseReport {
     /// Noise as stated, not tested.
-    pub(super) fn stated(policy: NoisePolicy, test: Option<NoiseTest>) -> Self {
+    pub(in crate::calibration) fn stated(policy: NoisePolicy, test: Option<NoiseTest>) -> Self {
         Self {
             policy,
             learnt: false,

@@ -6,17 +6,17 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::error::CalibrationError;
 use super::factors::Factors;
 use super::fit::{Fit, Likelihood, Slope};
 use super::likelihood_ratio::limit;
+use crate::calibration::error::CalibrationError;
 
 /// Chance that a source leaves what is stated though it is right, beside others that are wrong.
 const FALSE_ALARM: f64 = 0.05;
 
 /// Sources that are no longer as stated, and their factors.
 #[derive(Debug, Clone)]
-pub(super) struct Selection {
+pub struct Selection {
     pub fit: Fit,
     pub sources: Vec<usize>,
 }

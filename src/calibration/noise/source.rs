@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::model::Model;
-use super::super::problem::Problem;
+use crate::calibration::model::Model;
+use crate::calibration::problem::Problem;
 use crate::imu::{GaussMarkov, PerSensor, Sensor};
 use crate::navigation::ProcessNoise;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};
@@ -105,7 +105,7 @@ impl Source {
     }
 
     /// Whether the run states a figure of it that is not zero.
-    pub(super) fn stated(self, problem: &Problem) -> bool {
+    pub(in crate::calibration) fn stated(self, problem: &Problem) -> bool {
         match self {
             Self::Velocity | Self::Attitude => {
                 let sensor = match self {
@@ -121,7 +121,7 @@ impl Source {
 
     /// Its σ in the model of a problem, in SI and radians; the smallest unrest that is ever taken counts
     /// as none.
-    pub(super) fn sigma(self, problem: &Problem) -> f64 {
+    pub(in crate::calibration) fn sigma(self, problem: &Problem) -> f64 {
         let model = &problem.model;
         let gauss_markov = |sensor| {
             model
@@ -148,7 +148,7 @@ impl Source {
     }
 
     /// Sets its σ, in SI and radians. A bias that is not stated to vary gets the given correlation time.
-    pub(super) fn set(self, model: &mut Model, sigma: f64, correlation_time: f64) {
+    pub(in crate::calibration) fn set(self, model: &mut Model, sigma: f64, correlation_time: f64) {
         match self {
             Self::AngleRandomWalk => model.noise.gyro.random_walk = sigma,
             Self::VelocityRandomWalk => model.noise.accel.random_walk = sigma,

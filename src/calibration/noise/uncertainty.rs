@@ -3,14 +3,14 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::super::error::CalibrationError;
-use super::super::iterations::Iterated;
-use super::super::linearisation::AttitudePrior;
-use super::super::parameters::{ParameterMatrix, to_vector};
-use super::super::pass::{Gate, Mode, pass};
-use super::super::problem::Problem;
 use super::factors::Factors;
 use super::fit::Likelihood;
+use crate::calibration::error::CalibrationError;
+use crate::calibration::iterations::Iterated;
+use crate::calibration::linearisation::AttitudePrior;
+use crate::calibration::parameters::{ParameterMatrix, to_vector};
+use crate::calibration::pass::{Gate, Mode, pass};
+use crate::calibration::problem::Problem;
 
 impl Likelihood<'_> {
     /// Mean square by which the parameters would be others with other noise, as likely as the record leaves it.

@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::Filter;
 use super::mode::Mode;
+use crate::calibration::filter::Filter;
 
 /// States as data up to then show them, with what later data add by way of the constants that all share.
 ///
 /// Source: Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
 /// §1.4.14: what is learnt of the constants goes to the states by their regression.
 #[derive(Debug, Clone)]
-pub(super) struct Earlier {
+pub struct Earlier {
     pub mean: DVector<f64>,
     pub covariance: DMatrix<f64>,
     /// Mean and covariance of the constants then.

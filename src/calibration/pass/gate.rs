@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::filter::{Innovations, Observer, Verdict};
 use super::mode::{Gate, Mode};
-use super::segment::Seen;
-use crate::calibration::innovation::{Innovation, Observation};
+use crate::calibration::checks::innovation::{Innovation, Observation};
+use crate::calibration::filter::{Innovations, Observer, Verdict};
 use crate::calibration::model::Model;
 use crate::calibration::problem::Stretch;
+use crate::calibration::record::segment::Seen;
 
 /// After this many rejections in a row the gate doubts itself rather than the data.
 const REOPEN: usize = 5;
@@ -19,7 +19,7 @@ const MOST_CLOSING: usize = 3;
 
 /// What the gate remembers of a dwell.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Memory {
+pub struct Memory {
     /// Number of the dwell's first innovation.
     first: usize,
     /// Rejections in a row of each kind of observation.
@@ -29,7 +29,7 @@ pub(super) struct Memory {
 }
 
 /// Judges the innovations of a dwell.
-pub(super) struct Judge<'a> {
+pub struct Judge<'a> {
     pub stretch: &'a Stretch<'a>,
     pub model: &'a Model,
     pub mode: Mode<'a>,

@@ -1,42 +1,33 @@
 //! One pass of the filter over all stretches: with feedback as it goes, or linearised at a given point.
 
-mod courses;
 mod earlier;
-mod filter;
 mod gate;
-mod given;
-mod linear;
-mod local;
-mod measurement;
 mod mode;
 mod posteriors;
 mod result;
-mod rows;
-mod segment;
-mod sensitivity;
 mod stretch;
 
 use super::error::CalibrationError;
 use super::linearisation::{AttitudePrior, Linearisation, Start};
 use super::model::Model;
 use super::problem::{Problem, Stretch};
-use earlier::Earlier;
-pub(super) use filter::{
+pub use crate::calibration::filter::measurement::{Measurement, ScalarInnovation};
+pub use crate::calibration::filter::{
     Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Since,
     Taken, Told, Verdict,
 };
-pub(super) use measurement::{Measurement, ScalarInnovation};
-pub(super) use mode::{Gate, Mode};
+pub use crate::calibration::record::segment::{Seen, Segment, Segments, moves, segments};
+use earlier::Earlier;
+pub use mode::{Gate, Mode};
 use posteriors::Posteriors;
 use result::Sums;
 pub use result::{Epoch, Own};
-pub(super) use result::{PassResult, Tried};
-pub(super) use segment::{Seen, Segment, Segments, moves, segments};
+pub use result::{PassResult, Tried};
 use stretch::OneStretch;
-pub(super) use stretch::navigator;
+pub use stretch::navigator;
 
 /// A pass over all stretches of a problem, `priors` what is known of the initial attitude of each.
-pub(super) fn pass(
+pub fn pass(
     problem: &Problem,
     priors: &[AttitudePrior],
     at: &Linearisation,
@@ -46,7 +37,7 @@ pub(super) fn pass(
 }
 
 /// The same, and what auxiliary parameters that are no states would do to it.
-pub(super) fn pass_trying(
+pub fn pass_trying(
     problem: &Problem,
     priors: &[AttitudePrior],
     at: &Linearisation,
@@ -108,7 +99,7 @@ pub(super) fn pass_trying(
 }
 
 /// A stretch begins after another: what is of another recording or site starts anew.
-pub(super) fn begin(
+pub fn begin(
     filter: &mut Filter,
     model: &Model,
     before: Option<&Stretch>,

@@ -1,10 +1,10 @@
 //! How a pass treats its estimates, and which observations it lets in.
 
-use crate::calibration::innovation::Innovation;
+use crate::calibration::checks::innovation::Innovation;
 
 /// How a pass treats its estimates and its gate.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::calibration) enum Mode<'a> {
+pub enum Mode<'a> {
     /// Estimates are fed back as they come.
     Feedback,
     /// Linearisation is held at the given point.
@@ -13,7 +13,7 @@ pub(in crate::calibration) enum Mode<'a> {
 
 /// Which observations a pass lets in.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::calibration) enum Gate<'a> {
+pub enum Gate<'a> {
     /// All.
     Open,
     /// Those that its innovations do not make outliers.

@@ -1,6 +1,6 @@
 //! What is known of the constants as dwells go by.
 
-use crate::calibration::dwell_scatter::Posterior;
+use crate::calibration::checks::dwell_scatter::Posterior;
 
 /// So many are kept at least once there are as many: a dwell that tells a smaller part of all says little by
 /// itself, and with its neighbours as much.
@@ -9,7 +9,7 @@ const FEWEST: usize = 256;
 /// What is known of the constants before the first dwell and after each; where there are very many, after each
 /// so many, and after the last.
 #[derive(Debug, Clone)]
-pub(super) struct Posteriors {
+pub struct Posteriors {
     kept: Vec<Posterior>,
     /// Of the last dwell, where it is not kept.
     last: Option<Posterior>,

@@ -3,23 +3,23 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::earlier::Earlier;
-use super::filter::{Dwells, Filter};
 use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
-use crate::calibration::curvature::curvature;
-use crate::calibration::day_to_day::Difference;
-use crate::calibration::dwell_scatter::Posterior;
+use crate::calibration::budget::curvature::curvature;
+use crate::calibration::checks::dwell_scatter::Posterior;
+use crate::calibration::checks::innovation::Innovation;
+use crate::calibration::checks::observability::AttitudeCovariance;
 use crate::calibration::estimate::Estimate;
-use crate::calibration::innovation::Innovation;
+use crate::calibration::filter::{Dwells, Filter};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::model::Model;
-use crate::calibration::observability::AttitudeCovariance;
 use crate::calibration::parameters::{
     PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };
-use crate::calibration::thermal::{Coefficient, Thermal};
+use crate::calibration::several::day_to_day::Difference;
+use crate::calibration::several::thermal::{Coefficient, Thermal};
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients};
 use crate::turntable::TABLE_GEOMETRY;
 
@@ -36,7 +36,7 @@ pub struct Epoch {
 
 /// What a pass gives.
 #[derive(Debug, Clone)]
-pub(in crate::calibration) struct PassResult {
+pub struct PassResult {
     /// Where it linearised; in a pass with feedback, at its end.
     pub at: Linearisation,
     /// The estimate: where the next pass linearises.
@@ -86,7 +86,7 @@ impl PassResult {
 
 /// What auxiliary parameters that are no states of a pass would do to it.
 #[derive(Debug, Clone)]
-pub(in crate::calibration) struct Tried {
+pub struct Tried {
     /// Their information from the data alone.
     pub information: DMatrix<f64>,
     /// Gradient of ln of the likelihood where they are zero.
@@ -105,7 +105,7 @@ pub struct Own {
 }
 
 /// What a pass has come to so far.
-pub(super) struct Sums {
+pub struct Sums {
     pub at: Linearisation,
     pub filter: Filter,
     pub dwells: Dwells,

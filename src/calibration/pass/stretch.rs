@@ -2,20 +2,20 @@
 
 use nalgebra::Matrix3;
 
-use super::filter::{Filter, Taken};
 use super::gate::{Judge, Memory};
-use super::measurement::Measurement;
 use super::mode::Mode;
 use super::result::Sums;
-use super::segment::{Segment, moves, segments};
 use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
+use crate::calibration::filter::measurement::Measurement;
+use crate::calibration::filter::{Filter, Taken};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{from_vector, to_vector};
 use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::schedule::{AtRest, Step};
+use crate::calibration::record::schedule::{AtRest, Step};
+use crate::calibration::record::segment::{Segment, moves, segments};
 use crate::navigation::{Navigator, State, TermValues};
 
 /// Spacing of the history, s …
@@ -24,7 +24,7 @@ const EPOCH: f64 = 1.0;
 const EPOCHS: f64 = 3600.0;
 
 /// A pass within a stretch.
-pub(super) struct OneStretch<'a> {
+pub struct OneStretch<'a> {
     problem: &'a Problem<'a>,
     stretch: &'a Stretch<'a>,
     number: usize,
@@ -51,7 +51,7 @@ struct Begin<'a> {
 }
 
 /// Navigation through a stretch from this initial attitude on.
-pub(in crate::calibration) fn navigator<'a>(
+pub fn navigator<'a>(
     stretch: &Stretch<'a>,
     at: &Linearisation,
     initial: &Matrix3<f64>,

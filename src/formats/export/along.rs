@@ -148,7 +148,7 @@ impl Remainder {
 pub(super) fn upper(a: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
     let reversed = reverse * a * reverse;
-    let rotation = crate::calibration::frame::accelerometer_frame(&reversed);
+    let rotation = crate::calibration::result::frame::accelerometer_frame(&reversed);
     let rotation = reverse * rotation * reverse;
     let mut upper = a * rotation.transpose();
     // Below the diagonal there is only rounding.

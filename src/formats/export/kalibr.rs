@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Exported;
 use super::source::{Document, Source, divide, yaml_list, yaml_number};
-use crate::calibration::frame::accelerometer_frame;
+use crate::calibration::result::frame::accelerometer_frame;
 use crate::imu::{Noise, PerSensor, Sensor, Term};
 use crate::units::ARCSEC;
 

@@ -13,7 +13,7 @@ use super::Exported;
 use super::along::{Along, upper};
 use super::kalibr::{self, lower};
 use super::source::{Document, Source, yaml_list};
-use crate::calibration::frame::accelerometer_frame;
+use crate::calibration::result::frame::accelerometer_frame;
 use crate::imu::{PerSensor, Sensor, Term};
 
 /// Which triangle intrinsics are kept in.

@@ -1,0 +1,121 @@
+//! Parameters that change while the closed form's positions are visited.
+
+use nalgebra::DMatrix;
+
+use super::finding::Finding;
+use super::residuals::Residuals;
+use crate::imu::{AXES, ParameterKind, Sensor};
+use crate::statistics::chi_square_limit;
+use crate::units::{DEG_PER_H, MICRO_G, PPM};
+
+/// Chance that a run whose parameters stay rings, of both kinds of both triads.
+const FALSE_ALARM: f64 = 1e-3 / 4.0;
+
+/// How one kind of a triad's parameters makes the residuals' equations.
+pub struct Changing {
+    pub sensor: Sensor,
+    /// Scale or bias.
+    pub kind: ParameterKind,
+    /// The equations' columns of the three axes, as far as they are unknown, in normalised units.
+    pub columns: DMatrix<f64>,
+    /// Which axes those are.
+    pub axes: Vec<usize>,
+}
+
+/// Parameters whose even change in time explains residuals beyond chance, and better than any one position
+/// or turn that is off does.
+///
+/// The likelihoods of two hypotheses differ by the χ² that the change takes away. What lasts from one
+/// position to the next leaves residuals that are each small, so that the sum of all squares may hold.
+pub fn drift(
+    residuals: &Residuals,
+    changing: &[Changing],
+    times: &[f64],
+    without_worst: f64,
+) -> Option<Finding> {
+    let first = times.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let span = last - first;
+    if span.is_nan() || span <= 0.0 {
+        return None;
+    }
+    let least = residuals.chi_square() - without_worst;
+    let each = changing.iter().filter_map(|changing| {
+        let mut columns = changing.columns.clone();
+        for (mut row, time) in columns.row_iter_mut().zip(times) {
+            row *= (time - first) / span - 0.5;
+        }
+        let explained = residuals.explained_by(&columns);
+        let limit = chi_square_limit(explained.degrees as f64, FALSE_ALARM);
+        let rings = explained.degrees > 0 && explained.fall > limit && explained.fall > least;
+        rings.then_some((changing, explained, limit))
+    });
+    let (changing, explained, limit) = each.max_by(|a, b| a.1.fall.total_cmp(&b.1.fall))?;
+    let (parameters, unit, of_one) = match (changing.kind, changing.sensor) {
+        (ParameterKind::Bias, Sensor::Gyro) => ("bias", "°/h", DEG_PER_H),
+        (ParameterKind::Bias, Sensor::Accel) => ("bias", "µg", MICRO_G),
+        _ => ("scale factor", "ppm", PPM),
+    };
+    let axes = changing.axes.iter().zip(&explained.coefficients);
+    Some(Finding::ChangesInTime {
+        of: changing.sensor.name(),
+        parameters,
+        unit,
+        changes: axes
+            .map(|(&axis, change)| (AXES[axis], change / of_one))
+            .collect(),
+        times: [first, last],
+        fall: explained.fall,
+        limit,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::calibration::{Finding, Options, Problem, six_position};
+    use crate::run::Aiding;
+    use crate::simulation::Scenario;
+    use crate::units::{MICRO_G, PPM};
+
+    /// What is said to drift of a run whose accelerometers' rows change by so much over it, m/s² and parts.
+    fn drifts(seed: u64, bias: f64, scale: f64, with_table: bool) -> Option<(&'static str, f64)> {
+        let scenario = Scenario::load("mems").unwrap();
+        let mut run = scenario.simulate(seed, 0).unwrap().run;
+        let imu = &mut run.recording.imu;
+        let (count, period) = (imu.len() as f64, imu.period);
+        for (k, row) in imu.accel.to_mut().iter_mut().enumerate() {
+            let part = k as f64 / count;
+            *row *= 1.0 + scale * part;
+            row.x += bias * part * period;
+        }
+        let aiding = match with_table {
+            true => Aiding::Table,
+            false => Aiding::Velocity,
+        };
+        let problem = Problem::new(&run, &Options::default().aiding(aiding));
+        let findings = six_position(&problem).unwrap().findings;
+        findings.into_iter().find_map(|finding| match finding {
+            Finding::ChangesInTime {
+                parameters,
+                changes,
+                ..
+            } => Some((parameters, changes[0].1)),
+            _ => None,
+        })
+    }
+
+    #[test]
+    fn a_drift_of_biases_or_scale_factors_is_named_with_its_size_and_none_where_they_stay() {
+        for with_table in [true, false] {
+            for seed in 1..=6 {
+                assert_eq!(drifts(seed, 0.0, 0.0, with_table), None, "seed {seed}");
+            }
+            let (what, change) = drifts(1, 5000.0 * MICRO_G, 0.0, with_table).unwrap();
+            assert_eq!(what, "bias");
+            assert!((change - 5000.0).abs() < 1500.0, "{change} µg");
+        }
+        let (what, change) = drifts(1, 0.0, 3000.0 * PPM, true).unwrap();
+        assert_eq!(what, "scale factor");
+        assert!((change - 3000.0).abs() < 1000.0, "{change} ppm");
+    }
+}

@@ -1,0 +1,201 @@
+//! What the dwells say of σ without any model of noise: whether they scatter as much as the covariance of
+//! the estimate says.
+//!
+//! The filter's posterior after each dwell tells what that dwell added: information `ΔI` and a score
+//! `s = Δ(P⁻¹ θ) − ΔI θ̂`. Attitude and velocity that carry over from one dwell to the next are integrated
+//! out, so the scores are those of `p(y_u | y_1 … y_{u−1}, θ)` and independent of each other whatever they
+//! carry. If the model is right the covariance of a score is `ΔI − ΔI P ΔI`; if it is not, the scores show
+//! their own (White 1982, "Maximum likelihood estimation of misspecified models", Econometrica 50(1);
+//! correction of the leverage of few clusters: Bell and McCaffrey 2002, Survey Methodology 28(2)).
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::innovation::mean_square_interval;
+
+/// A direction of which a dwell has less than this part of all information says nothing of the dwell but
+/// rounding.
+const SHARE: f64 = 1e-3;
+/// Chance that scores of a right model are said to be too large.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// Mean and covariance of the constants of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Posterior {
+    pub mean: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+/// How much the dwells scatter, over what the covariance says.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DwellScatter {
+    /// Mean of squared scores, each over its σ; one if σ are true.
+    pub mean: f64,
+    /// How many scores.
+    pub count: usize,
+    /// What the mean stays below in 999 runs of 1000 if σ are true.
+    pub limit: f64,
+    /// Difference of the estimate from the first half of the dwells and that from the second: squared,
+    /// over its covariance, for each of its directions; one if σ are true …
+    pub halves: f64,
+    /// … with its 95 % interval.
+    pub halves_interval: (f64, f64),
+}
+
+/// The scores of dwells in units in which the covariance of the estimate is the identity.
+pub struct DwellScores {
+    pub scatter: DwellScatter,
+    /// Square root of the covariance of the estimate, each constant in units of its σ.
+    root: DMatrix<f64>,
+    /// Covariance of the estimate by the scores' own scatter.
+    robust: DMatrix<f64>,
+}
+
+impl DwellScores {
+    /// Of the posteriors after each dwell, the last that of the estimate; none if there are too few to say
+    /// anything.
+    pub fn new(prior: &Posterior, after: &[Posterior]) -> Option<Self> {
+        let last = after.last()?;
+        let n = last.mean.len();
+        let sigma = last.covariance.diagonal().map(f64::sqrt);
+        let over_sigma =
+            |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(i, j)] / (sigma[i] * sigma[j]));
+        let root = over_sigma(&last.covariance).cholesky()?.unpack();
+        // Information and its product with the mean, from the final mean on.
+        let whitened = |posterior: &Posterior| {
+            let factor = over_sigma(&posterior.covariance).cholesky()?;
+            let information = root.tr_mul(&factor.solve(&root));
+            let off = (&posterior.mean - &last.mean).component_div(&sigma);
+            Some((information, root.tr_mul(&factor.solve(&off))))
+        };
+        let mut squares = Vec::new();
+        let mut robust = DMatrix::zeros(n, n);
+        let mut before = whitened(prior)?;
+        let mut middle = None;
+        for (number, posterior) in after.iter().enumerate() {
+            let now = whitened(posterior)?;
+            let (gained, score) = (&now.0 - &before.0, &now.1 - &before.1);
+            let eigen = gained.symmetric_eigen();
+            let mut corrected = DVector::zeros(n);
+            for (share, direction) in eigen
+                .eigenvalues
+                .iter()
+                .zip(eigen.eigenvectors.column_iter())
+            {
+                if !(SHARE..1.0 - SHARE).contains(share) {
+                    continue;
+                }
+                let along = direction.dot(&score);
+                squares.push(along.powi(2) / (share * (1.0 - share)));
+                corrected.axpy(along / (1.0 - share).sqrt(), &direction, 1.0);
+            }
+            robust.ger(1.0, &corrected, &corrected, 1.0);
+            if number + 1 == after.len() / 2 {
+                middle = Some(now.clone());
+            }
+            before = now;
+        }
+        // What the estimate takes of the scores they do not have: as many as there are constants that
+        // dwells, and not what was known before, determine.
+        let constants = n as f64 - whitened(prior)?.0.trace();
+        let freedom = squares.len() as f64 - constants;
+        if freedom < 1.0 {
+            return None;
+        }
+        let (_, limit) = mean_square_interval(freedom as usize, 2.0 * FALSE_ALARM);
+        let (halves, directions) = middle.map_or((0.0, 0), |middle| halves(&middle));
+        Some(Self {
+            scatter: DwellScatter {
+                mean: squares.iter().sum::<f64>() / squares.len() as f64,
+                count: squares.len(),
+                limit,
+                halves: halves / directions.max(1) as f64,
+                halves_interval: mean_square_interval(directions, 0.05),
+            },
+            root,
+            robust,
+        })
+    }
+
+    /// Covariance of the estimate over its σ, where the scores say more than the model does as much as
+    /// they say; none if they are not too large.
+    pub fn widened(&self) -> Option<DMatrix<f64>> {
+        if self.scatter.mean <= self.scatter.limit {
+            return None;
+        }
+        let mut eigen = self.robust.clone().symmetric_eigen();
+        eigen.eigenvalues.apply(|value| *value = value.max(1.0));
+        Some(&self.root * eigen.recompose() * self.root.transpose())
+    }
+}
+
+/// Sum of squares of the difference between what the first half says and all, over its σ, and of how many
+/// directions. Both share the first half, so the covariance of their difference is that of the half less
+/// that of all, and the difference is a multiple of that of the two halves.
+fn halves((information, score): &(DMatrix<f64>, DVector<f64>)) -> (f64, usize) {
+    let eigen = information.clone().symmetric_eigen();
+    let directions = eigen
+        .eigenvalues
+        .iter()
+        .zip(eigen.eigenvectors.column_iter());
+    let squares = directions.filter_map(|(&share, direction)| {
+        let seen = (SHARE..1.0 - SHARE).contains(&share);
+        seen.then(|| direction.dot(score).powi(2) / (share * (1.0 - share)))
+    });
+    squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::{Finding, NoisePolicy, Options, Outcome, Problem, estimate};
+    use crate::run::Run;
+    use crate::simulation::Scenario;
+
+    /// Fixed before the first run was made.
+    const SEED: u64 = 13;
+    const RUNS: u64 = 4;
+
+    fn run(number: u64) -> Run {
+        Scenario::load("demo")
+            .unwrap()
+            .simulate(SEED, number)
+            .unwrap()
+            .run
+    }
+
+    fn estimated(run: &Run) -> Outcome {
+        let options = Options::default().noise(NoisePolicy::Stated);
+        estimate(&Problem::new(run, &options), &|_| {}).unwrap()
+    }
+
+    #[test]
+    fn scores_of_a_right_model_are_as_large_as_their_variance() {
+        let all: Vec<DwellScatter> = (0..RUNS)
+            .map(|number| estimated(&run(number)).dwell_scatter.unwrap())
+            .collect();
+        let count: usize = all.iter().map(|scatter| scatter.count).sum();
+        let sum: f64 = all.iter().map(|s| s.mean * s.count as f64).sum();
+        let (low, high) = mean_square_interval(count, 1e-3);
+        let mean = sum / count as f64;
+        println!("{mean:.3} of {count}");
+        assert!((low..high).contains(&mean), "{mean} {low} {high}");
+    }
+
+    #[test]
+    fn positions_worse_than_stated_are_seen_and_sigma_grow_to_them() {
+        let mut run = run(0);
+        let truth = estimated(&run);
+        run.table.position_sigma /= 3.0;
+        let outcome = estimated(&run);
+        let said = |finding: &Finding| matches!(finding, Finding::DwellsScatter { .. });
+        assert!(outcome.findings.iter().any(said));
+        // What positions tell most is again known as well as with the figure that is right.
+        let sigma = |outcome: &Outcome| outcome.estimate.sigma().rows(3, 6).norm();
+        let ratio = sigma(&outcome) / sigma(&truth);
+        let by_noise = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
+        let without = by_noise.rows(3, 6).norm() / sigma(&truth);
+        println!("σ of gyro E over those with the right figure: {ratio:.2}, by noise {without:.2}");
+        assert!(without < 0.5 && ratio > 0.7, "{without} {ratio}");
+    }
+}

@@ -1,0 +1,114 @@
+//! How unlikely it is that errors which are not there explain so much.
+
+use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::function::gamma::ln_gamma;
+
+use crate::statistics::chi_square_limit;
+
+/// What parameters explain of the data, against what they explain by chance.
+///
+/// By chance the cost falls by `Σ w_k χ²₁`, w_k the share of the prior variance that the data take in the
+/// k-th of independent directions. It is taken for `w χ²` of `Σ w_k / w` states with w the largest: the mean
+/// is right, and the tail as thick as that of the direction that is seen best. Source: MacKay 1992,
+/// "Bayesian interpolation", Neural Computation 4(3), for the number of states that data determine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// By how much the cost falls with them.
+    pub gain: f64,
+    /// Share of the prior variance that the data take in the direction that they show best.
+    share: f64,
+    /// States that the data determine.
+    states: f64,
+}
+
+impl Evidence {
+    /// Of parameters with this gain, covariance and prior σ.
+    pub fn new(gain: f64, covariance: &DMatrix<f64>, prior_sigma: &[f64]) -> Self {
+        let n = prior_sigma.len();
+        let taken = DMatrix::from_fn(n, n, |i, j| {
+            let left = covariance[(i, j)] / (prior_sigma[i] * prior_sigma[j]);
+            f64::from(u8::from(i == j)) - left
+        });
+        let total = taken.trace().max(0.0);
+        let share = taken.symmetric_eigenvalues().max();
+        Self {
+            gain,
+            share,
+            states: if share > 0.0 { total / share } else { 0.0 },
+        }
+    }
+
+    /// −2 ln of the chance of so much by chance alone; zero where the data show nothing of it.
+    pub fn significance(&self) -> f64 {
+        if self.states > 0.0 {
+            -2.0 * ln_survival(self.states, self.gain / self.share)
+        } else {
+            0.0
+        }
+    }
+
+    /// What the gain stays below but for this chance.
+    pub fn limit(&self, chance: f64) -> f64 {
+        self.share * chi_square_limit(self.states, chance)
+    }
+}
+
+/// ln of the chance that χ² with this many degrees of freedom is above `x`, however small it is.
+pub fn ln_survival(freedom: f64, x: f64) -> f64 {
+    let (a, z) = (0.5 * freedom, 0.5 * x);
+    if z < a + 1.0 {
+        return ChiSquared::new(freedom).map_or(0.0, |chi2| chi2.sf(x.max(0.0)).ln());
+    }
+    // Continued fraction of the incomplete gamma function, NIST Digital Library of Mathematical
+    // Functions, §8.9.2, by Lentz's method.
+    const TINY: f64 = 1e-300;
+    const TERMS: usize = 1000;
+    let mut b = z + 1.0 - a;
+    let mut c = 1.0 / TINY;
+    let mut d = 1.0 / b;
+    let mut fraction = d;
+    for k in 1..TERMS {
+        let k = k as f64;
+        let numerator = -k * (k - a);
+        b += 2.0;
+        let bounded = |value: f64| if value.abs() < TINY { TINY } else { value };
+        d = 1.0 / bounded(numerator * d + b);
+        c = bounded(b + numerator / c);
+        fraction *= d * c;
+        if (d * c - 1.0).abs() < f64::EPSILON {
+            break;
+        }
+    }
+    a * z.ln() - z - ln_gamma(a) + fraction.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn the_tail_of_chi_squared_is_right_where_it_can_be_represented_and_goes_on_beyond() {
+        for freedom in [0.7, 1.0, 3.0, 24.0] {
+            let chi2 = ChiSquared::new(freedom).unwrap();
+            for x in [0.1, 1.0, 10.0, 30.0, 300.0] {
+                let expected = chi2.sf(x).ln();
+                assert_relative_eq!(ln_survival(freedom, x), expected, max_relative = 1e-9);
+            }
+        }
+        // Two degrees of freedom: exp(−x/2).
+        assert_relative_eq!(ln_survival(2.0, 1e5), -5e4, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn what_data_hardly_show_takes_little_to_be_significant_and_counts_as_few_states() {
+        let prior = [1.0; 4];
+        let covariance =
+            DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[0.01, 0.5, 0.99, 0.99]));
+        let evidence = Evidence::new(20.0, &covariance, &prior);
+        assert_relative_eq!(evidence.states, 1.51 / 0.99, max_relative = 1e-12);
+        let chance = (-0.5 * evidence.significance()).exp();
+        assert_relative_eq!(evidence.limit(chance), 20.0, max_relative = 1e-6);
+    }
+}

@@ -1,0 +1,164 @@
+//! What biases do that may vary without the record showing it.
+
+use rayon::prelude::*;
+
+use super::joint::once_more;
+use super::{ErrorTermTest, Role};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::error_term::ErrorTerm;
+use crate::calibration::model::usual_variation;
+use crate::calibration::noise::LOG_SIGMA;
+use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::ParameterMatrix;
+use crate::calibration::pass::PassResult;
+use crate::calibration::problem::Problem;
+use crate::imu::{GaussMarkov, Noise, Sensor};
+use crate::run::Aiding;
+
+/// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one …
+const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
+/// … and its correlation time.
+const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
+
+/// What the covariance of an estimate lacks for biases of a triad that may vary though its record does not
+/// call for it; none where the noise is the stated one, where biases of both triads vary in it, or where a table is
+/// read, whose attitudes show how biases vary.
+///
+/// A short record hardly tells a bias that varies slowly from one that does not, and the likelihood that
+/// chose the noise takes the simpler of the two. Where the data contradict the stated noise, it is no word
+/// of anybody's that biases are constant: that those of a triad vary is then as likely as not before the
+/// data, with σ and correlation time lognormal about the usual ones, as any stated figure is about its own.
+/// The mean square error of the estimate is that of all these models, each as likely as the data leave it
+/// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::test_error_terms`]).
+///
+/// # Errors
+/// [`CalibrationError`] where the problem is not the one of the outcome.
+pub fn unseen_variation(
+    problem: &Problem,
+    outcome: &Outcome,
+    tests: &[ErrorTermTest],
+) -> Result<Option<ParameterMatrix>, CalibrationError> {
+    let seen =
+        |test: &ErrorTermTest| test.term == ErrorTerm::GaussMarkovBias && test.role != Role::None;
+    let table = problem.model.aiding == Aiding::Table;
+    if table || !outcome.noise.learnt || tests.iter().any(seen) {
+        return Ok(None);
+    }
+    let stated = &problem.model.noise;
+    let problem = &outcome.as_calibrated(problem);
+    let constant = |&sensor: &Sensor| problem.model.noise.get(sensor).gauss_markov.is_none();
+    let sensors: Vec<Sensor> = Sensor::ALL.into_iter().filter(constant).collect();
+    if sensors.is_empty() {
+        return Ok(None);
+    }
+    let own = once_more(problem, outcome, &[])?;
+    let of_sensors = sensors.par_iter().map(|&sensor| {
+        let stated = stated.get(sensor);
+        of_one(problem, outcome, &own, sensor, stated)
+    });
+    let of_sensors: Vec<ParameterMatrix> = of_sensors.collect();
+    Ok(Some(of_sensors.into_iter().sum()))
+}
+
+/// The same of biases of one triad.
+fn of_one(
+    problem: &Problem,
+    outcome: &Outcome,
+    own: &PassResult,
+    sensor: Sensor,
+    stated: &Noise,
+) -> ParameterMatrix {
+    let usual = usual_variation(stated);
+    let deviance = |result: &PassResult| result.cost + result.log_determinant;
+    let density = |z: &f64| (-0.5 * z * z).exp();
+    let sum_of = |nodes: &[f64]| -> f64 { nodes.iter().map(density).sum() };
+    let all = sum_of(&SIGMAS) * sum_of(&TIMES);
+    let (mut weights, mut sum) = (1.0, ParameterMatrix::zeros());
+    for (sigma, time) in SIGMAS
+        .iter()
+        .flat_map(|s| TIMES.iter().map(move |t| (s, t)))
+    {
+        let mut model = problem.model.clone();
+        model.noise.get_mut(sensor).gauss_markov = Some(GaussMarkov {
+            sigma: usual.sigma * (sigma * LOG_SIGMA).exp(),
+            correlation_time: usual.correlation_time * (time * LOG_SIGMA).exp(),
+        });
+        // What the filter cannot run with is not likely.
+        let Ok(with) = once_more(&problem.with_model(model), outcome, &[]) else {
+            continue;
+        };
+        let ratio = (0.5 * (deviance(own) - deviance(&with))).exp();
+        let weight = ratio * density(sigma) * density(time) / all;
+        if weight.is_finite() {
+            weights += weight;
+            sum += with.added_to(own) * weight;
+        }
+    }
+    sum / weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::parameters::parameter;
+    use crate::calibration::{BudgetSource, Method, NoisePolicy, Options};
+    use crate::run::Run;
+    use crate::simulation::Scenario;
+
+    /// Fixed before the first run was made.
+    const SEED: u64 = 13;
+
+    fn solved(run: &Run, aiding: Aiding, noise: NoisePolicy) -> Outcome {
+        let options = Options::default().aiding(aiding).noise(noise);
+        let problem = Problem::new(run, &options);
+        let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        solution.assess(&problem).unwrap();
+        solution.outcome().unwrap().clone()
+    }
+
+    #[test]
+    fn stated_noise_that_the_data_bear_out_or_a_table_says_that_biases_are_constant() {
+        let run = Scenario::load("demo")
+            .unwrap()
+            .simulate(SEED, 0)
+            .unwrap()
+            .run;
+        for (aiding, noise) in [
+            (Aiding::Velocity, NoisePolicy::Stated),
+            (Aiding::Table, NoisePolicy::Learnt),
+        ] {
+            let outcome = solved(&run, aiding, noise);
+            assert_eq!(outcome.part(BudgetSource::UnseenVariation).amax(), 0.0);
+        }
+    }
+
+    #[test]
+    fn biases_are_less_sure_where_nobody_says_that_they_are_constant_and_nothing_is_surer() {
+        let run = Scenario::load("demo")
+            .unwrap()
+            .simulate(SEED, 0)
+            .unwrap()
+            .run;
+        let outcome = solved(&run, Aiding::Velocity, NoisePolicy::Learnt);
+        let of = outcome.part(BudgetSource::UnseenVariation);
+        let variance = outcome.estimate.covariance.diagonal();
+        let without = variance - of.diagonal();
+        for sensor in Sensor::ALL {
+            if outcome.model.noise.get(sensor).gauss_markov.is_some() {
+                continue;
+            }
+            for bias in (9..12).map(|of_triad| parameter(sensor, of_triad)) {
+                let growth = (variance[bias] / without[bias]).sqrt();
+                println!("σ of bias {bias} grows {growth:.2} times");
+                assert!(growth > 1.0 && growth.is_finite());
+            }
+        }
+        // Of a mean square error no direction is less than without.
+        let over_sigma = ParameterMatrix::from_fn(|i, j| match without[i] * without[j] {
+            0.0 => 0.0,
+            product => of[(i, j)] / product.sqrt(),
+        });
+        let least = over_sigma.symmetric_eigenvalues().min();
+        assert!(least > -1e-3, "{least}");
+    }
+}

@@ -1,0 +1,295 @@
+//! Innovations: what an observation differs from its prediction by, and whether it is as much as its
+//! covariance says.
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// What was observed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Observation {
+    /// Zero velocity.
+    Velocity,
+    /// Attitude of the table.
+    Table,
+    /// Attitude that does not change at standstill, without a table.
+    Attitude,
+}
+
+impl Observation {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Velocity, Self::Table, Self::Attitude];
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Table => "table attitude",
+            Self::Attitude => "attitude at standstill",
+        }
+    }
+}
+
+/// The innovation of one observation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Time, s.
+    pub time: f64,
+    /// What was observed.
+    pub observation: Observation,
+    /// East, North and Up in units of their own σ, independent of each other.
+    pub whitened: [f64; 3],
+    /// Whether the gate let it in.
+    pub accepted: bool,
+    /// Number of the dwell in which it was made.
+    pub dwell: usize,
+    /// Whether what the move before that dwell has done is in it: nothing goes on where rows are lost.
+    pub after_move: bool,
+}
+
+impl Innovation {
+    /// Squared Mahalanobis distance, χ² with three degrees of freedom.
+    pub fn distance(&self) -> f64 {
+        self.whitened.iter().map(|w| w * w).sum()
+    }
+}
+
+/// Normalised innovation squared, apart for each kind of observation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Consistency {
+    /// All observations.
+    pub all: Nis,
+    /// Zero velocity.
+    pub velocity: Nis,
+    /// Attitude of the table.
+    pub table: Nis,
+    /// Attitude that does not change at standstill, without a table.
+    pub attitude: Nis,
+}
+
+impl Consistency {
+    /// The kinds of observation that there are.
+    pub fn kinds(&self) -> impl Iterator<Item = (Observation, Nis)> {
+        let each = [self.velocity, self.table, self.attitude];
+        let all = Observation::ALL.into_iter().zip(each);
+        all.filter(|(_, nis)| nis.count > 0)
+    }
+}
+
+/// Mean of normalised innovations squared.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Nis {
+    /// Mean per scalar observation; one if σ are true. NaN without observations.
+    pub mean: f64,
+    /// Number of scalar observations.
+    pub count: usize,
+    /// 95 % interval of the mean for consistent σ (χ²).
+    pub interval: (f64, f64),
+    /// Correlation of neighbouring innovations, zero if they are white.
+    pub lag_one: f64,
+}
+
+/// Innovations that are looked at apart: what is wrong with a model shows in a few of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Look {
+    /// All that were let in.
+    All,
+    /// The first of each dwell after a move, let in or not: it carries what that has done.
+    AfterMoves,
+    /// Sums over each dwell, each over its σ: they carry what lasts.
+    OverDwells,
+}
+
+impl Look {
+    const ALL: [Self; 3] = [Self::All, Self::AfterMoves, Self::OverDwells];
+
+    /// In words, after what was observed.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::All => "",
+            Self::AfterMoves => " first after each move",
+            Self::OverDwells => " summed over each dwell",
+        }
+    }
+
+    /// What the mean of so many squares stays within but for this chance.
+    ///
+    /// How far the IMU stands from the table's centre is stated as what it stays within, and the velocity after a
+    /// move is uncertain by what that leaves open: innovations that are smaller say nothing against the model.
+    fn limits(self, of: Observation, count: usize, chance: f64) -> (f64, f64) {
+        match (self, of) {
+            (Self::AfterMoves, Observation::Velocity) => {
+                (0.0, mean_square_interval(count, 2.0 * chance).1)
+            }
+            _ => mean_square_interval(count, chance),
+        }
+    }
+
+    /// Squares of independent numbers of σ 1.
+    fn squares(self, of_kind: &[&Innovation]) -> Vec<f64> {
+        let accepted = || of_kind.iter().filter(|i| i.accepted);
+        let dwells = || of_kind.chunk_by(|a, b| a.dwell == b.dwell);
+        match self {
+            Self::All => accepted().flat_map(|i| i.whitened.map(|w| w * w)).collect(),
+            Self::AfterMoves => {
+                let first = dwells().filter_map(|dwell| dwell.first());
+                first
+                    .filter(|innovation| innovation.after_move)
+                    .flat_map(|i| i.whitened.map(|w| w * w))
+                    .collect()
+            }
+            Self::OverDwells => dwells().flat_map(summed).collect(),
+        }
+    }
+}
+
+/// Squares of the sums over a dwell of what was let in, over their variance.
+fn summed(dwell: &[&Innovation]) -> Vec<f64> {
+    let accepted: Vec<_> = dwell.iter().filter(|i| i.accepted).collect();
+    let sum = |axis: usize| accepted.iter().map(|i| i.whitened[axis]).sum::<f64>();
+    match accepted.len() {
+        0 => Vec::new(),
+        n => (0..3).map(|axis| sum(axis).powi(2) / n as f64).collect(),
+    }
+}
+
+/// Innovations that are not as large as their covariance says.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Inconsistency {
+    /// Of what.
+    pub observation: Observation,
+    /// Which of them.
+    pub look: Look,
+    /// Mean of their squares.
+    pub nis: f64,
+    /// How many numbers.
+    pub count: usize,
+    /// What the mean stays within, for all looks at once, in 999 runs of 1000 if σ are true.
+    pub limits: (f64, f64),
+}
+
+/// Chance that any look at a run finds a right model inconsistent.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// The looks at innovations that find them larger or smaller than chance allows.
+pub fn inconsistencies(innovations: &[Innovation]) -> Vec<Inconsistency> {
+    let kinds = Observation::ALL.map(|kind| {
+        let of_kind = innovations.iter().filter(|i| i.observation == kind);
+        (kind, of_kind.collect::<Vec<_>>())
+    });
+    let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
+    let looks = kinds.clone().count() * Look::ALL.len();
+    let looked = kinds.flat_map(|(observation, of_kind)| {
+        Look::ALL.into_iter().map(move |look| {
+            let squares = look.squares(of_kind);
+            let count = squares.len();
+            Inconsistency {
+                observation: *observation,
+                look,
+                nis: squares.iter().sum::<f64>() / count as f64,
+                count,
+                limits: look.limits(*observation, count, FALSE_ALARM / looks as f64),
+            }
+        })
+    });
+    looked
+        .filter(|found| found.nis < found.limits.0 || found.nis > found.limits.1)
+        .collect()
+}
+
+/// Two-sided probability outside the intervals.
+const OUTSIDE: f64 = 0.05;
+
+/// Consistency of a pass: velocity and table apart.
+pub fn consistency(innovations: &[Innovation]) -> Consistency {
+    let of = |kinds: &[Observation]| {
+        nis(innovations
+            .iter()
+            .filter(|i| kinds.contains(&i.observation) && i.accepted)
+            .map(|i| i.whitened))
+    };
+    Consistency {
+        all: of(&Observation::ALL),
+        velocity: of(&[Observation::Velocity]),
+        table: of(&[Observation::Table]),
+        attitude: of(&[Observation::Attitude]),
+    }
+}
+
+fn nis(whitened: impl Iterator<Item = [f64; 3]>) -> Nis {
+    let (mut squares, mut products, mut count) = (0.0, 0.0, 0usize);
+    let mut last = [0.0; 3];
+    for w in whitened {
+        for axis in 0..3 {
+            squares += w[axis].powi(2);
+            products += w[axis] * last[axis];
+        }
+        last = w;
+        count += 3;
+    }
+    Nis {
+        mean: squares / count as f64,
+        count,
+        interval: mean_square_interval(count, OUTSIDE),
+        lag_one: products / squares,
+    }
+}
+
+/// The interval that holds the mean of `count` squared standard normal numbers but for a chance of
+/// `outside`, half on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
+/// Tracking and Navigation*, §5.4.2). NaN if there are none.
+pub fn mean_square_interval(count: usize, outside: f64) -> (f64, f64) {
+    let n = count as f64;
+    ChiSquared::new(n).map_or((f64::NAN, f64::NAN), |chi2| {
+        (
+            chi2.inverse_cdf(outside / 2.0) / n,
+            chi2.inverse_cdf(1.0 - outside / 2.0) / n,
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn interval_meets_tabulated_chi_square_quantiles() {
+        // Abramowitz and Stegun, table 26.8: χ²(30) at 0.975 and 0.025 is 16.791 and 46.979.
+        let (low, high) = mean_square_interval(30, 0.05);
+        assert_abs_diff_eq!(low, 16.791 / 30.0, epsilon = 1e-4);
+        assert_abs_diff_eq!(high, 46.979 / 30.0, epsilon = 1e-4);
+    }
+
+    #[test]
+    fn velocity_after_a_move_may_stay_well_within_what_the_mounting_leaves_open() {
+        // Squares of all and of sums are one in the mean, those of the first after a move 0.16.
+        let dwell = [0.4, 1.6, 0.8, -0.8];
+        let of = |observation| -> Vec<Innovation> {
+            let of_dwell = |dwell: usize, whitened: f64| Innovation {
+                time: 0.0,
+                observation,
+                whitened: [whitened; 3],
+                accepted: true,
+                dwell,
+                after_move: dwell > 0,
+            };
+            let dwells = (0..20).flat_map(|k| dwell.map(|whitened| of_dwell(k, whitened)));
+            dwells.collect()
+        };
+        assert_eq!(inconsistencies(&of(Observation::Velocity)), []);
+        let found = inconsistencies(&of(Observation::Table));
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].look, Look::AfterMoves);
+    }
+
+    #[test]
+    fn interval_of_many_observations_is_that_of_the_normal_limit() {
+        let n = 36_000.0;
+        let (low, high) = mean_square_interval(n as usize, 0.05);
+        let half = 1.959964 * (2f64 / n).sqrt();
+        assert_abs_diff_eq!(low, 1.0 - half, epsilon = 1e-4);
+        assert_abs_diff_eq!(high, 1.0 + half, epsilon = 1e-4);
+    }
+}

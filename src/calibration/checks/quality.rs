@@ -1,0 +1,286 @@
+//! How well a calibration explains what is known without a truth: gravity, and turns.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::attitude::{exp, level, log, tilt};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::{Linearisation, singular};
+use crate::calibration::outcome::Outcome;
+use crate::calibration::pass::{Gate, Mode, pass};
+use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::start::closed_form::{ClosedForm, Reference, six_position_by};
+use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
+use crate::navigation::{Navigator, State, TermValues};
+use crate::recording::LabelledMotion;
+use crate::run::{Dwell, Run};
+
+/// What a calibration leaves of gravity and of turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Over the whole record.
+    pub all: Measures,
+    /// By a calibration that did without every other dwell, over those dwells and the turns that end in
+    /// them; none where the rest does not give a calibration.
+    pub held_out: Option<Measures>,
+}
+
+/// Departures from what is known of a body that stands and turns.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Measures {
+    /// Magnitude of the mean specific force in each dwell minus gravity, m/s².
+    pub gravity: Spread,
+    /// Angle in each dwell between gravity as the accelerometers see it and as the gyros carry it there
+    /// from the dwell before, rad.
+    pub direction: Spread,
+    /// What the gyros are wrong by over a turn between two readings of the table, or about the axis of a
+    /// labelled turn, rad.
+    pub turns: Spread,
+}
+
+/// Several departures of one kind.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// How many.
+    pub count: usize,
+    /// Their root mean square.
+    pub rms: f64,
+    /// The largest, whatever its sign.
+    pub largest: f64,
+}
+
+impl FromIterator<f64> for Spread {
+    fn from_iter<I: IntoIterator<Item = f64>>(departures: I) -> Self {
+        let (mut count, mut sum, mut largest) = (0, 0.0, 0f64);
+        for departure in departures {
+            count += 1;
+            sum += departure * departure;
+            largest = largest.max(departure.abs());
+        }
+        Self {
+            count,
+            rms: (sum / count.max(1) as f64).sqrt(),
+            largest,
+        }
+    }
+}
+
+impl Outcome {
+    /// The quality of this calibration of a problem.
+    ///
+    /// What is held out is judged by one pass more, without the observations of every other dwell. It
+    /// linearises where the last pass did; nothing else of that pass is in it.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] where the problem is not the one of the outcome.
+    pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
+        let problem = &self.as_calibrated(problem);
+        let estimate = Linearisation {
+            triads: self.estimate.triads,
+            terms: self.auxiliary.terms(),
+            ..self.linearised_at.clone()
+        };
+        let half = every_other(problem).and_then(|half| {
+            let mode = Mode::Held(Gate::Innovations);
+            // Half the dwells may be too few.
+            pass(&half, &self.prior_attitudes, &self.linearised_at, mode).ok()
+        });
+        let held_out = half.map(|half| measures(problem, &half.estimate, |k| k % 2 == 1));
+        Ok(Quality {
+            all: measures(problem, &estimate, |_| true)?,
+            held_out: held_out.transpose()?,
+        })
+    }
+}
+
+impl ClosedForm {
+    /// The quality of this calibration of a problem.
+    ///
+    /// From labels, what is held out are dwells without a label; else every other dwell, as in
+    /// [`Outcome::quality`].
+    ///
+    /// # Errors
+    /// [`CalibrationError`] where the problem is not the one of the closed form.
+    pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
+        let run = problem.run();
+        let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
+            let first = problem.stretches().iter();
+            let initial = first.map(|s| first_attitude(s, triads));
+            let initial = initial.collect::<Result<_, _>>()?;
+            let at = Linearisation::new(*triads, TermVector::zeros(), initial);
+            measures(problem, &at, judged)
+        };
+        let all = of(&self.estimate.triads, &|_| true)?;
+        let held_out = match self.reference {
+            Reference::Labels if run.recording.imu.continuous => {
+                let dwells: Vec<&Dwell> = problem.dwells().collect();
+                let unlabelled = |k: usize| !labelled(run, dwells[k]);
+                let measures = of(&self.estimate.triads, &unlabelled)?;
+                // Every labelled turn was used.
+                let turns = Spread::default();
+                Some(Measures { turns, ..measures })
+            }
+            Reference::Labels => None,
+            reference => {
+                // Half the positions may be too few.
+                let half = every_other(problem).map(|half| six_position_by(reference, &half));
+                let half = half.and_then(Result::ok);
+                let half = half.map(|half| of(&half.estimate.triads, &|k| k % 2 == 1));
+                half.transpose()?
+            }
+        };
+        Ok(Quality {
+            all,
+            held_out: held_out.filter(|measures| measures.gravity.count > 0),
+        })
+    }
+}
+
+/// The problem with its dwells from the first on, leaving out every other; none if that leaves less than
+/// two, or a stretch with none.
+fn every_other<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
+    let half = problem.observed_in(|k| k % 2 == 0);
+    let left = half
+        .stretches()
+        .iter()
+        .all(|stretch| !stretch.dwells.is_empty());
+    (left && half.dwells().count() >= 2).then_some(half)
+}
+
+fn labelled(run: &Run, dwell: &Dwell) -> bool {
+    let Dwell { samples, .. } = dwell;
+    run.recording.segments.iter().any(|segment| {
+        segment.motion.is_some()
+            && segment.samples.start < samples.end
+            && samples.start < segment.samples.end
+    })
+}
+
+/// The table's attitude in the first dwell of a stretch, or one of those in which it is level.
+fn first_attitude(
+    stretch: &Stretch,
+    triads: &PerSensor<Triad>,
+) -> Result<Matrix3<f64>, CalibrationError> {
+    let Some(first) = stretch.dwells.first() else {
+        return Ok(Matrix3::identity());
+    };
+    if let Some(position) = &first.position {
+        return Ok(position.attitude);
+    }
+    let correction = triads.accel.correction().ok_or_else(|| singular(triads))?;
+    let output = first.mean(Sensor::Accel, stretch.run).output;
+    let up = correction * (output - triads.accel.bias);
+    Ok(level(&up.normalize()))
+}
+
+/// What a calibration leaves in the judged dwells and in the turns that end in them.
+fn measures(
+    problem: &Problem,
+    at: &Linearisation,
+    judged: impl Fn(usize) -> bool,
+) -> Result<Measures, CalibrationError> {
+    let (mut gravity, mut direction, mut turns) = (Vec::new(), Vec::new(), Vec::new());
+    let mut number = 0;
+    for (stretch, initial) in problem.stretches().iter().zip(&at.initial_attitudes) {
+        let run = stretch.run;
+        let during = |samples: &Range<usize>| {
+            at.instrument(&problem.model, (run, stretch.recording), samples)
+        };
+        let mut carried = *initial;
+        let mut before: Option<&Dwell> = None;
+        for dwell in &stretch.dwells {
+            let judged = judged(number);
+            number += 1;
+            let position = dwell.position.as_ref();
+            if let Some(before) = before {
+                let turn = before.samples.end..dwell.samples.start;
+                let start = before.position.as_ref().map_or(carried, |p| p.attitude);
+                carried = navigate(run, (at, &during(&turn)), start, turn)?;
+                if let Some(position) = position.filter(|_| judged) {
+                    turns.push(log(&(carried * position.attitude.transpose())).norm());
+                }
+            }
+            let force = force_at_rest(run, dwell, (at, &during(&dwell.samples)), &carried)?;
+            let off = tilt(&(carried * force));
+            if judged {
+                gravity.push(force.norm() - run.site.gravity);
+                if before.is_some() {
+                    direction.push(off.norm());
+                }
+            }
+            carried = exp(off) * carried;
+            before = Some(dwell);
+        }
+    }
+    let (run, dwells) = (problem.run(), problem.dwells().collect::<Vec<_>>());
+    for segment in &run.recording.segments {
+        let ends = |dwell: &&Dwell| {
+            dwell
+                .samples
+                .contains(&segment.samples.end.saturating_sub(1))
+        };
+        let of_judged = dwells.iter().position(ends).is_none_or(&judged);
+        if let Some(LabelledMotion::Turns { axis, angle }) = segment.motion
+            && of_judged
+            && !run.recording.imu.is_lost(&segment.samples)
+        {
+            let triads = at.instrument(&problem.model, (run, 0), &segment.samples);
+            let triad = &triads.gyro;
+            let correction = triad.correction().ok_or_else(|| singular(&triads))?;
+            let sum: Vector3<f64> = run.recording.imu.gyro.sum(segment.samples.clone());
+            let duration = segment.samples.len() as f64 * run.recording.imu.period;
+            turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
+        }
+    }
+    Ok(Measures {
+        gravity: gravity.into_iter().collect(),
+        direction: direction.into_iter().collect(),
+        turns: turns.into_iter().collect(),
+    })
+}
+
+/// Attitude after these samples, navigated from this one before.
+fn navigate(
+    run: &Run,
+    (at, triads): (&Linearisation, &PerSensor<Triad>),
+    from: Matrix3<f64>,
+    samples: Range<usize>,
+) -> Result<Matrix3<f64>, CalibrationError> {
+    let (imu, state) = (&run.recording.imu, State::at_rest(from));
+    let navigator = Navigator::new(imu, &run.site, triads, state);
+    let on = (0..at.terms.len()).filter(|&k| at.terms[k] != 0.0);
+    let terms = TermValues {
+        on: on.collect(),
+        values: at.terms,
+    };
+    let navigator = navigator.ok_or_else(|| singular(triads))?;
+    let block = navigator.with_terms(terms).advance(samples);
+    Ok(block.state.attitude)
+}
+
+/// A term changes the force that it responds to by a hundredth at most, so three rounds leave a millionth
+/// of it.
+const ROUNDS: usize = 3;
+
+/// Mean specific force along body axes over a dwell at about this attitude, m/s².
+fn force_at_rest(
+    run: &Run,
+    dwell: &Dwell,
+    (at, triads): (&Linearisation, &PerSensor<Triad>),
+    attitude: &Matrix3<f64>,
+) -> Result<Vector3<f64>, CalibrationError> {
+    let triad = &triads.accel;
+    let correction = triad.correction().ok_or_else(|| singular(triads))?;
+    let of_triad = correction * (dwell.mean(Sensor::Accel, run).output - triad.bias);
+    let mut sensed = Sensed {
+        rate: attitude.tr_mul(&run.site.earth_rate_n()),
+        rate_over_earth: Vector3::zeros(),
+        angular_acceleration: Vector3::zeros(),
+        force: of_triad,
+    };
+    for _ in 0..ROUNDS {
+        sensed.force = of_triad - sensed.added(Sensor::Accel, &at.terms);
+    }
+    Ok(sensed.force)
+}

@@ -1,0 +1,203 @@
+//! What a triad's outputs leave of any linear triad, whatever its parameters.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use crate::statistics::chi_square_limit;
+
+/// Chance that residuals of a right model ring, of each of the two triads.
+const FALSE_ALARM: f64 = 1e-3 / 2.0;
+/// Directions of unit columns that are shorter than this beside all others are rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Residuals of linear equations, without what any value of their unknowns explains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residuals {
+    /// Of unit covariance.
+    whitened: DVector<f64>,
+    /// Orthonormal, spans what the unknowns explain.
+    explained: DMatrix<f64>,
+    /// Columns of the whitening's inverse factor: one for each equation.
+    whitening: DMatrix<f64>,
+}
+
+/// What more unknowns would explain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explained {
+    /// By how much χ² falls.
+    pub fall: f64,
+    /// How many of them it is for.
+    pub degrees: usize,
+    /// Their values.
+    pub coefficients: Vec<f64>,
+}
+
+/// Equations that fit the others least.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Worst {
+    /// Which groups of equations: several if their data cannot tell them apart.
+    pub groups: Vec<usize>,
+    /// χ² of all others alone.
+    pub without: f64,
+}
+
+impl Residuals {
+    /// Of `errors = design · unknowns + noise`, the noise of this covariance. `None` if that is none.
+    pub fn new(
+        design: &DMatrix<f64>,
+        errors: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+    ) -> Option<Self> {
+        let factor = covariance.clone().cholesky()?.l();
+        let mut design = factor.solve_lower_triangular(design)?;
+        for mut column in design.column_iter_mut() {
+            column.try_normalize_mut(0.0);
+        }
+        let explained = if design.is_empty() {
+            DMatrix::zeros(errors.len(), 0)
+        } else {
+            // Unlike singular values, which are iterated for, it comes to an end whatever the design is.
+            let qr = design.col_piv_qr();
+            let r = qr.r();
+            let left: Vec<f64> = (0..r.nrows()).map(|k| r[(k, k)].abs()).collect();
+            let largest = left.iter().copied().fold(0.0, f64::max);
+            let explains = |&k: &usize| left[k] > ROUNDING * largest;
+            let columns: Vec<usize> = (0..left.len()).filter(explains).collect();
+            qr.q().select_columns(&columns)
+        };
+        let whitened = factor.solve_lower_triangular(errors)?;
+        let whitened = &whitened - &explained * explained.tr_mul(&whitened);
+        let count = errors.len();
+        let whitening = factor.solve_lower_triangular(&DMatrix::identity(count, count))?;
+        Some(Self {
+            whitened,
+            explained,
+            whitening,
+        })
+    }
+
+    /// Sum of squares, each over its variance.
+    pub fn chi_square(&self) -> f64 {
+        self.whitened.norm_squared()
+    }
+
+    /// Degrees of freedom.
+    pub fn degrees(&self) -> usize {
+        self.explained.nrows() - self.explained.ncols()
+    }
+
+    /// What χ² stays below if model and σ are right, but for one run in two thousand.
+    pub fn limit(&self) -> f64 {
+        limit(self.degrees())
+    }
+
+    /// Whether this χ² is within its limit where so many equations are left out.
+    pub fn would_hold(&self, chi_square: f64, left_out: usize) -> bool {
+        let degrees = self.degrees().saturating_sub(left_out);
+        degrees > 0 && chi_square <= limit(degrees)
+    }
+
+    /// By how much all σ are to grow, the Birge ratio; none where χ² is within its limit.
+    pub fn growth(&self) -> Option<f64> {
+        let (chi_square, degrees) = (self.chi_square(), self.degrees());
+        (chi_square > self.limit()).then(|| (chi_square / degrees as f64).sqrt())
+    }
+
+    /// Which of some groups of equations the others contradict most: χ² falls by most without it.
+    pub fn worst(&self, groups: &[Vec<usize>]) -> Worst {
+        let falls: Vec<f64> = groups
+            .iter()
+            .map(|group| self.falls_without(group))
+            .collect();
+        let largest = falls.iter().copied().fold(0.0, f64::max);
+        let alike = |&k: &usize| largest - falls[k] <= 1e-6 * largest;
+        Worst {
+            groups: (0..groups.len()).filter(alike).collect(),
+            without: self.chi_square() - largest,
+        }
+    }
+
+    /// By how much χ² falls if these equations may be off by anything.
+    fn falls_without(&self, equations: &[usize]) -> f64 {
+        self.fall(self.whitening.select_columns(equations)).fall
+    }
+
+    /// What unknowns with these columns would explain of the errors.
+    pub fn explained_by(&self, columns: &DMatrix<f64>) -> Explained {
+        self.fall(&self.whitening * columns)
+    }
+
+    /// The same of whitened columns.
+    fn fall(&self, shifts: DMatrix<f64>) -> Explained {
+        let free = &shifts - &self.explained * self.explained.tr_mul(&shifts);
+        let of_shifts = shifts.column_iter().map(|c| c.norm_squared());
+        let least = ROUNDING * of_shifts.fold(0.0, f64::max);
+        let SymmetricEigen {
+            eigenvectors,
+            eigenvalues,
+        } = free.tr_mul(&free).symmetric_eigen();
+        let along = eigenvectors.tr_mul(&free.tr_mul(&self.whitened));
+        let told: Vec<usize> = (0..eigenvalues.len())
+            .filter(|&k| eigenvalues[k] > least)
+            .collect();
+        let fall = |&k: &usize| along[k].powi(2) / eigenvalues[k];
+        let part = |&k: &usize| eigenvectors.column(k) * (along[k] / eigenvalues[k]);
+        let none = DVector::zeros(eigenvalues.len());
+        Explained {
+            fall: told.iter().map(fall).sum(),
+            degrees: told.len(),
+            coefficients: told.iter().map(part).fold(none, |a, b| a + b).data.into(),
+        }
+    }
+}
+
+fn limit(degrees: usize) -> f64 {
+    chi_square_limit(degrees as f64, FALSE_ALARM)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+
+    use crate::calibration::start::closed_form::{by_position, linear_design};
+
+    fn six() -> Vec<Vector3<f64>> {
+        (0..6)
+            .map(|k| Vector3::ith(k / 2, if k % 2 == 0 { 9.8 } else { -9.8 }))
+            .collect()
+    }
+
+    #[test]
+    fn six_positions_leave_six_degrees_and_what_a_triad_explains_leaves_nothing() {
+        let inputs = six();
+        let a = Matrix3::new(1.0, 0.01, 0.0, 0.02, 0.99, -0.01, 0.0, 0.03, 1.01);
+        let errors =
+            DVector::from_iterator(18, inputs.iter().flat_map(|u| <[f64; 3]>::from(a * u)));
+        let covariance = DMatrix::identity(18, 18) * 1e-8;
+        let residuals = Residuals::new(&linear_design(&inputs, 9.8), &errors, &covariance).unwrap();
+        assert_eq!(residuals.degrees(), 6);
+        assert!(residuals.chi_square() < 1e-6);
+        assert_eq!(residuals.growth(), None);
+    }
+
+    #[test]
+    fn a_position_that_is_off_is_named_with_its_opposite_where_none_other_tells_them_apart() {
+        let mut inputs = six();
+        let mut errors = DVector::zeros(18);
+        errors[3 * 2 + 2] = 0.1;
+        let covariance = DMatrix::identity(18, 18) * 1e-6;
+        let of = |inputs: &[Vector3<f64>], errors: &DVector<f64>, covariance: &DMatrix<f64>| {
+            let design = linear_design(inputs, 9.8);
+            let residuals = Residuals::new(&design, errors, covariance).unwrap();
+            assert!(residuals.growth().is_some());
+            residuals.worst(&by_position(inputs.len()))
+        };
+        let worst = of(&inputs, &errors, &covariance);
+        assert_eq!(worst.groups, [2, 3]);
+        assert!(worst.without < 1e-6);
+        inputs.push(Vector3::new(0.0, 9.8, 0.0));
+        let errors = errors.resize_vertically(21, 0.0);
+        let covariance = DMatrix::identity(21, 21) * 1e-6;
+        assert_eq!(of(&inputs, &errors, &covariance).groups, [2]);
+    }
+}

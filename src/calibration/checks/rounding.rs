@@ -1,0 +1,244 @@
+//! What rates leave open that are rounded to steps wider than their noise.
+//!
+//! Rounding errs by the same in every row where nothing moves the value over the edge of a step: no mean takes that
+//! away. Noise of σ leaves of it a sum of waves of the value, the k-th of amplitude step/πk · exp(−2π²k²σ²/step²)
+//! (Widrow and Kollár, *Quantization Noise*, 2008, on dither); where the value lies within a step is anybody's guess,
+//! so half their squares add up. With σ of half a step next to nothing is left.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::finding::Finding;
+use crate::calibration::estimate::largest_growth;
+use crate::calibration::parameters::{ParameterMatrix, parameter};
+use crate::calibration::problem::Problem;
+use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
+use crate::run::{Aiding, Run};
+use crate::units::DEGREE;
+
+/// Waves that are summed: what others add is a thousandth.
+const WAVES: u32 = 600;
+/// What rounds to once as large says nothing.
+const SAID: f64 = 1.05;
+
+/// Covariance that rounding adds: what it leaves in the mean of every dwell, by least squares of these and the prior.
+/// Dwells that have their mean within one step err by the same. Without a table, accelerometers at rest tell how
+/// large gravity is along itself only.
+pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMatrix {
+    let mut covariance = ParameterMatrix::zeros();
+    for sensor in Sensor::ALL {
+        let first = parameter(sensor, 0);
+        covariance
+            .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
+            .copy_from(&of_triad(problem, sensor, triads.get(sensor)));
+    }
+    covariance
+}
+
+/// The triads of which that says something, covariance being that of an estimate with it.
+pub fn rounded(
+    problem: &Problem,
+    by_rounding: &ParameterMatrix,
+    covariance: &ParameterMatrix,
+) -> Vec<Finding> {
+    let of = |sensor: Sensor| {
+        let first = parameter(sensor, 0);
+        let of_triad =
+            |m: &ParameterMatrix| m.diagonal().fixed_rows::<PER_TRIAD>(first).into_owned();
+        let with = of_triad(covariance);
+        let without = with - of_triad(by_rounding);
+        let growth = largest_growth(without.as_slice(), with.as_slice());
+        let steps = problem.runs().map(|run| steps(run, sensor).max());
+        let (unit, name) = match sensor {
+            Sensor::Gyro => (DEGREE, "°/s"),
+            Sensor::Accel => (1.0, "m/s²"),
+        };
+        (growth >= SAID).then(|| Finding::Rounded {
+            of: sensor.name(),
+            step: steps.fold(0.0, f64::max) / unit,
+            unit: name,
+            growth,
+        })
+    };
+    Sensor::ALL.into_iter().filter_map(of).collect()
+}
+
+/// Covariance of a triad's parameters by what rounding leaves in means of dwells.
+fn of_triad(
+    problem: &Problem,
+    sensor: Sensor,
+    triad: &Triad,
+) -> SMatrix<f64, PER_TRIAD, PER_TRIAD> {
+    let Some(correction) = triad.correction() else {
+        return SMatrix::zeros();
+    };
+    let response = triad.response();
+    let sigma = &problem.model.prior_sigma;
+    let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
+    let recordings = problem.runs().enumerate();
+    let means: Vec<Mean> = recordings
+        .flat_map(|(recording, run)| of_recording(problem, recording, run, sensor))
+        .collect();
+    let variance: f64 = means.iter().map(|mean| mean.variance.mean()).sum();
+    if variance == 0.0 {
+        return SMatrix::zeros();
+    }
+    let variance = variance / means.len() as f64;
+    let along_gravity = sensor == Sensor::Accel && problem.model.aiding == Aiding::Velocity;
+    let mut information = SMatrix::<f64, PER_TRIAD, PER_TRIAD>::identity();
+    let mut of_steps = BTreeMap::<(usize, i64), TriadVector>::new();
+    for mean in &means {
+        let input = match sensor {
+            Sensor::Gyro => Vector3::zeros(),
+            Sensor::Accel => correction * (mean.output - triad.bias),
+        };
+        let seen = match along_gravity {
+            true => input * input.transpose() / input.norm_squared().max(f64::MIN_POSITIVE),
+            false => Matrix3::identity(),
+        };
+        let input = input.push(1.0);
+        let columns: Vec<Vector3<f64>> = (0..PER_TRIAD)
+            .map(|p| seen * response[p] * input * sigma[p])
+            .collect();
+        let design = SMatrix::<f64, 3, PER_TRIAD>::from_columns(&columns);
+        information += design.transpose() * design / variance;
+        for axis in 0..3 {
+            let error = design.row(axis).transpose() * mean.variance[axis].sqrt() / variance;
+            *of_steps
+                .entry((axis, mean.step[axis]))
+                .or_insert_with(TriadVector::zeros) += error;
+        }
+    }
+    let Some(information) = information.cholesky() else {
+        return SMatrix::zeros();
+    };
+    let mut covariance = SMatrix::zeros();
+    for error in of_steps.values() {
+        let error = information.solve(error).component_mul(&sigma);
+        covariance += error * error.transpose();
+    }
+    covariance
+}
+
+/// Steps of rates along body axes, rad/s or m/s²; zero where there are none, or where rows are integrals, which may
+/// carry what rounding leaves over.
+fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
+    let imu = &run.recording.imu;
+    let Some(log) = imu.log.as_ref().filter(|log| log.output == Output::Rate) else {
+        return Vector3::zeros();
+    };
+    let step = |axis: usize| {
+        let facts = &log.columns.get(sensor)[axis];
+        facts.step.unwrap_or(0.0) * facts.unit.abs() / imu.period
+    };
+    Vector3::from_fn(|axis, _| step(axis))
+}
+
+/// The mean of a triad's rows over a dwell.
+struct Mean {
+    /// Along body axes, rad/s or m/s².
+    output: Vector3<f64>,
+    /// The step that it lies in, axis by axis.
+    step: [i64; 3],
+    /// What rounding leaves in it, (rad/s)² or (m/s²)².
+    variance: Vector3<f64>,
+}
+
+/// Means of a recording's dwells; none where rows are not rounded.
+fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) -> Vec<Mean> {
+    let steps = steps(run, sensor);
+    if steps == Vector3::zeros() {
+        return Vec::new();
+    }
+    let imu = &run.recording.imu;
+    let mut squares = Vector3::zeros();
+    let (mut means, mut count) = (Vec::new(), 0.0f64);
+    let stretches = problem.stretches().iter();
+    for stretch in stretches.filter(|stretch| stretch.recording == recording) {
+        for dwell in &stretch.dwells {
+            // Pairs that have no row in common, so that each is new.
+            let mut rows = imu.of(sensor).sums(dwell.samples.clone(), 1);
+            let (mut sum, mut summed) = (Vector3::zeros(), 0.0f64);
+            while let (Some(before), Some(after)) = (rows.next(), rows.next()) {
+                squares += (after - before).map(|change| change * change);
+                sum += before + after;
+                summed += 2.0;
+            }
+            count += summed;
+            means.push(sum / (summed.max(1.0) * imu.period));
+        }
+    }
+    let scatter = squares / (count.max(1.0) * imu.period.powi(2));
+    let stated = run.instrument.noise.get(sensor).random_walk.powi(2) / imu.period;
+    let variance = Vector3::from_fn(|axis, _| left(steps[axis], scatter[axis], stated));
+    let mean = |output: Vector3<f64>| Mean {
+        output,
+        step: std::array::from_fn(|axis| match steps[axis] > 0.0 {
+            true => (output[axis] / steps[axis]).round() as i64,
+            false => 0,
+        }),
+        variance,
+    };
+    means.into_iter().map(mean).collect()
+}
+
+/// Variance that rounding to this step leaves in a mean of rows that scatter by this variance, rounding included, and
+/// whose noise is stated to have that.
+fn left(step: f64, scatter: f64, stated: f64) -> f64 {
+    if step == 0.0 {
+        return 0.0;
+    }
+    let square = step * step;
+    let seen = (scatter / square - 1.0 / 12.0).max(0.0);
+    // Two values scatter by a quarter of a step's square at most, however little noise takes them from one to the other.
+    let noise = match scatter > 0.25 * square {
+        true => seen,
+        false => seen.min(stated / square),
+    };
+    let wave = |k: u32| {
+        let k = f64::from(k);
+        (-4.0 * PI * PI * k * k * noise).exp() / (2.0 * PI * PI * k * k)
+    };
+    square * (1..=WAVES).map(wave).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, Normal};
+
+    use super::*;
+
+    #[test]
+    fn what_rounding_leaves_in_a_mean_is_what_values_within_a_step_have() {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        assert!((left(1.0, 0.0, 1.0) * 12.0 - 1.0).abs() < 2e-3);
+        // Between two values without noise the step is as unknown.
+        assert_eq!(left(1.0, 0.2, 0.0), left(1.0, 0.0, 0.0));
+        for sigma in [0.25, 0.35, 0.7] {
+            let noise = Normal::new(0.0, sigma).unwrap();
+            let (mut errors, mut scatters) = (0.0, 0.0);
+            let values = 400;
+            for k in 0..values {
+                let value = f64::from(k) / f64::from(values);
+                let rows: Vec<f64> = (0..4000)
+                    .map(|_| f64::round(value + noise.sample(&mut random)))
+                    .collect();
+                let mean = rows.iter().sum::<f64>() / 4000.0;
+                let scatter = rows.iter().map(|row| (row - mean).powi(2)).sum::<f64>() / 4000.0;
+                errors += (mean - value).powi(2) - scatter / 4000.0;
+                scatters += scatter;
+            }
+            let (found, expected) = (errors / f64::from(values), scatters / f64::from(values));
+            let expected = left(1.0, expected, sigma * sigma);
+            // A mean of 4,000 rows knows its error to a hundredth of its scatter.
+            assert!(
+                (found - expected).abs() < 0.25 * expected + 2e-5,
+                "{found} {expected}"
+            );
+        }
+    }
+}

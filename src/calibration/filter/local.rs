@@ -1,0 +1,149 @@
+//! A filter of a part of a dwell alone.
+//!
+//! At rest the parameters act through three rates and three specific forces that do not change. Given these
+//! and the navigation errors at the begin, together `g`, only noise
+//! is left: a small filter of navigation errors that are known when it begins takes it out of each
+//! observation. What is left of the observations is linear in `g` and white, so all of them together are one
+//! measurement of `g`, and the errors at the end are linear in `g`, too. Nothing is lost: it is the filter
+//! of all states with its steps in another order (Friedland 1969, "Treatment of bias in recursive
+//! filtering", IEEE Trans. Automatic Control 14(4)).
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::courses::{Courses, Gain};
+use super::given::{Given, Unexpected};
+use super::measurement::ScalarInnovation;
+use super::rows::{add, factor};
+
+/// An observation of three components: navigation errors from `state` on.
+pub struct Observed {
+    pub state: usize,
+    pub residual: Vector3<f64>,
+    /// Of each component.
+    pub variance: f64,
+}
+
+/// Navigation errors `U g + m` where `g` is given, and what is known of `g`: `M` states move, `G` is the size of
+/// `g`.
+pub struct Local<'a, const M: usize, const G: usize> {
+    courses: &'a mut Courses<M, G>,
+    /// The point of its course where it is.
+    at: usize,
+    /// m
+    mean: [f64; M],
+    /// Rows of `g` times what they measured, summed.
+    vector: [f64; G],
+    given: Given<G>,
+}
+
+/// An innovation, and what taking it in needs.
+pub(in crate::calibration) struct Look<const G: usize> {
+    /// Where taking it in leads.
+    pub to: usize,
+    /// Of each component, the components before it taken in.
+    pub scalars: [ScalarInnovation; 3],
+    /// Given `g`, whitened.
+    residual: Vector3<f64>,
+    unexpected: Unexpected<G>,
+}
+
+/// What a part of a dwell comes to.
+pub(in crate::calibration) struct Outcome {
+    /// Rows of `g` …
+    pub measured: DMatrix<f64>,
+    /// … and what each measures, of σ 1.
+    pub values: DVector<f64>,
+    /// Navigation errors at the end: rows of `g`, offset, covariance.
+    pub of_given: DMatrix<f64>,
+    pub offset: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
+    pub fn new(given: Given<G>, courses: &'a mut Courses<M, G>) -> Self {
+        Self {
+            courses,
+            at: Courses::<M, G>::BEGIN,
+            mean: [0.0; M],
+            vector: [0.0; G],
+            given,
+        }
+    }
+
+    /// Errors of a state become more by a known amount.
+    pub fn refer(&mut self, state: usize, by: f64) {
+        self.mean[state] += by;
+    }
+
+    pub fn propagate(&mut self, model: usize) {
+        self.at = self.courses.step(self.at, model);
+        let mut mean = [0.0; M];
+        for &(row, column, phi) in &self.courses.model(model).transition {
+            mean[row] += phi * self.mean[column];
+        }
+        self.mean = mean;
+    }
+
+    /// The innovation of an observation; `None` if it is not finite or its covariance not positive definite.
+    // A look is half a kilobyte, which would be copied on its way out.
+    #[inline(always)]
+    pub fn look(&mut self, observed: &Observed) -> Option<Look<G>> {
+        let to = self
+            .courses
+            .observe(self.at, observed.state, observed.variance)?;
+        let Gain { root, rows, .. } = self.courses.gain(to);
+        let expected = Vector3::from_fn(|axis, _| self.mean[observed.state + axis]);
+        let residual = root.solve_lower_triangular(&(observed.residual - expected))?;
+        let unexpected = self.given.look(rows, &residual)?;
+        let scalars = [0, 1, 2].map(|k| {
+            let sigma = root[(k, k)] * unexpected.root[(k, k)];
+            ScalarInnovation {
+                innovation: unexpected.whitened[k] * sigma,
+                variance: sigma.powi(2),
+            }
+        });
+        Some(Look {
+            to,
+            scalars,
+            residual,
+            unexpected,
+        })
+    }
+
+    /// Takes an innovation in.
+    #[inline]
+    pub fn take(&mut self, look: &Look<G>) {
+        self.at = look.to;
+        let gain = self.courses.gain(look.to);
+        for k in 0..3 {
+            add(&mut self.mean, look.residual[k], &gain.of_errors[k]);
+            add(&mut self.vector, look.residual[k], &gain.rows[k]);
+        }
+        self.given.take(&look.unexpected);
+    }
+
+    /// Rows of what is measured of `g`, each with the component that it took out: the rows after it have
+    /// none of that.
+    pub fn measured(&mut self) -> Vec<(usize, [f64; G])> {
+        let information = self.courses.end(self.at).information;
+        let rows = factor(information, self.vector);
+        rows.map(|(pivot, row, _)| (pivot, row)).collect()
+    }
+
+    pub fn outcome(self) -> Outcome {
+        let known = self.courses.end(self.at);
+        let rows = factor(known.information, self.vector);
+        let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
+        Outcome {
+            measured: matrix(&rows),
+            values: values.into(),
+            of_given: matrix(&known.of_given),
+            offset: DVector::from_column_slice(&self.mean),
+            covariance: matrix(&known.covariance),
+        }
+    }
+}
+
+fn matrix<const N: usize>(rows: &[[f64; N]]) -> DMatrix<f64> {
+    DMatrix::from_row_slice(rows.len(), N, rows.as_flattened())
+}

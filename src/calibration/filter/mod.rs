@@ -1,0 +1,392 @@
+//! The Kalman filter: covariance in block form, measurements one scalar at a time.
+
+pub mod courses;
+pub mod given;
+pub mod linear;
+pub mod local;
+pub mod measurement;
+pub mod rows;
+pub mod sensitivity;
+
+mod at_rest;
+mod back;
+mod dwells;
+mod operation;
+mod propagation;
+mod standing;
+mod tape;
+mod update;
+
+pub use back::{Effect, Followed, Told};
+pub use dwells::Dwells;
+pub use operation::{Driver, Operation};
+pub use standing::{Innovations, Observer, Taken, Verdict};
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use crate::attitude::skew;
+use crate::calibration::checks::dwell_scatter::Posterior;
+use crate::calibration::filter::sensitivity::Sensitivity;
+use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::linearisation::{Linearisation, Start};
+use crate::calibration::model::Model;
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector, to_vector};
+use crate::calibration::record::segment::between;
+use crate::calibration::several::day_to_day::{DayToDay, Difference, Turned};
+use crate::imu::{PerSensor, TermVector, ThermalCoefficients};
+use crate::navigation::{ProcessNoise, State};
+
+/// Mean and covariance of the errors.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    pub layout: Layout,
+    x: DVector<f64>,
+    p: DMatrix<f64>,
+    noise: PerSensor<ProcessNoise>,
+    /// Of the turn at rest alone, rad/√s.
+    turning: f64,
+    /// 1σ and correlation time of each varying bias, by its state.
+    varying: Vec<(usize, f64, f64)>,
+    day_to_day: DayToDay,
+    /// What the mounting of the recording does to the parameters, where it has its own.
+    turned: Option<Turned>,
+    /// What auxiliary parameters that are tried would do.
+    pub sensitivity: Option<Sensitivity>,
+    /// What was done to the errors, where that is kept.
+    tape: Option<Vec<Operation>>,
+}
+
+/// What a stretch begins after.
+#[derive(Debug)]
+pub enum Since<'a> {
+    /// So much time of the same recording, s, of which nothing is known.
+    Lost(f64),
+    /// Nothing of its recording: where it is linearised what is of that alone, and what its mounting does.
+    Anew(&'a Difference, Option<&'a Turned>),
+}
+
+impl Filter {
+    /// Before the first stretch begins, with the means of what is constant.
+    pub fn new(model: &Model, errors: &PriorErrors) -> Self {
+        let layout = Layout::new(model);
+        let n = layout.size();
+        let (mut x, mut p) = (DVector::zeros(n), DMatrix::zeros(n, n));
+        for (state, index) in layout.parameters() {
+            x[state] = errors.parameters[index];
+            p[(state, state)] = model.prior_sigma[index].powi(2);
+        }
+        for (state, index) in layout.terms() {
+            x[state] = errors.terms[index];
+            p[(state, state)] = model.term_sigma[index].powi(2);
+        }
+        if let Some(thermal) = model.thermal.as_deref() {
+            for (state, coefficient) in layout.thermal() {
+                x[state] = coefficient.of(&errors.thermal);
+                p[(state, state)] = coefficient.of(&thermal.sigma).powi(2);
+            }
+        }
+        for (state, axis) in layout.table_base() {
+            p[(state, state)] = model.geometry.base[axis].powi(2);
+        }
+        for (state, k) in layout.table_axes() {
+            p[(state, state)] = model.geometry.axes[k].powi(2);
+        }
+        let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
+            let variation = model.noise.get(sensor).gauss_markov?;
+            Some((state, variation.sigma, variation.correlation_time))
+        });
+        let varying = varying.collect();
+        Self {
+            layout,
+            x,
+            p,
+            turning: model.turning_at_rest,
+            noise: model.process_noise(),
+            varying,
+            day_to_day: model.day_to_day,
+            turned: None,
+            sensitivity: None,
+            tape: None,
+        }
+    }
+
+    /// The same with auxiliary parameters that are no states but tried.
+    pub fn trying(mut self, auxiliary: &[usize]) -> Self {
+        self.layout = self.layout.trying(auxiliary);
+        let tried = self.layout.tried();
+        self.sensitivity = (tried > 0).then(|| Sensitivity::new(tried, self.x.len()));
+        self
+    }
+
+    /// A stretch begins: navigation errors and the table's position start anew. In another recording the
+    /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
+    /// 4th ed., §3.8) does, too, and what is of the recording; in the same one it has gone on meanwhile. `gravity` is
+    /// its 1σ at another site.
+    pub fn begin(&mut self, start: &Start, table_sigma: f64, since: Since, gravity: Option<f64>) {
+        let initial = self.layout.initial_attitude();
+        for axis in 0..3 {
+            for (first, mean, sigma) in [
+                (ATTITUDE, start.attitude[axis], start.attitude_sigma[axis]),
+                (VELOCITY, 0.0, start.velocity_sigma),
+                (POSITION, 0.0, start.position_sigma),
+                (initial, start.attitude[axis], start.attitude_sigma[axis]),
+            ] {
+                self.redraw(first + axis, mean, sigma);
+            }
+        }
+        for axis in 0..3 {
+            // φ starts as φ₀: fully correlated.
+            let variance = start.attitude_sigma[axis].powi(2);
+            self.p[(ATTITUDE + axis, initial + axis)] = variance;
+            self.p[(initial + axis, ATTITUDE + axis)] = variance;
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Drawn {
+                    states: vec![ATTITUDE + axis, initial + axis],
+                    sigma: start.attitude_sigma[axis],
+                });
+            }
+        }
+        self.redraw_table(table_sigma);
+        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+            self.redraw(state, 0.0, sigma);
+        }
+        match since {
+            Since::Lost(duration) => self.vary(duration),
+            Since::Anew(at, turned) => {
+                self.turned = turned.cloned();
+                for k in 0..self.varying.len() {
+                    let (state, sigma, _) = self.varying[k];
+                    self.redraw(state, 0.0, sigma);
+                }
+                for (state, own) in self.layout.own().collect::<Vec<_>>() {
+                    self.redraw(state, -at.get(own), self.day_to_day.of(own));
+                }
+            }
+        }
+    }
+
+    /// Forgets a state: its error is drawn anew, independent of all others.
+    fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
+        self.x[state] = mean;
+        if let Some(sensitivity) = &mut self.sensitivity {
+            sensitivity.redraw(state);
+        }
+        if let Some(tape) = &mut self.tape {
+            let states = vec![state];
+            tape.push(Operation::Drawn { states, sigma });
+        }
+        self.p.row_mut(state).fill(0.0);
+        self.p.column_mut(state).fill(0.0);
+        self.p[(state, state)] = sigma.powi(2);
+    }
+
+    /// The table has left its position: its error is drawn anew.
+    pub fn redraw_table(&mut self, sigma: f64) {
+        if let Some(table) = self.layout.table_position() {
+            (table..table + 3).for_each(|state| self.redraw(state, 0.0, sigma));
+        }
+    }
+
+    /// The body does not turn from now on: what the computed attitude does is an error.
+    pub fn begin_to_hold(&mut self) {
+        if let Some(turn) = self.layout.turn_at_rest() {
+            (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));
+        }
+    }
+
+    /// The body has come to rest: errors of velocity and position become those in the computed frame,
+    /// `δV + φ × V`, of the computed state.
+    ///
+    /// A heading that is wrong turns computed velocity and position with it, and `computed − true`
+    /// takes that for something observed of the heading; in the computed frame a heading is invisible
+    /// (Barrau and Bonnabel 2017, "The invariant extended Kalman filter as a stable observer", IEEE
+    /// Trans. Automatic Control 62(4)). Without it the σ of a heading that nothing shows shrinks with
+    /// every turn.
+    pub fn come_to_rest(&mut self, computed: &State) {
+        for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
+            let turn = skew(-computed);
+            if let Some(tape) = &mut self.tape {
+                tape.push(Operation::Turned { first, by: turn });
+            }
+            let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
+            let mut error = self.x.fixed_rows_mut::<3>(first);
+            error += x;
+            if let Some(sensitivity) = &mut self.sensitivity {
+                for row in 0..3 {
+                    let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
+                    sensitivity.add(first + row, turned);
+                }
+            }
+            let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
+            let mut of_error = self.p.fixed_rows_mut::<3>(first);
+            of_error += rows;
+            let columns = self.p.fixed_columns::<3>(ATTITUDE) * turn.transpose();
+            let mut of_error = self.p.fixed_columns_mut::<3>(first);
+            of_error += columns;
+        }
+    }
+
+    /// Refers the navigation errors to another computed state of the same moment.
+    pub fn refer(&mut self, from: &State, to: &State) {
+        let by = between(from, to);
+        let turn = self.layout.turn_at_rest();
+        let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
+        for (first, by) in firsts.chain(turn.map(|turn| (turn, by[0]))) {
+            let mut error = self.x.fixed_rows_mut::<3>(first);
+            error += by;
+        }
+    }
+
+    /// Estimated errors that a pass with feedback takes out of the mean.
+    pub fn take_feedback(&mut self) -> Feedback {
+        let feedback = Feedback {
+            attitude: self.at(ATTITUDE),
+            velocity: self.at(VELOCITY),
+            position: self.at(POSITION),
+            initial_attitude: self.initial_attitude(),
+            parameters: self.parameters(),
+            terms: self.terms(),
+        };
+        let constants = self.layout.parameters().chain(self.layout.terms());
+        let initial = self.layout.initial_attitude();
+        let taken = (0..NAVIGATION)
+            .chain(constants.map(|(state, _)| state))
+            .chain(initial..initial + 3);
+        for state in taken.collect::<Vec<_>>() {
+            self.x[state] = 0.0;
+        }
+        feedback
+    }
+
+    fn at(&self, first: usize) -> Vector3<f64> {
+        self.x.fixed_rows::<3>(first).into_owned()
+    }
+
+    /// Mean of the parameter errors δθ.
+    pub fn parameters(&self) -> ParameterVector {
+        let mut all = ParameterVector::zeros();
+        for (state, index) in self.layout.parameters() {
+            all[index] = self.x[state];
+        }
+        all
+    }
+
+    /// Covariance of the parameter errors; zero where fixed.
+    pub fn parameter_covariance(&self) -> ParameterMatrix {
+        let mut all = ParameterMatrix::zeros();
+        for (row, i) in self.layout.parameters() {
+            for (column, j) in self.layout.parameters() {
+                all[(i, j)] = self.p[(row, column)];
+            }
+        }
+        all
+    }
+
+    /// 1σ of the parameter errors.
+    pub fn parameter_sigma(&self) -> ParameterVector {
+        let mut all = ParameterVector::zeros();
+        for (state, index) in self.layout.parameters() {
+            all[index] = self.p[(state, state)].max(0.0).sqrt();
+        }
+        all
+    }
+
+    /// Mean of the errors of the error terms' parameters; zero where off.
+    pub fn terms(&self) -> TermVector {
+        let mut all = TermVector::zeros();
+        for (state, index) in self.layout.terms() {
+            all[index] = self.x[state];
+        }
+        all
+    }
+
+    /// Mean of the errors of the coefficients of temperature; zero where off.
+    pub fn thermal(&self) -> PerSensor<ThermalCoefficients> {
+        let mut all = PerSensor::<ThermalCoefficients>::default();
+        for (state, coefficient) in self.layout.thermal() {
+            *coefficient.of_mut(&mut all) = self.x[state];
+        }
+        all
+    }
+
+    /// Mean and covariance of the errors of what is constant throughout a recording.
+    pub fn constants(&self) -> Posterior {
+        let states: Vec<usize> = self.layout.constants().collect();
+        let n = states.len();
+        Posterior {
+            mean: DVector::from_fn(n, |i, _| self.x[states[i]]),
+            covariance: DMatrix::from_fn(n, n, |i, j| self.p[(states[i], states[j])]),
+        }
+    }
+
+    /// Mean of a state's error.
+    pub fn mean(&self, state: usize) -> f64 {
+        self.x[state]
+    }
+
+    /// Covariance of two states' errors.
+    pub fn covariance(&self, one: usize, other: usize) -> f64 {
+        self.p[(one, other)]
+    }
+
+    /// Mean and 1σ of the error of gravity, true − stated; zero where it is no state.
+    pub fn gravity(&self) -> (f64, f64) {
+        let of = |state: usize| (self.x[state], self.p[(state, state)].max(0.0).sqrt());
+        self.layout.gravity().map_or((0.0, 0.0), of)
+    }
+
+    /// 1σ of the initial attitude error φ₀ of this stretch, East, North and Up.
+    pub fn initial_attitude_sigma(&self) -> Vector3<f64> {
+        let first = self.layout.initial_attitude();
+        Vector3::from_fn(|axis, _| self.p[(first + axis, first + axis)].max(0.0).sqrt())
+    }
+
+    /// Mean of the initial attitude error φ₀ of this stretch.
+    pub fn initial_attitude(&self) -> Vector3<f64> {
+        self.at(self.layout.initial_attitude())
+    }
+}
+
+/// Means of the errors of what is constant, where a pass linearises away from the prior's mean.
+#[derive(Debug, Clone)]
+pub struct PriorErrors {
+    pub parameters: ParameterVector,
+    pub terms: TermVector,
+    pub thermal: PerSensor<ThermalCoefficients>,
+}
+
+impl PriorErrors {
+    /// Where a pass begins with what is known.
+    pub fn none() -> Self {
+        Self {
+            parameters: ParameterVector::zeros(),
+            terms: TermVector::zeros(),
+            thermal: PerSensor::default(),
+        }
+    }
+
+    /// At a point of linearisation.
+    pub fn at(model: &Model, at: &Linearisation) -> Self {
+        Self {
+            parameters: model.prior_mean - to_vector(&at.triads),
+            terms: -at.terms,
+            thermal: PerSensor::from_fn(|sensor| -at.thermal.get(sensor)),
+        }
+    }
+}
+
+/// What a pass with feedback takes out of the mean.
+#[derive(Debug, Clone, Copy)]
+pub struct Feedback {
+    pub attitude: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+    pub position: Vector3<f64>,
+    pub initial_attitude: Vector3<f64>,
+    pub parameters: ParameterVector,
+    pub terms: TermVector,
+}
+
+const _: () = assert!(NAVIGATION == crate::navigation::NAVIGATION);
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,80 @@
+//! Rows of a few numbers, as many as the compiler knows.
+
+use nalgebra::Matrix3;
+
+/// Products that are summed side by side.
+const LANES: usize = 4;
+
+/// `sum += weight row`
+#[inline]
+pub fn add<const N: usize>(sum: &mut [f64; N], weight: f64, row: &[f64; N]) {
+    for k in 0..N {
+        sum[k] += weight * row[k];
+    }
+}
+
+#[inline]
+pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    // Several sums at once: a sum whose order is fixed waits for each of its terms.
+    let (of_a, rest_of_a) = a.as_chunks::<LANES>();
+    let (of_b, rest_of_b) = b.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for (a, b) in of_a.iter().zip(of_b) {
+        for k in 0..LANES {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest = rest_of_a.iter().zip(rest_of_b).map(|(a, b)| a * b);
+    sums.iter().sum::<f64>() + rest.sum::<f64>()
+}
+
+/// `L⁻¹` times rows.
+pub fn whiten<const N: usize>(root: &Matrix3<f64>, rows: &mut [[f64; N]; 3]) {
+    for k in 0..3 {
+        let (before, from) = rows.split_at_mut(k);
+        for (j, row) in before.iter().enumerate() {
+            add(&mut from[0], -root[(k, j)], row);
+        }
+        let scale = root[(k, k)].recip();
+        from[0].iter_mut().for_each(|x| *x *= scale);
+    }
+}
+
+/// Roots r of a covariance, `Σ r rᵀ` over these.
+pub fn roots<const N: usize>(covariance: [[f64; N]; N]) -> Vec<[f64; N]> {
+    let rows = factor(covariance, [0.0; N]);
+    rows.map(|(_, row, _)| row).collect()
+}
+
+/// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector, each after the component
+/// that it takes out: Cholesky's factorisation, the largest of what is left first, until rounding is all that is left
+/// (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).
+pub fn factor<const N: usize>(
+    mut matrix: [[f64; N]; N],
+    mut vector: [f64; N],
+) -> impl Iterator<Item = (usize, [f64; N], f64)> {
+    let diagonal: [f64; N] = std::array::from_fn(|k| matrix[k][k]);
+    let mut left: Vec<usize> = (0..N).filter(|&k| diagonal[k] > 0.0).collect();
+    std::iter::from_fn(move || {
+        let part = |k: usize| matrix[k][k] / diagonal[k];
+        let largest = |&a: &usize, &b: &usize| part(left[a]).total_cmp(&part(left[b]));
+        let place = (0..left.len()).max_by(largest)?;
+        if part(left[place]) < N as f64 * f64::EPSILON {
+            return None;
+        }
+        let pivot = left.swap_remove(place);
+        let root = matrix[pivot][pivot].sqrt();
+        let mut row = [0.0; N];
+        // What was taken out before is exactly nothing.
+        for &component in left.iter().chain([&pivot]) {
+            row[component] = matrix[pivot][component] / root;
+        }
+        let value = vector[pivot] / root;
+        for &component in &left {
+            let weight = row[component];
+            add(&mut matrix[component], -weight, &row);
+            vector[component] -= weight * value;
+        }
+        Some((pivot, row, value))
+    })
+}

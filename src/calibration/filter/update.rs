@@ -1,0 +1,65 @@
+//! Measurements.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Filter;
+use super::linear::Linear;
+use super::measurement::Measurement;
+use super::operation::Operation;
+
+impl Filter {
+    /// So many quantities that no error does anything to.
+    pub fn none(&self, rows: usize) -> Linear {
+        Linear::zeros(rows, self.x.len(), self.layout.tried())
+    }
+
+    /// Takes in a measurement.
+    pub fn update(&mut self, measurement: &Measurement) {
+        let mut h = self.none(measurement.rows.len());
+        for (row, of_row) in measurement.rows.iter().enumerate() {
+            for &(state, weight) in of_row {
+                h.states[(row, state)] = weight;
+            }
+        }
+        let z = DVector::from_column_slice(measurement.residual.as_slice());
+        let across = &h.states * &self.p;
+        self.take((&h, across), &z, measurement.variance);
+    }
+
+    /// Takes in measurements `z = H x + v`, v white of variance R each, given H and H P, in Joseph's form, which
+    /// keeps the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
+    /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
+    pub fn take(&mut self, (h, across): (&Linear, DMatrix<f64>), z: &DVector<f64>, variance: f64) {
+        let mut innovation = &across * h.states.transpose();
+        (0..z.len()).for_each(|k| innovation[(k, k)] += variance);
+        let Some(root) = innovation.cholesky() else {
+            // Nothing is finite any more, and the pass diverges.
+            self.x.fill(f64::NAN);
+            return;
+        };
+        // L⁻¹ of the innovations' covariance L Lᵀ, P Hᵀ L⁻ᵀ, and K = P Hᵀ L⁻ᵀ L⁻¹.
+        let mut whiten = DMatrix::identity(z.len(), z.len());
+        root.l_dirty().solve_lower_triangular_mut(&mut whiten);
+        let whitened = &whiten * (z - &h.states * &self.x);
+        let by_whitened = across.transpose() * whiten.transpose();
+        let gain = &by_whitened * &whiten;
+        self.x.gemv(1.0, &by_whitened, &whitened, 1.0);
+        // (I − K H) P, then (…) (I − K H)ᵀ + K R Kᵀ.
+        self.p
+            .gemm(-1.0, &by_whitened, &by_whitened.transpose(), 1.0);
+        let rest = (&gain * variance - &self.p * h.states.transpose()) * 0.5;
+        self.p.gemm(1.0, &gain, &rest.transpose(), 1.0);
+        self.p.gemm(1.0, &rest, &gain.transpose(), 1.0);
+        self.p.fill_lower_triangle_with_upper_triangle();
+        if let Some(sensitivity) = &mut self.sensitivity {
+            sensitivity.update(h, &gain, (&whiten, &whitened));
+        }
+        if let Some(tape) = &mut self.tape {
+            tape.push(Operation::Taken {
+                rows: h.states.clone(),
+                gain,
+                variance,
+            });
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! What is observed when: a stretch of a recording cut into steps, each with what its end shows.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::attitude::{self, exp, tilt};
+use crate::imu::{Sensor, Triad};
+use crate::navigation::{State, Sums, samples_of};
+use crate::recording::TableLog;
+use crate::run::{Dwell, Run};
+use crate::turntable::{AxisResponse, axis_response};
+
+/// A move, or a part of a dwell that ends with an observation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    pub samples: Range<usize>,
+    /// Set where they lie within a dwell.
+    pub at_rest: Option<AtRest>,
+}
+
+/// What is known at the end of a step within a dwell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AtRest {
+    /// Whether it is the dwell's first.
+    pub first: bool,
+    /// Its samples, summed.
+    pub sums: Sums,
+    /// Mean of the table's readings during the step, and how many they were.
+    pub reading: Option<(Matrix3<f64>, usize)>,
+    /// What its dwell is as a whole.
+    pub dwell: Arc<WholeDwell>,
+}
+
+/// What is known of a dwell as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WholeDwell {
+    /// Mean of the table's readings, `C_b_n`; none without a table.
+    pub attitude: Option<Matrix3<f64>>,
+    /// How the table's attitude turns with errors of its axes, where their angles are known.
+    pub axes: Option<Arc<AxisResponse>>,
+    /// Mean output of the accelerometers.
+    pub accel: Vector3<f64>,
+}
+
+/// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
+const STEP: f64 = 0.1;
+/// The same of a packed record once a dwell has lasted as long, in such steps: by then what is observed is
+/// limited by random walk, not by its own noise.
+const STEPS_OF_PACKED: usize = 10;
+
+/// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
+/// dwells so many taken together.
+pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: usize) -> Vec<Step> {
+    let imu = &run.recording.imu;
+    let length = step_length(imu.period);
+    let longest = match imu.is_packed() {
+        true => STEPS_OF_PACKED * length,
+        false => length,
+    };
+    let lengths = (length, longest);
+    let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), lengths, together);
+    // There may be so many that room to grow would be too much.
+    let count = dwells.iter().map(|dwell| 1 + of_dwell(dwell).count());
+    let mut steps = Vec::with_capacity(count.sum());
+    let mut at = dwells.first().map_or(0, |dwell| dwell.samples.start);
+    for (number, dwell) in dwells.iter().enumerate() {
+        let samples = at..dwell.samples.start;
+        if !samples.is_empty() {
+            steps.push(Step {
+                samples,
+                at_rest: None,
+            });
+        }
+        let position = dwell.position.as_ref();
+        let mut unread = position.map(|p| p.readings.clone());
+        // The first reading of all is the initial attitude.
+        if let Some(unread) = unread.as_mut().filter(|_| number == 0) {
+            unread.start += 1;
+        }
+        let axes = table.zip(position);
+        let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
+        let whole = Arc::new(WholeDwell {
+            attitude: position.map(|p| p.attitude),
+            axes: axes.map(|angles| Arc::new(axis_response(angles))),
+            accel: dwell.mean(Sensor::Accel, run).output,
+        });
+        let mut first = true;
+        for samples in of_dwell(dwell) {
+            let until = imu.time(samples.end) + 1e-3 * imu.period;
+            let reading = table.zip(unread.as_mut()).and_then(|(table, unread)| {
+                let readings = take_until(unread, table, until);
+                let mean = attitude::mean(&table.attitude[readings.clone()])?;
+                Some((mean, readings.len()))
+            });
+            steps.push(Step {
+                at_rest: Some(AtRest {
+                    first,
+                    sums: Sums::new(imu, samples.clone()),
+                    reading,
+                    dwell: whole.clone(),
+                }),
+                samples,
+            });
+            first = false;
+        }
+        at = dwell.samples.end;
+    }
+    steps
+}
+
+impl AtRest {
+    /// Where a pass without feedback linearises while the table is at rest: in the table's mean attitude, else
+    /// in the computed one, levelled.
+    ///
+    /// Both are within arc seconds of the truth in every pass, so what noise adds up to over a long
+    /// record never leaves the linear range; nor does a tilt that it makes change what a wrong heading
+    /// does.
+    pub fn tied(&self, computed: &State, accel: &Triad) -> State {
+        State::at_rest(self.dwell.attitude.unwrap_or_else(|| {
+            let up = accel.correction().unwrap_or_default() * (self.dwell.accel - accel.bias);
+            exp(tilt(&(computed.attitude * up))) * computed.attitude
+        }))
+    }
+}
+
+/// The attitude that a table's first reading gives.
+pub fn first_reading(table: Option<&TableLog>, dwells: &[Dwell]) -> Option<Matrix3<f64>> {
+    let position = dwells.first()?.position.as_ref()?;
+    table?
+        .attitude
+        .get(position.readings.start)
+        .map(attitude::matrix)
+}
+
+/// Number of samples in a step of a dwell.
+pub fn step_length(period: f64) -> usize {
+    samples_of(STEP, period)
+}
+
+/// Cuts a range into parts of this length; the last may be shorter.
+pub fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> {
+    let end = range.end;
+    let begins = range.step_by(length.max(1));
+    begins.map(move |begin| begin..(begin + length).min(end))
+}
+
+/// Cuts a range into parts of the first length, then into ever longer ones, each as long as all before it, up
+/// to the second; so many of them are taken together.
+fn growing(
+    range: Range<usize>,
+    (length, longest): (usize, usize),
+    together: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let begin = range.start;
+    let mut at = begin;
+    std::iter::from_fn(move || {
+        let from = at;
+        for _ in 0..together.max(1) {
+            let length = (at - begin).clamp(length.max(1), longest.max(1));
+            at = (at + length).min(range.end);
+        }
+        (at > from).then_some(from..at)
+    })
+}
+
+/// Takes the readings up to a time off the front of those not yet used.
+fn take_until(unread: &mut Range<usize>, table: &TableLog, until: f64) -> Range<usize> {
+    let taken = table.time[unread.clone()].partition_point(|&t| t <= until);
+    let readings = unread.start..unread.start + taken;
+    unread.start = readings.end;
+    readings
+}

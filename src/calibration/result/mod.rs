@@ -1,0 +1,493 @@
+//! A calibration as a file: `calibration.json` and `truth.json`.
+//!
+//! Values are in the file's quantity (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u)
+//! + bias`, with `u` in rad/s or m/s² along right-front-up.
+
+pub(super) mod at_rest;
+pub(super) mod comparison;
+pub(super) mod correction;
+pub(crate) mod frame;
+pub(super) mod nees;
+pub(super) mod record;
+pub(super) mod scatter;
+pub(super) mod thermal_record;
+
+use std::collections::BTreeMap;
+use std::ops::Index;
+
+use nalgebra::{Matrix3, Vector3};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::budget::BudgetRecord;
+use super::noise::NoiseReport;
+use crate::calibration::checks::dwell_scatter::DwellScatter;
+use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
+use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
+use crate::run::Aiding;
+
+/// The version of the format.
+pub const FORMAT: &str = "turncal-calibration/1";
+/// The version of one that changes with temperature.
+pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
+
+/// The equation of a record.
+pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
+
+/// The equation of a record with error terms of the instrument.
+pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
+     to u, zero in test_vectors";
+
+/// A calibration with its accuracy and how it was reached, or a known truth.
+///
+/// Only the two triads are always there. Unknown fields are ignored when reading.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
+    pub format: String,
+    /// How it was found; none for a truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Method>,
+    /// How angles make the installation matrix.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub installation_form: Option<InstallationForm>,
+    /// What the filter observed; none for a method without filter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aiding: Option<Aiding>,
+    /// What fixes the body axes.
+    #[serde(default)]
+    pub body_frame: BodyFrame,
+    /// The gyros.
+    pub gyro: TriadRecord,
+    /// The accelerometers.
+    pub accel: TriadRecord,
+    /// The file's quantity, such as `count`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<PerSensor<String>>,
+    /// 1σ of every value, zero where fixed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<PerSensor<TriadRecord>>,
+    /// Names of the estimated parameters, such as `gyro.installation.xy`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<String>,
+    /// Covariance of the estimated parameters, in their units.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub covariance: Vec<Vec<f64>>,
+    /// What each source adds to their uncertainty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<BudgetRecord>,
+    /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
+    /// such as `table.base.up`, in rad, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub terms: BTreeMap<String, TermRecord>,
+    /// How it changes with temperature; the values are those at its reference. None where it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ThermalRecord>,
+    /// What each of several recordings says.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<RecordingRecord>,
+    /// Gravity at the site.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<GravityRecord>,
+    /// Number of passes over the record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passes: Option<usize>,
+    /// Whether the last pass moved nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converged: Option<bool>,
+    /// Whether the innovations agree with their covariance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<ConsistencyRecord>,
+    /// What it leaves of gravity and turns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<QualityRecord>,
+    /// What error terms did, or would do.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<BlockRecord>,
+    /// Independent directions of the parameters, the least observed first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub observability: Vec<DirectionRecord>,
+    /// The noise that was used; none where a file states noise of another kind, as a truth may.
+    #[serde(
+        default,
+        deserialize_with = "if_known",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub noise: Option<NoiseRecord>,
+    /// What must be known before using the values.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// The same as values: kind, words, figures.
+    #[serde(default)]
+    pub findings: Vec<FindingRecord>,
+    /// Names of parameters that were not estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<String>,
+    /// The model in words, [`EQUATION`] or [`EQUATION_WITH_TERMS`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equation: Option<String>,
+    /// The matrix of `u = correction (N − bias)`, ready to use.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<PerSensor<[[f64; 3]; 3]>>,
+    /// Raw outputs with what they are calibrated, to check a user's own code.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub test_vectors: Vec<TestVector>,
+    /// What it was made of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
+    /// `[meta]` of the run.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub meta: BTreeMap<String, String>,
+}
+
+/// What a calibration was made of: enough to say which data and program gave it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The program with its version.
+    pub program: String,
+    /// Each file that was read with its SHA-256, the run.toml first; empty where nothing was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<InputFile>,
+    /// Nominal scales: the file's quantity per second for one rad/s or m/s².
+    pub nominal: PerSensor<[f64; 3]>,
+    /// Latitude of the site, degrees.
+    pub latitude_deg: f64,
+    /// Height of the site, m.
+    pub height_m: f64,
+    /// Time recorded, s.
+    pub duration_s: f64,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// How many dwells.
+    pub dwells: usize,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// Its name, as run.toml spells it.
+    pub name: String,
+    /// SHA-256 in hexadecimal digits.
+    pub sha256: String,
+}
+
+/// The noise that a calibration used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseRecord {
+    /// Policy, test and sources.
+    #[serde(flatten)]
+    pub report: NoiseReport,
+    /// `[imu.noise]` of what was learnt, to be pasted into `run.toml`; none where nothing was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run_toml: Option<String>,
+}
+
+/// A value of this kind, or none.
+fn if_known<'de, T: DeserializeOwned, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<T>, D::Error> {
+    let value = serde_json::Value::deserialize(from)?;
+    Ok(serde_json::from_value(value).ok())
+}
+
+/// A constant beside the parameters of the triads.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TermRecord {
+    /// Its value, in SI.
+    pub value: f64,
+    /// 1σ; none for a truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+}
+
+/// Gravity at the site of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GravityRecord {
+    /// Its magnitude.
+    pub m_s2: f64,
+    /// 1σ, which the scale factors of all three accelerometers share.
+    pub sigma_m_s2: f64,
+}
+
+/// How a calibration was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Extended Kalman filter.
+    Ekf,
+    /// Closed form from static positions.
+    SixPosition,
+}
+
+/// Values of one triad.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TriadRecord {
+    /// The file's quantity per second for one rad/s or m/s².
+    pub scale: [f64; 3],
+    /// Row by row, pure numbers.
+    pub installation: [[f64; 3]; 3],
+    /// The file's quantity per second.
+    pub bias: [f64; 3],
+}
+
+/// Normalised innovation squared of all observations, and of each kind apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ConsistencyRecord {
+    /// Of all observations.
+    #[serde(flatten)]
+    pub all: NisRecord,
+    /// Of zero velocity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<NisRecord>,
+    /// Of the table's attitude.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<NisRecord>,
+    /// Scores of dwells over their σ; none where there are too few dwells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dwells: Option<DwellScatter>,
+    /// Of the attitude that does not change at standstill, without a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude: Option<NisRecord>,
+}
+
+/// Mean of normalised innovations squared with its 95 % interval; one if σ are true.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NisRecord {
+    /// Mean per scalar observation.
+    pub nis: f64,
+    /// 95 % interval (χ²).
+    pub nis_interval: [f64; 2],
+}
+
+/// What a calibration leaves of what is known without a truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct QualityRecord {
+    /// Over the whole record.
+    pub all: MeasuresRecord,
+    /// In dwells whose observations a calibration did without, and over the turns that end in them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<MeasuresRecord>,
+}
+
+/// Departures from gravity and from known turns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeasuresRecord {
+    /// Magnitude of specific force at rest minus gravity.
+    pub gravity_m_s2: SpreadRecord,
+    /// Angle between up as gyros carry it over a turn and as accelerometers see it after.
+    pub direction_rad: SpreadRecord,
+    /// Angle between a turn as gyros see it and as table or label say.
+    pub turns_rad: SpreadRecord,
+}
+
+/// Several departures.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SpreadRecord {
+    /// How many; the rest is zero if none.
+    pub count: usize,
+    /// Root mean square.
+    pub rms: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+/// An error term against the same run without it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BlockRecord {
+    /// Its name, such as `accel-second-order`.
+    pub block: String,
+    /// Whether it was on; if not, it was tried with its usual σ.
+    pub on: bool,
+    /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; none where there is
+    /// no σ.
+    pub sigma_factors: [Option<f64>; 6],
+    /// By how much the cost, −2 ln of likelihood and prior, falls with it.
+    pub merit_gain: f64,
+    /// What that stays below where the block's errors are not there, but for its share of one false alarm
+    /// in a thousand runs.
+    pub merit_gain_limit: f64,
+    /// Whether it is more, so that the data ask for the block.
+    pub asked_for: bool,
+    /// NIS of all observations without it …
+    pub nis_without: f64,
+    /// … and with it.
+    pub nis_with: f64,
+}
+
+/// A combination of parameters, each in units of its prior σ, and how well a run observed it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DirectionRecord {
+    /// Posterior over prior σ.
+    pub remaining: f64,
+    /// In words, such as `gyro scale z with gyro bias z`.
+    pub words: String,
+    /// Name and component of the parameters that make up most of it; squares of all sum to one.
+    pub parts: BTreeMap<String, f64>,
+}
+
+/// What must be known before using the values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FindingRecord {
+    /// What kind of finding, such as `not-observed`.
+    pub kind: String,
+    /// In words.
+    pub text: String,
+    /// Its figures by name.
+    #[serde(default)]
+    pub figures: serde_json::Value,
+}
+
+/// A raw output of both triads and what it becomes, gyro first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TestVector {
+    /// `N`, in the file's quantity per second.
+    pub raw: [f64; 6],
+    /// `u`, in rad/s and m/s².
+    pub calibrated: [f64; 6],
+}
+
+/// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
+///
+/// # Panics
+/// As a map does, if there is no parameter of that name; `get` does not.
+impl Index<&str> for Calibration {
+    type Output = f64;
+
+    fn index(&self, name: &str) -> &f64 {
+        match self.get(name) {
+            Some(value) => value,
+            None => panic!("no parameter `{name}` in this calibration"),
+        }
+    }
+}
+
+impl Calibration {
+    /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity,
+    /// `gyro.installation.xy` the entry of the installation matrix in that row and column, the same for
+    /// `accel`; then parameters of error terms such as `accel.time_offset`, in SI.
+    pub fn get(&self, name: &str) -> Option<&f64> {
+        let in_triad = |sensor: &str| match sensor {
+            "gyro" => Some(&self.gyro),
+            "accel" => Some(&self.accel),
+            _ => None,
+        };
+        let mut parts = name.splitn(3, '.');
+        let (sensor, kind) = (parts.next()?, parts.next()?);
+        let found = in_triad(sensor).zip(parts.next());
+        let found = found.and_then(|(triad, axes)| entry(triad, kind, axes));
+        found.or_else(|| self.terms.get(name).map(|term| &term.value))
+    }
+
+    /// 1σ of a parameter by name, zero where it was not estimated; none if no σ is claimed.
+    pub fn sigma_of(&self, name: &str) -> Option<&f64> {
+        let sigma = self.sigma.as_ref()?;
+        let mut parts = name.splitn(3, '.');
+        let triad = match parts.next()? {
+            "gyro" => Some(&sigma.gyro),
+            "accel" => Some(&sigma.accel),
+            _ => None,
+        };
+        let found = triad.zip(parts.next()).zip(parts.next());
+        let found = found.and_then(|((triad, kind), axes)| entry(triad, kind, axes));
+        found.or_else(|| self.terms.get(name)?.sigma.as_ref())
+    }
+
+    /// A record of the two triads and nothing else, as a truth is.
+    pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            method: None,
+            installation_form: None,
+            aiding: None,
+            body_frame: BodyFrame::default(),
+            gyro,
+            accel,
+            unit: None,
+            sigma: None,
+            parameters: Vec::new(),
+            covariance: Vec::new(),
+            budget: None,
+            terms: BTreeMap::new(),
+            temperature: None,
+            recordings: Vec::new(),
+            gravity: None,
+            passes: None,
+            converged: None,
+            consistency: None,
+            quality: None,
+            blocks: Vec::new(),
+            observability: Vec::new(),
+            noise: None,
+            warnings: Vec::new(),
+            findings: Vec::new(),
+            fixed: Vec::new(),
+            equation: None,
+            correction: None,
+            test_vectors: Vec::new(),
+            provenance: None,
+            meta: BTreeMap::new(),
+        }
+    }
+}
+
+fn entry<'a>(triad: &'a TriadRecord, kind: &str, axes: &str) -> Option<&'a f64> {
+    let mut axes = axes
+        .chars()
+        .map(|axis| AXES.iter().position(|&a| a == axis));
+    let (first, second, more) = (axes.next()??, axes.next(), axes.next());
+    match (kind, second, more) {
+        ("scale", None, None) => Some(&triad.scale[first]),
+        ("bias", None, None) => Some(&triad.bias[first]),
+        ("installation", Some(Some(column)), None) => Some(&triad.installation[first][column]),
+        _ => None,
+    }
+}
+
+/// Both triads of a record, normalised by these nominal scales and split in a form. A record may
+/// hold any installation matrix, so the split goes through `K C`, which all forms share.
+pub fn triads_of(
+    record: &Calibration,
+    nominal: &PerSensor<Nominal>,
+    form: InstallationForm,
+) -> PerSensor<Triad> {
+    PerSensor::from_fn(|sensor| {
+        let triad = match sensor {
+            Sensor::Gyro => &record.gyro,
+            Sensor::Accel => &record.accel,
+        };
+        let nominal = nominal.get(sensor).0;
+        let a = Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j] / nominal[i]);
+        let bias = Vector3::from(triad.bias).component_div(&nominal);
+        Triad::from_sensitivity(form, &a, bias)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_have_names() {
+        let triad = |k: f64| TriadRecord {
+            scale: [k, k + 1.0, k + 2.0],
+            installation: [[1.0, k * 1e-3, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            bias: [0.0, 0.0, -k],
+        };
+        let calibration = Calibration::new(triad(5.0), triad(7.0));
+        assert_eq!(calibration["gyro.scale.y"], 6.0);
+        assert_eq!(calibration["accel.bias.z"], -7.0);
+        assert_eq!(calibration["gyro.installation.xy"], 5e-3);
+        for other in [
+            "gyro",
+            "gyro.scale",
+            "gyro.scale.w",
+            "gyro.scale.xy",
+            "gyro.bias.",
+            "x.y.z",
+            "",
+        ] {
+            assert_eq!(calibration.get(other), None, "{other}");
+        }
+        assert_eq!(calibration.sigma_of("gyro.scale.y"), None);
+    }
+}

@@ -1,0 +1,96 @@
+//! An error measured by its covariance, correlations included.
+
+use faer::{Mat, Side};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+use crate::calibration::checks::innovation::mean_square_interval;
+
+/// A correlation matrix has no information in directions whose eigenvalue is below this: they are
+/// zero but for rounding, as where three angles stand for six.
+const NO_DIRECTION: f64 = 1e-11;
+
+/// Normalised estimation error squared, a mean of squares of independent numbers of σ 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Nees {
+    /// NEES/n.
+    pub mean: f64,
+    /// n: number of independent directions in which the covariance is not zero.
+    pub count: usize,
+    /// 95 % interval of NEES/n if the σ are true (χ²).
+    pub interval: (f64, f64),
+}
+
+/// NEES of a difference over those of some parameters that have a σ; none if none has.
+pub fn nees<const N: usize>(
+    difference: &SVector<f64, N>,
+    covariance: &SMatrix<f64, N, N>,
+    parameters: &[usize],
+) -> Option<Nees> {
+    let with_sigma = parameters.iter().copied();
+    let with_sigma: Vec<usize> = with_sigma.filter(|&i| covariance[(i, i)] > 0.0).collect();
+    let squares = Directions::new(covariance, &with_sigma)?.squares(difference);
+    let count = squares.len();
+    (count > 0).then(|| Nees {
+        mean: squares.iter().sum::<f64>() / count as f64,
+        count,
+        interval: mean_square_interval(count, 0.05),
+    })
+}
+
+/// The independent directions of a covariance, found on its correlation matrix so that units do not
+/// matter.
+pub struct Directions {
+    indices: Vec<usize>,
+    sigma: DVector<f64>,
+    eigenvalues: DVector<f64>,
+    /// Column by column.
+    eigenvectors: DMatrix<f64>,
+}
+
+impl Directions {
+    /// Of the covariance of some parameters, each of which has a σ; none if there are none, or if the
+    /// matrix cannot be a covariance.
+    pub fn new<const N: usize>(covariance: &SMatrix<f64, N, N>, indices: &[usize]) -> Option<Self> {
+        let n = indices.len();
+        let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
+        let correlation = Mat::from_fn(n, n, |i, j| {
+            let (a, b) = (indices[i], indices[j]);
+            0.5 * (covariance[(a, b)] + covariance[(b, a)]) / (sigma[i] * sigma[j])
+        });
+        let finite = |j: usize| (0..n).all(|i| correlation[(i, j)].is_finite());
+        if n == 0 || !(0..n).all(finite) {
+            return None;
+        }
+        let eigen = correlation.self_adjoint_eigen(Side::Lower).ok()?;
+        let eigenvalues = DVector::from_fn(n, |k, _| eigen.S().column_vector()[k]);
+        (eigenvalues.min() > -NO_DIRECTION).then(|| Self {
+            indices: indices.to_vec(),
+            sigma,
+            eigenvalues,
+            eigenvectors: DMatrix::from_fn(n, n, |i, k| eigen.U()[(i, k)]),
+        })
+    }
+
+    /// Squares of a vector's components along the directions, each in units of its σ.
+    fn squares<const N: usize>(&self, v: &SVector<f64, N>) -> Vec<f64> {
+        let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
+        let along = self.eigenvectors.tr_mul(&z);
+        let squares = along.iter().zip(&self.eigenvalues);
+        squares
+            .filter(|(_, variance)| **variance > NO_DIRECTION)
+            .map(|(x, variance)| x * x / variance)
+            .collect()
+    }
+
+    /// The inverse of the covariance; `None` where it has no inverse.
+    pub fn information(&self) -> Option<DMatrix<f64>> {
+        if self.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
+            return None;
+        }
+        let inverse = DMatrix::from_diagonal(&self.eigenvalues.map(f64::recip));
+        let scale = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
+        let whitened = &scale * &self.eigenvectors;
+        Some(&whitened * inverse * whitened.transpose())
+    }
+}

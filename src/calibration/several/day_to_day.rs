@@ -1,0 +1,223 @@
+//! What differs between recordings of one instrument: parameters from one day to the next, and how it is mounted.
+
+use nalgebra::{SMatrix, Vector3};
+
+use crate::attitude::exp;
+use crate::calibration::group::Group;
+use crate::calibration::parameters::{
+    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
+};
+use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+
+/// What an instrument that is turned on its mounting face makes of parameters: derivatives of those of the recording.
+#[derive(Debug, Clone)]
+pub struct Turned {
+    /// By those that all recordings have in common, a column each. What is weak, the mean of all mountings, leans on
+    /// what is strong, so they have to be as exact as their ratio.
+    pub by_parameters: ParameterMatrix,
+    /// By the turn about each body axis.
+    pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
+}
+
+/// 1σ by which recordings of one instrument differ.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct DayToDay {
+    /// Of each parameter, normalised; zero where it is common to all.
+    pub parameters: ParameterVector,
+    /// Of the turn of the whole instrument on its mounting face, about each body axis, rad.
+    pub mounting: f64,
+}
+
+/// By how much one recording differs from what all have in common; or 1σ of that.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Difference {
+    /// Added to each parameter, normalised.
+    pub parameters: ParameterVector,
+    /// Rotation vector of the whole instrument on its mounting face, body axes, rad: what the face senses as u
+    /// the instrument senses as `R(ψ)ᵀ u`.
+    pub mounting: Vector3<f64>,
+}
+
+/// One thing that a recording has of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OwnState {
+    /// The difference of a parameter of both triads.
+    Parameter(usize),
+    /// The turn about a body axis.
+    Mounting(usize),
+}
+
+/// Rounds in which a mounting of a degree is found to a thousandth of a second of arc.
+const ROUNDS: usize = 3;
+/// Step of derivatives: small to their third order, large to rounding.
+const STEP: f64 = 1e-4;
+
+impl DayToDay {
+    /// Whether anything differs.
+    pub fn any(&self) -> bool {
+        self.parameters.amax() > 0.0 || self.mounting > 0.0
+    }
+
+    /// The key of a group in a campaign's `[day_to_day]`, and its unit in SI.
+    pub fn key(group: Group) -> (String, f64) {
+        let (kind, unit) = match (group.kind(), group.sensor()) {
+            (ParameterKind::Scale, _) => ("scale_ppm", PPM),
+            (ParameterKind::Installation, _) => ("installation_arcsec", ARCSEC),
+            (ParameterKind::Bias, Sensor::Gyro) => ("bias_deg_per_h", DEG_PER_H),
+            (ParameterKind::Bias, Sensor::Accel) => ("bias_ug", MICRO_G),
+        };
+        (format!("{}_{kind}", group.sensor().name()), unit)
+    }
+
+    /// All that a recording has of its own, with its 1σ.
+    pub(in crate::calibration) fn of(&self, own: OwnState) -> f64 {
+        match own {
+            OwnState::Parameter(index) => self.parameters[index],
+            OwnState::Mounting(_) => self.mounting,
+        }
+    }
+
+    /// Covariance of the parameters of a recording around what all have in common.
+    pub(in crate::calibration) fn covariance(&self, common: &PerSensor<Triad>) -> ParameterMatrix {
+        let parameters = self.parameters.component_mul(&self.parameters);
+        let parameters = ParameterMatrix::from_diagonal(&parameters);
+        if self.mounting == 0.0 {
+            return parameters;
+        }
+        let turns = Difference::default().response(common).by_mounting * self.mounting;
+        parameters + turns * turns.transpose()
+    }
+}
+
+impl Difference {
+    /// The value of one thing that differs.
+    pub(in crate::calibration) fn get(&self, own: OwnState) -> f64 {
+        match own {
+            OwnState::Parameter(index) => self.parameters[index],
+            OwnState::Mounting(axis) => self.mounting[axis],
+        }
+    }
+
+    pub(in crate::calibration) fn get_mut(&mut self, own: OwnState) -> &mut f64 {
+        match own {
+            OwnState::Parameter(index) => &mut self.parameters[index],
+            OwnState::Mounting(axis) => &mut self.mounting[axis],
+        }
+    }
+
+    /// The triads of the recording.
+    pub fn applied(&self, common: &PerSensor<Triad>) -> PerSensor<Triad> {
+        let form = common.gyro.form;
+        let triads = from_vector(form, &(to_vector(common) + self.parameters));
+        match self.mounting == Vector3::zeros() {
+            true => triads,
+            false => self.turned(&triads),
+        }
+    }
+
+    /// How the parameters of the recording change with those of all and with its mounting.
+    pub(in crate::calibration) fn response(&self, common: &PerSensor<Triad>) -> Turned {
+        let form = common.gyro.form;
+        let before = to_vector(common) + self.parameters;
+        let after = |mounting: &Vector3<f64>, parameters: &ParameterVector| {
+            let turned = Self {
+                mounting: *mounting,
+                ..*self
+            };
+            to_vector(&turned.turned(&from_vector(form, parameters)))
+        };
+        let difference = |up: ParameterVector, down: ParameterVector| (up - down) / (2.0 * STEP);
+        let columns = |k: usize| {
+            let step = ParameterVector::from_fn(|i, _| if i == k { STEP } else { 0.0 });
+            let at = |step| after(&self.mounting, &(before + step));
+            difference(at(step), at(-step))
+        };
+        let turns = [0, 1, 2].map(|axis| {
+            let step = Vector3::from_fn(|i, _| if i == axis { STEP } else { 0.0 });
+            let at = |step| after(&(self.mounting + step), &before);
+            difference(at(step), at(-step))
+        });
+        Turned {
+            by_parameters: ParameterMatrix::from_columns(&std::array::from_fn::<_, PARAMETERS, _>(
+                columns,
+            )),
+            by_mounting: SMatrix::from_columns(&turns),
+        }
+    }
+
+    /// The mounting by which common triads come nearest to those of a recording.
+    pub(in crate::calibration) fn mounting_between(
+        common: &PerSensor<Triad>,
+        recording: &ParameterVector,
+    ) -> Vector3<f64> {
+        let mut found = Self::default();
+        for _ in 0..ROUNDS {
+            let by = found.response(common).by_mounting;
+            let off = recording - to_vector(&found.turned(common));
+            let step = (by.transpose() * by).cholesky();
+            found.mounting +=
+                step.map_or_else(Vector3::zeros, |f| f.solve(&(by.transpose() * off)));
+        }
+        found.mounting
+    }
+
+    fn turned(&self, triads: &PerSensor<Triad>) -> PerSensor<Triad> {
+        let turn = exp(self.mounting).transpose();
+        PerSensor::from_fn(|sensor| {
+            let triad = triads.get(sensor);
+            Triad::from_sensitivity(triad.form, &(triad.sensitivity() * turn), triad.bias)
+        })
+    }
+
+    /// The difference a fraction of the way to another.
+    pub(in crate::calibration) fn towards(&self, other: &Self, fraction: f64) -> Self {
+        Self {
+            parameters: self.parameters + (other.parameters - self.parameters) * fraction,
+            mounting: self.mounting + (other.mounting - self.mounting) * fraction,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::InstallationForm;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn an_instrument_that_is_turned_senses_what_its_face_senses_turned_back() {
+        let common = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+        let turn = 1e-3f64;
+        let difference = Difference {
+            mounting: Vector3::new(0.0, 0.0, turn),
+            ..Difference::default()
+        };
+        let recording = difference.applied(&common);
+        // Turned about z from x towards y, its y axis sees what lies along x of the face from behind.
+        let sensed = recording.accel.output(&Vector3::x());
+        let expected = Vector3::new(turn.cos(), -turn.sin(), 0.0);
+        assert_relative_eq!(sensed, expected, epsilon = 1e-15);
+        let found = Difference::mounting_between(&common, &to_vector(&recording));
+        assert_relative_eq!(found, difference.mounting, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn a_recording_changes_with_what_all_have_in_common_as_its_response_says() {
+        let mut common = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+        common.gyro.scale.x = 1.01;
+        common.gyro.angles[0] = 0.02;
+        let difference = Difference {
+            mounting: Vector3::new(2e-3, -1e-3, 3e-3),
+            ..Difference::default()
+        };
+        let by = difference.response(&common).by_parameters;
+        let step = ParameterVector::from_fn(|i, _| 1e-5 * (i as f64 + 1.0).sin());
+        let moved = from_vector(common.gyro.form, &(to_vector(&common) + step));
+        let change =
+            to_vector(&difference.applied(&moved)) - to_vector(&difference.applied(&common));
+        // Linear to the square of the step; without the turn the change would be off by 3e-8.
+        assert_relative_eq!(by * step, change, epsilon = 1e-9);
+        assert!((step - change).amax() > 1e-8);
+    }
+}

@@ -1,0 +1,428 @@
+//! By how much recordings differ beyond what is stated: learnt from what each says alone.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::alone::Alone;
+use super::day_to_day::DayToDay;
+use crate::calibration::checks::finding::{Finding, RecordingDifference};
+use crate::calibration::estimate::Estimate;
+use crate::calibration::group::Group;
+use crate::calibration::model::Model;
+use crate::calibration::parameters::{from_vector, sensor_and_parameter};
+use crate::imu::{RATE, ThermalModel, Triad};
+use crate::statistics::chi_square_limit;
+
+/// Chance that recordings which differ as is stated are said to differ more; each group has the same share.
+const FALSE_ALARM: f64 = 1e-3;
+/// Fewer recordings do not tell a difference from a change with temperature.
+const FEWEST: usize = 3;
+/// The least part of its prior variance that a recording is believed to leave of a direction; below it rounding rules.
+const LEAST_LEFT: f64 = 1e-12;
+/// Halvings of the logarithm of a variance, over this many decades.
+const HALVINGS: usize = 16;
+const DECADES: f64 = 24.0;
+/// Rounds over the variances that are found, and a fall of −2 ln of the likelihood that is none.
+const ROUNDS: usize = 20;
+const SETTLED: f64 = 1e-2;
+
+/// What recordings differ by where they differ by more than is stated, and the finding that says so.
+///
+/// Each parameter is a polynomial in temperature, and each recording's own departs from it by a difference that all
+/// parameters of a group draw with one σ. The variances are those of the largest marginal likelihood. The group that
+/// the data call for most comes in first, then the next, as long as the likelihood ratio exceeds chance.
+///
+/// Source: Patterson and Thompson 1971, "Recovery of inter-block information when block sizes are unequal",
+/// Biometrika 58(3), for the likelihood; Henderson 1975, "Best linear unbiased estimation and prediction under a
+/// selection model", Biometrics 31(2), for its normal equations.
+pub fn learnt(model: &Model, alone: &[Alone]) -> Option<(DayToDay, Finding)> {
+    let said = Said::new(model, alone)?;
+    let limit = chi_square_limit(1.0, FALSE_ALARM / said.groups.len() as f64);
+    let found = said.found(limit)?;
+    let mut day_to_day = model.day_to_day;
+    let differences = found
+        .into_iter()
+        .map(
+            |Found {
+                 group,
+                 variance,
+                 ratio,
+             }| {
+                let (key, unit) = DayToDay::key(group);
+                let mut stated = 0.0;
+                for index in group.parameters(model.form) {
+                    let sigma = &mut day_to_day.parameters[index];
+                    stated = *sigma / unit;
+                    *sigma = sigma.hypot(variance.sqrt());
+                }
+                RecordingDifference {
+                    key,
+                    stated,
+                    found: stated.hypot(variance.sqrt() / unit),
+                    ratio,
+                    limit,
+                }
+            },
+        )
+        .collect();
+    Some((day_to_day, Finding::RecordingsDiffer { differences }))
+}
+
+/// A group whose parameters differ by this variance beyond what is stated.
+struct Found {
+    group: Group,
+    variance: f64,
+    ratio: f64,
+}
+
+/// What one recording says beyond its prior, along the directions of which it says more than that.
+struct Says {
+    /// Each with an error of 1σ …
+    values: DVector<f64>,
+    /// … of its own parameters, in prior σ: a row for each value …
+    by_own: DMatrix<f64>,
+    /// … and of what all recordings have in common.
+    by_common: DMatrix<f64>,
+}
+
+/// What all recordings say of the parameters that are estimated.
+struct Said {
+    recordings: Vec<Says>,
+    /// Of each parameter: the group's place, and the prior variance.
+    parameters: Vec<(usize, f64)>,
+    groups: Vec<Group>,
+    /// Covariance of what a recording has of its own as is stated, in prior σ.
+    stated: DMatrix<f64>,
+    /// Of what all have in common: the inverse of the prior variance.
+    prior: DVector<f64>,
+}
+
+/// −2 ln of the likelihood, but for a constant, and its derivative by the variance of each group.
+struct Likelihood {
+    deviance: f64,
+    slopes: Vec<f64>,
+}
+
+impl Says {
+    /// Where `common` takes what all have in common to the parameters at the recording's temperature. `None` where
+    /// the recording says nothing beyond its prior.
+    fn new(
+        (off, covariance): (&DVector<f64>, DMatrix<f64>),
+        common: &DMatrix<f64>,
+    ) -> Option<Self> {
+        // The recording left so much of the prior variance along each direction.
+        let left = covariance.symmetric_eigen();
+        let seen: Vec<usize> = (0..off.len())
+            .filter(|&k| left.eigenvalues[k] < 0.5)
+            .collect();
+        let weight = |k: usize| 1.0 / left.eigenvalues[k].max(LEAST_LEFT) - 1.0;
+        let by_own = DMatrix::from_fn(seen.len(), off.len(), |row, i| {
+            weight(seen[row]).sqrt() * left.eigenvectors[(i, seen[row])]
+        });
+        // Its prior drew the estimate towards the mean by the part that is left.
+        let drawn = DVector::from_fn(seen.len(), |row, _| {
+            let weight = weight(seen[row]);
+            (1.0 + weight) / weight
+        });
+        (!seen.is_empty()).then(|| Self {
+            values: (&by_own * off).component_mul(&drawn),
+            by_common: &by_own * common,
+            by_own,
+        })
+    }
+}
+
+impl Said {
+    /// `None` where too few recordings say anything.
+    fn new(model: &Model, alone: &[Alone]) -> Option<Self> {
+        let groups: Vec<Group> = Group::all().collect();
+        let indices: Vec<usize> = groups
+            .iter()
+            .flat_map(|group| group.parameters(model.form))
+            .filter(|&index| model.prior_sigma[index] > 0.0)
+            .collect();
+        let n = indices.len();
+        let prior = |i: usize| model.prior_sigma[indices[i]];
+        let functions = model.thermal.as_ref().map_or(0, |_| RATE);
+        let coefficient = |i: usize, function: usize| {
+            let (sensor, of_triad) = sensor_and_parameter(indices[i]);
+            let sigma = |thermal: &ThermalModel| thermal.sigma.get(sensor)[(of_triad, function)];
+            model.thermal.as_deref().map_or(0.0, sigma)
+        };
+        let mut widest = DVector::from_element(n, 1.0f64);
+        let mut recordings = Vec::new();
+        for alone in alone {
+            let Some(estimate) = &alone.estimate else {
+                continue;
+            };
+            let state = match &alone.state {
+                None if functions > 0 => continue,
+                state => state.as_ref(),
+            };
+            let mut common = DMatrix::zeros(n, n * (1 + functions));
+            for i in 0..n {
+                common[(i, i)] = 1.0;
+                let (sensor, of_triad) = sensor_and_parameter(indices[i]);
+                let axis = Triad::axis(model.form, of_triad);
+                if let Some((state, axis)) = state.zip(axis) {
+                    for function in 0..functions {
+                        let by = state.get(sensor)[axis][function];
+                        common[(i, (1 + function) * n + i)] =
+                            by * coefficient(i, function) / prior(i);
+                    }
+                }
+            }
+            let (off, covariance) = in_prior_sigma(estimate, model, &indices);
+            widest.zip_apply(&off, |widest, off| *widest = widest.max(off.abs()));
+            recordings.extend(Says::new((&off, covariance), &common));
+        }
+        let own = model.day_to_day;
+        let own = own.covariance(&from_vector(model.form, &model.prior_mean));
+        (recordings.len() >= FEWEST).then(|| Self {
+            recordings,
+            parameters: indices
+                .iter()
+                .map(|&index| {
+                    let group = Group::of(index);
+                    let place = groups.iter().position(|&of| of == group);
+                    (place.unwrap_or_default(), model.prior_sigma[index].powi(2))
+                })
+                .collect(),
+            groups,
+            stated: DMatrix::from_fn(n, n, |i, j| {
+                own[(indices[i], indices[j])] / (prior(i) * prior(j))
+            }),
+            // A mean that is far from what all recordings say is no difference between them.
+            prior: DVector::from_fn(n * (1 + functions), |k, _| match k < n {
+                true => widest[k].powi(-2),
+                false => 1.0,
+            }),
+        })
+    }
+
+    /// Where the variance of each group beyond what is stated is this. `None` where rounding has the last word.
+    fn likelihood(&self, variances: &[f64]) -> Option<Likelihood> {
+        let mut own = self.stated.clone();
+        for (i, &(group, prior)) in self.parameters.iter().enumerate() {
+            own[(i, i)] += variances[group] / prior;
+        }
+        let mut information = DMatrix::from_diagonal(&self.prior);
+        let mut right = DVector::zeros(self.prior.len());
+        let mut deviance = 0.0;
+        let mut whitened = Vec::with_capacity(self.recordings.len());
+        for says in &self.recordings {
+            let m = says.values.len();
+            let covariance =
+                DMatrix::identity(m, m) + &says.by_own * &own * says.by_own.transpose();
+            let root = covariance.cholesky()?.unpack();
+            let by = |of: &DMatrix<f64>| root.solve_lower_triangular(of);
+            let (by_own, by_common) = (by(&says.by_own)?, by(&says.by_common)?);
+            let values = root.solve_lower_triangular(&says.values)?;
+            deviance += 2.0 * root.diagonal().map(f64::ln).sum() + values.norm_squared();
+            information += by_common.tr_mul(&by_common);
+            right += by_common.tr_mul(&values);
+            whitened.push((by_own, by_common, values));
+        }
+        let root: Cholesky<f64, Dyn> = information.cholesky()?;
+        let common = root.solve(&right);
+        let root = root.unpack();
+        deviance += 2.0 * root.diagonal().map(f64::ln).sum() - right.dot(&common);
+        let mut slopes = vec![0.0; self.groups.len()];
+        for (by_own, by_common, values) in &whitened {
+            let unexplained = by_own.tr_mul(&(values - by_common * &common));
+            let told = root.solve_lower_triangular(&by_common.tr_mul(by_own))?;
+            for (i, &(group, prior)) in self.parameters.iter().enumerate() {
+                let expected = by_own.column(i).norm_squared() - told.column(i).norm_squared();
+                slopes[group] += (expected - unexplained[i].powi(2)) / prior;
+            }
+        }
+        Some(Likelihood { deviance, slopes })
+    }
+
+    /// The variance of a group at which the likelihood is largest, the others' held; zero where any lowers it.
+    fn most_likely(&self, group: usize, variances: &[f64]) -> Option<f64> {
+        let mut trial = variances.to_vec();
+        let mut falls = |variance: f64| {
+            trial[group] = variance;
+            Some(self.likelihood(&trial)?.slopes[group] < 0.0)
+        };
+        if !falls(0.0)? {
+            return Some(0.0);
+        }
+        let of_group = self.parameters.iter().filter(|of| of.0 == group);
+        let mut high = of_group.map(|of| of.1).fold(0.0, f64::max);
+        while falls(high)? {
+            high *= 100.0;
+        }
+        let (mut low, mut high) = (high.log10() - DECADES, high.log10());
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            match falls(10f64.powf(middle))? {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        Some(10f64.powf(0.5 * (low + high)))
+    }
+
+    /// The groups whose variance the data call for beyond this likelihood ratio; `None` where there are none.
+    fn found(&self, limit: f64) -> Option<Vec<Found>> {
+        let mut variances = vec![0.0; self.groups.len()];
+        let deviance = |variances: &[f64]| self.likelihood(variances).map(|of| of.deviance);
+        // What −2 ln of the likelihood loses by a group, the others' variances held.
+        let ratio = |group: usize, variances: &[f64]| {
+            let mut without = variances.to_vec();
+            without[group] = 0.0;
+            Some(deviance(&without)? - deviance(variances)?)
+        };
+        loop {
+            let candidates = (0..variances.len()).filter(|&group| variances[group] == 0.0);
+            let tried = candidates.filter_map(|group| {
+                let mut with = variances.clone();
+                with[group] = self.most_likely(group, &variances)?;
+                Some((ratio(group, &with)?, with))
+            });
+            let Some((_, with)) = tried
+                .filter(|&(ratio, _)| ratio > limit)
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+            else {
+                break;
+            };
+            variances = with;
+            let mut before = deviance(&variances)?;
+            for _ in 0..ROUNDS {
+                for group in 0..variances.len() {
+                    if variances[group] > 0.0 {
+                        variances[group] = self.most_likely(group, &variances)?;
+                    }
+                }
+                let after = deviance(&variances)?;
+                if before - after < SETTLED {
+                    break;
+                }
+                before = after;
+            }
+        }
+        let found = (0..variances.len()).filter(|&group| variances[group] > 0.0);
+        let found: Vec<Found> = found
+            .filter_map(|group| {
+                Some(Found {
+                    group: self.groups[group],
+                    variance: variances[group],
+                    ratio: ratio(group, &variances)?,
+                })
+            })
+            // One that came in first may be explained by those after it.
+            .filter(|found| found.ratio > limit)
+            .collect();
+        (!found.is_empty()).then_some(found)
+    }
+}
+
+/// What an estimate is off the mean of the prior, and its covariance, in prior σ.
+fn in_prior_sigma(
+    estimate: &Estimate,
+    model: &Model,
+    indices: &[usize],
+) -> (DVector<f64>, DMatrix<f64>) {
+    let n = indices.len();
+    let off = estimate.vector() - model.prior_mean;
+    let sigma = |i: usize| model.prior_sigma[indices[i]];
+    (
+        DVector::from_fn(n, |i, _| off[indices[i]] / sigma(i)),
+        DMatrix::from_fn(n, n, |i, j| {
+            estimate.covariance[(indices[i], indices[j])] / (sigma(i) * sigma(j))
+        }),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Of the prior, where each recording alone knows a parameter to 1.
+    const PRIOR: f64 = 100.0;
+
+    /// Ten parameters of one group in eight recordings with a linear change, each alone known to 1 or, of the first
+    /// recording, only the sum of each two; that differ by `sigma`.
+    fn drawn(sigma: f64, seed: u64) -> Said {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut unit = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (n, by) = (10, |a: usize| a as f64 / 4.0 - 1.0);
+        let mut normal = |scale: f64| DVector::from_fn(n, |_, _| scale * unit());
+        let (constant, slope) = (normal(PRIOR), normal(PRIOR));
+        let recordings = (0..8)
+            .map(|a| {
+                let own = (&constant + &slope * by(a) + normal(sigma)) / PRIOR;
+                let by_own = match a {
+                    0 => DMatrix::from_fn(n / 2, n, |row, i| {
+                        PRIOR * f64::from(u8::from(i / 2 == row))
+                    }),
+                    _ => DMatrix::identity(n, n) * PRIOR,
+                };
+                let mut common = DMatrix::identity(n, 2 * n);
+                common.view_mut((0, n), (n, n)).fill_diagonal(by(a));
+                Says {
+                    values: &by_own * own + normal(1.0).rows(0, by_own.nrows()),
+                    by_common: &by_own * common,
+                    by_own,
+                }
+            })
+            .collect();
+        Said {
+            recordings,
+            parameters: vec![(0, PRIOR.powi(2)); n],
+            groups: Group::all().take(1).collect(),
+            stated: DMatrix::zeros(n, n),
+            prior: DVector::from_element(2 * n, 1.0),
+        }
+    }
+
+    #[test]
+    fn the_slope_of_the_likelihood_is_its_derivative() {
+        let said = drawn(2.0, 1);
+        let at = |variance: f64| said.likelihood(&[variance]).unwrap();
+        let numeric = (at(2.0 + 1e-4).deviance - at(2.0 - 1e-4).deviance) / 2e-4;
+        assert!((at(2.0).slopes[0] / numeric - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_difference_is_found_within_its_own_error_and_none_where_there_is_none() {
+        // Six of eight degrees of freedom are left of each parameter, half a one less for what the first recording
+        // does not tell apart: 55, so σ² is known to √(2/55) of itself.
+        let runs = 200;
+        let mut sum = 0.0;
+        for seed in 0..runs {
+            let found = drawn(2.0, seed)
+                .found(chi_square_limit(1.0, FALSE_ALARM))
+                .unwrap();
+            sum += found[0].variance / f64::from(runs as u32);
+        }
+        let expected = 5.0 * (2.0f64 / 55.0).sqrt() / f64::from(runs as u32).sqrt();
+        assert!((sum - 4.0).abs() < 4.0 * expected, "{sum} ± {expected}");
+        let beyond = (0..runs).filter(|&seed| {
+            drawn(0.0, seed)
+                .found(chi_square_limit(1.0, 0.05))
+                .is_some()
+        });
+        // One in twenty by a test of two sides, of which only one counts: five of 200, and 13 in one of a thousand.
+        let beyond = beyond.count();
+        assert!(beyond <= 13, "{beyond}");
+    }
+
+    #[test]
+    fn what_a_recording_does_not_tell_apart_is_no_difference() {
+        // It saw the sum of two parameters of which the first is 3 prior σ off, and shares it by their prior.
+        let covariance =
+            DMatrix::from_row_slice(2, 2, &[0.5, -0.5, -0.5, 0.5]) + DMatrix::identity(2, 2) * 1e-6;
+        let says = Says::new(
+            (&DVector::from_vec(vec![1.5, 1.5]), covariance),
+            &DMatrix::identity(2, 2),
+        )
+        .unwrap();
+        assert_eq!(says.values.len(), 1);
+        let off = (&says.by_own * DVector::from_vec(vec![3.0, 0.0]) - &says.values)[0];
+        assert!(off.abs() < 0.01, "{off}");
+    }
+}

@@ -1,0 +1,199 @@
+//! Several recordings of one instrument as one problem: what they have in common is estimated once, what is
+//! each one's own differs by a stated σ, and parameters may follow temperature.
+//!
+//! Each recording is first calibrated alone, on a thread of its own. Through these estimates go the polynomials
+//! from which the Gauss–Newton iterations of all data begin; with all orders that the temperatures support,
+//! then with those that a likelihood ratio calls for.
+
+pub mod at_temperature;
+pub mod day_to_day;
+pub mod separate;
+pub mod thermal;
+
+pub mod alone;
+mod differ;
+mod order;
+mod repeat;
+mod temperatures;
+
+use std::sync::Arc;
+
+use super::error::CalibrationError;
+use super::iterations::{Iterated, iterate};
+use super::linearisation::{AttitudePrior, Linearisation};
+use super::noise::NoisePolicy;
+use super::options::Options;
+use super::outcome::Pass;
+use super::parameters::parameter;
+use super::pass::Gate;
+use super::problem::{Problem, Stretch};
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::several::alone::Alone;
+use crate::calibration::several::day_to_day::{DayToDay, Difference};
+use crate::calibration::start::attempt::Progress;
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::run::{Aiding, Run};
+pub use repeat::Repeatability;
+pub use temperatures::TemperatureOptions;
+use temperatures::Temperatures;
+
+/// What recordings of one instrument have in common, and what not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Together {
+    /// By how much they differ. Without a table the body axes go with the accelerometers, however they are mounted.
+    pub day_to_day: DayToDay,
+    /// How parameters follow temperature; none where they do not.
+    pub temperature: Option<TemperatureOptions>,
+}
+
+impl Default for Together {
+    fn default() -> Self {
+        Self {
+            day_to_day: DayToDay::default(),
+            temperature: Some(TemperatureOptions::default()),
+        }
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// The problem that recordings of one instrument pose together. The first one's instrument and table stand for
+    /// all; one without a dwell is left out, and a finding says so.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if there is none, or one has no temperature where parameters follow it.
+    pub fn together(
+        runs: &[&'a Run],
+        options: &Options,
+        together: &Together,
+    ) -> Result<Self, CalibrationError> {
+        let (first, others) = runs.split_first().ok_or(CalibrationError::NoDwells)?;
+        let mut problem = Self::new(first, options);
+        for run in others {
+            problem = problem.and(run);
+        }
+        let problem = problem.of_dwells();
+        let mut model = problem.model.clone();
+        model.day_to_day = together.day_to_day;
+        if model.aiding == Aiding::Velocity {
+            model.day_to_day.mounting = 0.0;
+        }
+        if let Some(options) = together.temperature {
+            let temperatures = Temperatures::of(&problem)?;
+            model.thermal = temperatures.model(&problem, options).map(Arc::new);
+        }
+        Ok(problem.with_model(model))
+    }
+
+    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known.
+    pub(in crate::calibration) fn warming(&self) -> Vec<(f64, f64)> {
+        let of_stretch = |stretch: &Stretch| {
+            let imu = &stretch.run.recording.imu;
+            let mean =
+                |all: PerSensor<[f64; 3]>| all.gyro.iter().chain(&all.accel).sum::<f64>() / 6.0;
+            let dwells = stretch.dwells.iter();
+            dwells
+                .map(|dwell| {
+                    let (from, to) = (imu.time(dwell.samples.start), imu.time(dwell.samples.end));
+                    let middle = 0.5 * (from + to);
+                    imu.temperature.as_ref().map_or((f64::NAN, f64::NAN), |t| {
+                        (mean(t.at(middle)), mean(t.rate(middle)))
+                    })
+                })
+                .collect::<Vec<_>>()
+        };
+        self.stretches().iter().flat_map(of_stretch).collect()
+    }
+
+    /// Whether anything in it differs between recordings or temperatures.
+    pub(in crate::calibration) fn varies(&self) -> bool {
+        self.model.thermal.is_some() || self.model.day_to_day.any()
+    }
+}
+
+/// Iterations of all recordings together, and what came of each alone.
+pub struct Joint<'a> {
+    /// With the orders that the data call for.
+    pub problem: Problem<'a>,
+    pub priors: Vec<AttitudePrior>,
+    pub passes: Vec<Pass>,
+    pub iterated: Iterated,
+    pub alone: Vec<Alone>,
+    pub findings: Vec<Finding>,
+}
+
+/// Solves a problem of several recordings, or one that varies, with stated noise. Recordings differ by what is stated
+/// or, where the noise may be learnt, by what they show.
+pub fn solve<'a>(problem: &Problem<'a>, progress: Progress) -> Result<Joint<'a>, CalibrationError> {
+    let alone = separate::each(problem)?;
+    let mut findings = Vec::new();
+    let mut problem = problem.clone();
+    if problem.options.noise != NoisePolicy::Stated
+        && let Some((day_to_day, finding)) = differ::learnt(&problem.model, &alone)
+    {
+        let mut model = problem.model.clone();
+        model.day_to_day = day_to_day;
+        problem = problem.with_model(model);
+        findings.push(finding);
+    }
+    let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
+    let at = start(&problem, &alone);
+    let mut passes = Vec::new();
+    let gate = Gate::Innovations;
+    let mut iterated = iterate(&problem, &priors, at, gate, &mut passes, progress)?;
+    if let Some(thermal) = &iterated.held.thermal {
+        let selected = order::select(thermal, &iterated.held.covariance);
+        findings.extend(selected.finding(problem.model.form));
+        if selected.model != thermal.model {
+            let mut model = problem.model.clone();
+            model.thermal = Some(Arc::new(selected.model));
+            problem = problem.with_model(model);
+            let mut from = iterated.held.estimate.clone();
+            order::move_to(&selected.conditioned, &mut from);
+            iterated = iterate(&problem, &priors, from, gate, &mut passes, progress)?;
+        }
+    }
+    Ok(Joint {
+        problem,
+        priors,
+        passes,
+        iterated,
+        alone,
+        findings,
+    })
+}
+
+/// Where the iterations begin: of each parameter the polynomial through what each recording alone says.
+fn start(problem: &Problem, alone: &[Alone]) -> Linearisation {
+    let model = &problem.model;
+    let initial = alone.iter().flat_map(|a| a.initial_attitudes.clone());
+    let mut at = Linearisation::new(
+        super::parameters::from_vector(model.form, &model.prior_mean),
+        nalgebra::SVector::zeros(),
+        initial.collect(),
+    );
+    let mut common = model.prior_mean;
+    for sensor in Sensor::ALL {
+        for of_triad in 0..PER_TRIAD {
+            let index = parameter(sensor, of_triad);
+            let (sigma, axis) = (model.prior_sigma[index], Triad::axis(model.form, of_triad));
+            let (Some(axis), true) = (axis, sigma > 0.0) else {
+                continue;
+            };
+            let fit = separate::through(model, alone, (sensor, of_triad, axis));
+            common[index] = model.prior_mean[index] + fit[0];
+            let coefficients = at.thermal.get_mut(sensor);
+            for function in 0..fit.len() - 1 {
+                coefficients[(of_triad, function)] = fit[function + 1];
+            }
+        }
+    }
+    at.triads = super::parameters::from_vector(model.form, &common);
+    if model.day_to_day.mounting > 0.0 {
+        let mountings = alone.iter().map(|alone| Difference {
+            mounting: Difference::mounting_between(&at.triads, &alone.start),
+            ..Difference::default()
+        });
+        at.own = mountings.collect();
+    }
+    at
+}

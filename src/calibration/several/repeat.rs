@@ -1,0 +1,150 @@
+//! Whether recordings repeat each other: what each alone says against all together.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::alone::Alone;
+use super::day_to_day::Difference;
+use crate::calibration::checks::innovation::Observation;
+use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::{PARAMETERS, ParameterVector, to_vector};
+use crate::statistics::chi_square_limit;
+
+/// Chance that recordings which repeat are said not to.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// How a parameter repeats from one recording to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repeatability {
+    /// Its index.
+    pub parameter: usize,
+    /// Standard deviation of what recordings alone say about the common curve …
+    pub spread: f64,
+    /// … its 1σ …
+    pub sigma: f64,
+    /// … and what their claimed σ make of it.
+    pub claimed: f64,
+    /// Squared departures, each over its variance, for each degree of freedom; one if σ are true.
+    pub chi_square: f64,
+    /// What that stays below in 999 of 1000 campaigns if σ are true.
+    pub limit: f64,
+}
+
+impl Outcome {
+    /// What a recording alone says less all together at its temperature, where its temperature stands, if it had been
+    /// mounted as the mean of all.
+    fn departure(&self, number: usize, alone: &Alone) -> Option<ParameterVector> {
+        let mounting = self.own.get(number).map(|own| own.values.mounting);
+        let turned_back = Difference {
+            mounting: -mounting.unwrap_or_default(),
+            ..Difference::default()
+        };
+        let triads = turned_back.applied(&alone.estimate.as_ref()?.triads);
+        let mut off = to_vector(&triads) - self.estimate.vector();
+        if let Some(thermal) = &self.thermal {
+            let (change, _) = thermal.at(alone.state.as_ref()?, &self.estimate.covariance);
+            off -= change;
+        }
+        Some(off)
+    }
+
+    /// Squared distance of what a recording alone says from all together, for each of its parameters, and what it
+    /// stays below in 999 of 1000. `None` where it alone says nothing.
+    pub fn distance_alone(&self, number: usize) -> Option<(f64, f64)> {
+        let alone = self.alone.get(number)?;
+        let off = self.departure(number, alone)?;
+        let estimate = alone.estimate.as_ref()?;
+        let estimated: Vec<usize> = estimate.estimated().collect();
+        let n = estimated.len();
+        let sigma = estimate.sigma();
+        let together = match &self.thermal {
+            Some(thermal) => {
+                thermal
+                    .at(alone.state.as_ref()?, &self.estimate.covariance)
+                    .1
+            }
+            None => self.estimate.covariance,
+        };
+        let own = &self.model.day_to_day;
+        // All together have told the mounting already.
+        let told = if own.mounting > 0.0 { 3 } else { 0 };
+        let own = own.covariance(&self.estimate.triads);
+        // What one part of the data says differs from what all say by as much as it knows less (Hausman 1978,
+        // "Specification tests in econometrics", Econometrica 46(6)).
+        let covariance = DMatrix::from_fn(n, n, |i, j| {
+            let (i, j) = (estimated[i], estimated[j]);
+            (estimate.covariance[(i, j)] + own[(i, j)] - together[(i, j)]) / (sigma[i] * sigma[j])
+        });
+        let off = DVector::from_fn(n, |i, _| off[estimated[i]] / sigma[estimated[i]]);
+        let squared = off.dot(&covariance.cholesky()?.solve(&off));
+        let freedom = n.checked_sub(told).filter(|&freedom| freedom > 0)? as f64;
+        Some((
+            squared / freedom,
+            chi_square_limit(freedom, FALSE_ALARM) / freedom,
+        ))
+    }
+
+    /// How each parameter repeats, where at least three recordings say it alone.
+    pub fn repeatability(&self) -> Vec<Repeatability> {
+        let all: Vec<(ParameterVector, ParameterVector)> = self
+            .alone
+            .iter()
+            .enumerate()
+            .filter_map(|(k, alone)| {
+                Some((self.departure(k, alone)?, alone.estimate.as_ref()?.sigma()))
+            })
+            .collect();
+        let of = |parameter: usize| {
+            let own = self.model.day_to_day.parameters[parameter];
+            let known: Vec<(f64, f64)> = all
+                .iter()
+                .filter(|(_, sigma)| sigma[parameter] > 0.0)
+                .map(|(off, sigma)| (off[parameter], sigma[parameter]))
+                .collect();
+            let taken = 1 + self.thermal.as_ref().map_or(0, |t| t.order(parameter).0);
+            let freedom = known
+                .len()
+                .checked_sub(taken)
+                .filter(|&f| f > 0 && known.len() > 2)?;
+            let freedom = freedom as f64;
+            let variance = |sigma: f64| sigma * sigma + own * own;
+            let squares: f64 = known.iter().map(|(off, _)| off * off).sum();
+            let chi_square: f64 = known.iter().map(|(off, s)| off * off / variance(*s)).sum();
+            let claimed: f64 = known.iter().map(|(_, s)| variance(*s)).sum();
+            let spread = (squares / freedom).sqrt();
+            Some(Repeatability {
+                parameter,
+                spread,
+                sigma: spread / (2.0 * freedom).sqrt(),
+                claimed: (claimed / known.len() as f64).sqrt(),
+                chi_square: chi_square / freedom,
+                limit: chi_square_limit(freedom, FALSE_ALARM) / freedom,
+            })
+        };
+        (0..PARAMETERS).filter_map(of).collect()
+    }
+
+    /// Of each dwell that had any, told by number, the sums of its whitened innovations of velocity over the root of
+    /// their number.
+    pub fn by_dwell(&self) -> Vec<(usize, [f64; 3])> {
+        let mut all: Vec<(usize, [f64; 3], f64)> = Vec::new();
+        let seen = self.innovations.iter();
+        for innovation in seen.filter(|i| i.accepted && i.observation == Observation::Velocity) {
+            if all
+                .last()
+                .is_none_or(|(dwell, ..)| *dwell != innovation.dwell)
+            {
+                all.push((innovation.dwell, [0.0; 3], 0.0));
+            }
+            if let Some((_, sums, count)) = all.last_mut() {
+                for (sum, whitened) in sums.iter_mut().zip(&innovation.whitened) {
+                    *sum += whitened;
+                }
+                *count += 1.0;
+            }
+        }
+        let root = |(dwell, sums, count): (usize, [f64; 3], f64)| {
+            (dwell, sums.map(|sum| sum / count.sqrt()))
+        };
+        all.into_iter().map(root).collect()
+    }
+}

@@ -1,0 +1,126 @@
+//! How parameters depend on temperature, as estimated: coefficients of [`crate::imu::ThermalModel`].
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector, parameter};
+use crate::imu::{
+    InstallationForm, PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalCoefficients, ThermalModel,
+    ThermalState, Triad,
+};
+
+/// A coefficient of a parameter's dependence on temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Coefficient {
+    /// Whose.
+    pub sensor: Sensor,
+    /// Index among the triad's parameters.
+    pub parameter: usize,
+    /// Index among [`THERMAL_FUNCTIONS`].
+    pub function: usize,
+    /// The axis whose temperature counts.
+    pub axis: usize,
+}
+
+impl Coefficient {
+    /// Those that a model has on.
+    pub(in crate::calibration) fn all(
+        form: InstallationForm,
+        model: Option<&ThermalModel>,
+    ) -> Vec<Self> {
+        let on = model.into_iter().flat_map(ThermalModel::on);
+        on.filter_map(|(sensor, parameter, function)| {
+            let axis = Triad::axis(form, parameter)?;
+            Some(Self {
+                sensor,
+                parameter,
+                function,
+                axis,
+            })
+        })
+        .collect()
+    }
+
+    /// Index of its parameter among those of both triads.
+    pub fn index(&self) -> usize {
+        parameter(self.sensor, self.parameter)
+    }
+
+    /// What an error of it is of its parameter's in this state.
+    pub(in crate::calibration) fn weight(&self, state: &ThermalState) -> f64 {
+        state.get(self.sensor)[self.axis][self.function]
+    }
+
+    /// Of these coefficients.
+    pub(in crate::calibration) fn of(&self, all: &PerSensor<ThermalCoefficients>) -> f64 {
+        all.get(self.sensor)[(self.parameter, self.function)]
+    }
+
+    pub(in crate::calibration) fn of_mut<'a>(
+        &self,
+        all: &'a mut PerSensor<ThermalCoefficients>,
+    ) -> &'a mut f64 {
+        &mut all.get_mut(self.sensor)[(self.parameter, self.function)]
+    }
+}
+
+/// Estimated coefficients with their covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thermal {
+    /// Ranges, and σ before.
+    pub model: ThermalModel,
+    /// What each of the estimates is.
+    pub coefficients: Vec<Coefficient>,
+    /// Normalised as the parameters.
+    pub values: DVector<f64>,
+    /// Of the values.
+    pub covariance: DMatrix<f64>,
+    /// Of the parameters of both triads (rows) with them.
+    pub cross: DMatrix<f64>,
+}
+
+impl Thermal {
+    /// The coefficients of both triads; zero where off.
+    pub fn coefficients(&self) -> PerSensor<ThermalCoefficients> {
+        let mut all = PerSensor::<ThermalCoefficients>::default();
+        for (coefficient, value) in self.coefficients.iter().zip(&self.values) {
+            *coefficient.of_mut(&mut all) = *value;
+        }
+        all
+    }
+
+    /// By how much the parameters of both triads differ from those at the reference in a state, and
+    /// covariance of what they are then, given that of those at the reference.
+    pub fn at(
+        &self,
+        state: &ThermalState,
+        covariance: &ParameterMatrix,
+    ) -> (ParameterVector, ParameterMatrix) {
+        let n = self.coefficients.len();
+        let mut by = DMatrix::zeros(PARAMETERS, n);
+        for (k, coefficient) in self.coefficients.iter().enumerate() {
+            by[(coefficient.index(), k)] = coefficient.weight(state);
+        }
+        let change = &by * &self.values;
+        let cross = &self.cross * by.transpose();
+        let own = &by * &self.covariance * by.transpose();
+        let at = ParameterMatrix::from_fn(|i, j| {
+            covariance[(i, j)] + cross[(i, j)] + cross[(j, i)] + own[(i, j)]
+        });
+        (ParameterVector::from_fn(|i, _| change[i]), at)
+    }
+
+    /// The highest order that is on of each parameter of a triad, none where it does not change, and whether its rate
+    /// is on.
+    pub fn order(&self, index: usize) -> (usize, bool) {
+        let of = |c: &&Coefficient| c.index() == index;
+        let functions = self.coefficients.iter().filter(of).map(|c| c.function + 1);
+        let (mut order, mut rate) = (0, false);
+        for function in functions {
+            match function {
+                THERMAL_FUNCTIONS => rate = true,
+                _ => order = order.max(function),
+            }
+        }
+        (order, rate)
+    }
+}

@@ -1,0 +1,177 @@
+//! A wrong mounting in words and as a line of `run.toml`.
+
+use std::fmt;
+
+use nalgebra::Matrix3;
+
+use crate::attitude::log;
+use crate::imu::{AXES, AxisOrder, PerSensor, Sensor};
+use crate::recording::{FileColumn, NamedColumns};
+use crate::run::Run;
+use crate::units::DEGREE;
+
+/// What `run.toml` says of the axes and the motion contradicts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mounting {
+    /// The run.
+    pub recording: String,
+    /// The order of each triad's outputs, as they come in along right-front-up, that puts it right.
+    pub orders: PerSensor<AxisOrder>,
+    /// What it is known from, in a few words.
+    pub known_from: &'static str,
+    /// Natural logarithm of how much likelier the record is so.
+    pub log_ratio: f64,
+    /// The line of `run.toml` for it.
+    pub line: String,
+    /// Lines of other mountings that the record does not tell from it.
+    pub others: Vec<String>,
+    /// Whether a latitude of the other sign would explain it as well.
+    pub or_latitude: bool,
+    /// Triads of which `[imu.prior]` gives values that differ by axis, or biases that a reversed column
+    /// does not have.
+    pub prior_differs: Vec<Sensor>,
+}
+
+impl fmt::Display for Mounting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the axes are not as run.toml has them: {}; by {} the record is e^{:.0} times likelier so. In \
+             [imu] of run.toml write\n  {}",
+            said(&self.orders),
+            self.known_from,
+            self.log_ratio,
+            self.line
+        )?;
+        if !self.others.is_empty() {
+            write!(
+                f,
+                "\nThis record does not tell it from\n  {}",
+                self.others.join("\n  ")
+            )?;
+        }
+        if self.or_latitude {
+            f.write_str("\nA latitude of the other sign would explain it as well.")?;
+        }
+        for sensor in &self.prior_differs {
+            write!(
+                f,
+                "\n[imu.prior.{}] speaks of the columns as they are then read, in that order: bring its scale \
+                 and bias to it, too, where they are those of the columns.",
+                sensor.name()
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// What is wrong.
+fn said(orders: &PerSensor<AxisOrder>) -> String {
+    let PerSensor { gyro, accel } = orders;
+    if gyro == accel && gyro.is_rotation() {
+        return format!(
+            "the instrument is turned by {}, both triads alike",
+            turn(&gyro.matrix())
+        );
+    }
+    if gyro == accel {
+        return format!(
+            "both triads are left-handed alike, {}",
+            axes(Sensor::Gyro, gyro)
+        );
+    }
+    let triads = Sensor::ALL.into_iter();
+    let wrong = triads.filter(|&sensor| *orders.get(sensor) != AxisOrder::IDENTITY);
+    let parts: Vec<String> = wrong
+        .map(|sensor| of_triad(sensor, orders.get(sensor)))
+        .collect();
+    parts.join("; ")
+}
+
+/// Such as `90° about z`.
+fn turn(rotation: &Matrix3<f64>) -> String {
+    let turn = log(rotation);
+    let angle = turn.norm();
+    let axis = turn / angle;
+    let largest = axis.iamax();
+    let positive = axis * axis[largest].signum();
+    if positive[largest] > 0.999 {
+        // Half a turn has no sense.
+        let signed = if angle > 179.0 * DEGREE {
+            angle
+        } else {
+            angle * axis[largest].signum()
+        };
+        return format!("{:.0}° about {}", signed / DEGREE, AXES[largest]);
+    }
+    let [x, y, z] = [axis.x, axis.y, axis.z];
+    format!("{:.0}° about ({x:.2}, {y:.2}, {z:.2})", angle / DEGREE)
+}
+
+/// Such as `gyro x is what comes in as -y, gyro y is what comes in as x (turned by 90° about z)`.
+fn of_triad(sensor: Sensor, order: &AxisOrder) -> String {
+    let how = if order.is_rotation() {
+        format!("turned by {}", turn(&order.matrix()))
+    } else {
+        "left-handed".to_owned()
+    };
+    format!("{} ({how})", axes(sensor, order))
+}
+
+fn axes(sensor: Sensor, order: &AxisOrder) -> String {
+    let name = sensor.name();
+    let changed = (0..3).filter(|&axis| order.source[axis] != axis || order.reversed[axis]);
+    let axes: Vec<String> = changed
+        .map(|axis| {
+            let sign = if order.reversed[axis] { "−" } else { "" };
+            let source = AXES[order.source[axis]];
+            format!("{name} {} is what comes in as {sign}{source}", AXES[axis])
+        })
+        .collect();
+    axes.join(", ")
+}
+
+/// The line of `run.toml`, or for a run that was made the orders by name.
+pub fn line(run: &Run, orders: &PerSensor<AxisOrder>) -> String {
+    // A nominal scale below zero turns what comes in already.
+    let as_columns = PerSensor::from_fn(|sensor| {
+        let nominal = run.instrument.nominal.get(sensor).0;
+        let mut order = *orders.get(sensor);
+        for axis in 0..3 {
+            order.reversed[axis] ^= nominal[axis] * nominal[order.source[axis]] < 0.0;
+        }
+        order
+    });
+    match &run.recording.imu.log {
+        Some(log) => log.named.line(&as_columns),
+        None => made().line(&as_columns),
+    }
+}
+
+/// The columns of a run that no file holds.
+fn made() -> NamedColumns {
+    let of_triad = |sensor: Sensor| {
+        AXES.map(|axis| FileColumn {
+            name: format!("{}.{axis}", sensor.name()),
+            reversed: false,
+        })
+    };
+    NamedColumns {
+        time: None,
+        triads: PerSensor::from_fn(of_triad),
+        temperature: None,
+        axes: AxisOrder::IDENTITY,
+    }
+}
+
+/// Triads whose prior would have to follow the columns.
+pub fn prior_differs(run: &Run, orders: &PerSensor<AxisOrder>) -> Vec<Sensor> {
+    let differs = |&sensor: &Sensor| {
+        let order = orders.get(sensor);
+        let nominal = run.instrument.nominal.get(sensor).0.abs();
+        let bias = run.instrument.prior.get(sensor).bias;
+        let placed = |axis: usize| nominal[order.source[axis]] != nominal[axis];
+        order.apply(&bias) != bias || (0..3).any(placed)
+    };
+    Sensor::ALL.into_iter().filter(differs).collect()
+}
