@@ -77,15 +77,6 @@ pub enum CalibrationError {
         /// All of them.
         contradicted: Vec<ContradictedLabel>,
     },
-    /// Something that batch least squares does not have.
-    #[error(
-        "the problem has {term}, which batch least squares does not know; leave it out of problem and \
-         outcome"
-    )]
-    NotInBatch {
-        /// What it is.
-        term: &'static str,
-    },
     /// Axes that are swapped, reversed or left-handed.
     #[error("{0}")]
     Mounting(Box<Mounting>),

@@ -11,7 +11,6 @@ mod several;
 mod start;
 
 mod auxiliary;
-mod batch;
 mod bound;
 mod budget;
 mod error;
@@ -35,7 +34,6 @@ mod solution;
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
-pub use batch::batch_estimate;
 pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::dwell_scatter::DwellScatter;

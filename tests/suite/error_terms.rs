@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 use turncal::calibration::{
-    CalibrationError, ErrorTerm, ErrorTermTest, Estimate, Finding, Method, NoisePolicy, Options,
-    Outcome, PARAMETERS, Problem, Role, Solution, batch_estimate, estimate, nees, test_error_terms,
-    to_vector,
+    ErrorTerm, ErrorTermTest, Estimate, Finding, Method, NoisePolicy, Options, Outcome, PARAMETERS,
+    Problem, Role, Solution, estimate, nees, test_error_terms, to_vector,
 };
 use turncal::imu::Term;
 use turncal::simulation::Scenario;
@@ -143,19 +142,6 @@ fn sigma_hold_what_an_error_term_does_that_the_data_show_and_that_is_left_off() 
     // 1 in 1,000 of 8 runs of 24 parameters is above 1.36. Below one, for explanations that cannot be told
     // apart count, too.
     assert!(before > 5.0 && after < 1.36, "{before} {after}");
-}
-
-#[test]
-fn a_batch_refuses_a_problem_with_states_that_it_does_not_have() {
-    let scenario = Scenario::load("demo").unwrap();
-    let run = scenario.simulate(SEED, 0).unwrap().run;
-    let mut problem = Problem::new(&run, &stated());
-    let (outcome, _) = calibrated(&problem);
-    assert!(batch_estimate(&problem, &outcome).is_ok());
-    problem.model.switch_on(ORDER);
-    let refused = batch_estimate(&problem, &outcome).unwrap_err();
-    assert_eq!(refused, CalibrationError::NotInBatch { term: ORDER.name() });
-    assert!(refused.to_string().contains("accel-second-order"));
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 mod allan;
 mod apply;
-mod batch;
 mod by_hand;
 mod calibration_file;
 mod campaign;

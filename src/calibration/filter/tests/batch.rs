@@ -14,19 +14,18 @@ use std::ops::Range;
 use faer::{Mat, MatRef, Side};
 use nalgebra::{Matrix3, Vector3};
 
-use super::error::CalibrationError;
-use super::error_term::ErrorTerm;
-use super::estimate::Estimate;
-use super::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
-use super::linearisation::{Start, singular};
-use super::model::Model;
-use super::outcome::Outcome;
-use super::parameters::{
-    ParameterMatrix, ParameterVector, from_vector, sensor_and_parameter, to_vector,
-};
-use super::problem::{Problem, Stretch};
 use crate::attitude::{log, skew, to_tilt_and_heading};
 use crate::calibration::budget::curvature::curvature;
+use crate::calibration::error::CalibrationError;
+use crate::calibration::estimate::Estimate;
+use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::linearisation::{Start, singular};
+use crate::calibration::model::Model;
+use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::{
+    ParameterMatrix, ParameterVector, from_vector, sensor_and_parameter, to_vector,
+};
+use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::schedule::AtRest;
 use crate::imu::{PerSensor, Triad};
 use crate::navigation::{Block, BlockMatrix, Navigator, ProcessNoise, State};
@@ -41,24 +40,11 @@ const NO_SOURCE: f64 = 1e-14;
 /// Estimate and covariance of an outcome's last pass, from its point of linearisation and with the
 /// observations that it let in, by batch least squares.
 ///
-/// # Errors
-/// [`CalibrationError`] where the problem is not the one of the outcome, or has on what the batch does not know:
-/// an error term, what follows temperature or differs between recordings.
+/// It knows neither error terms, nor turning at standstill, nor what follows temperature or differs between recordings.
 pub fn batch_estimate(problem: &Problem, outcome: &Outcome) -> Result<Estimate, CalibrationError> {
     let problem = &outcome.as_calibrated(problem);
     let model = &problem.model;
-    let on = ErrorTerm::ALL.into_iter().find(|&term| model.has(term));
-    if let Some(term) = on {
-        return Err(CalibrationError::NotInBatch { term: term.name() });
-    }
-    if model.turning_at_rest > 0.0 {
-        let term = "turning at standstill";
-        return Err(CalibrationError::NotInBatch { term });
-    }
-    if problem.varies() {
-        let term = "what follows temperature or differs between recordings";
-        return Err(CalibrationError::NotInBatch { term });
-    }
+    assert!(model.term_sigma.iter().all(|&sigma| sigma == 0.0) && !problem.varies());
     let mut accepted = outcome.innovations.iter().map(|i| i.accepted);
     let mut information = None;
     for (number, stretch) in problem.stretches().iter().enumerate() {
@@ -352,7 +338,7 @@ impl Information {
         self.rows = stack.qr().thin_R().get(..n, ..).to_owned();
     }
 
-    /// The body has come to rest, see [`super::pass::Filter::come_to_rest`].
+    /// The body has come to rest, see [`crate::calibration::filter::Filter::come_to_rest`].
     fn come_to_rest(&mut self, computed: &State) {
         for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
             let turn = skew(computed);
@@ -365,7 +351,7 @@ impl Information {
     }
 
     /// Refers the navigation errors to another computed state of the same moment, see
-    /// [`super::pass::Filter::refer`].
+    /// [`crate::calibration::filter::Filter::refer`].
     fn refer(&mut self, from: &State, to: &State) {
         let turned = to_tilt_and_heading(&(from.attitude * to.attitude.transpose()));
         let mut shift = Mat::zeros(NAVIGATION, 1);

@@ -1,3 +1,6 @@
+mod against_batch;
+mod batch;
+
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, SMatrix, SVector};

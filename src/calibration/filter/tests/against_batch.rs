@@ -1,13 +1,12 @@
 //! The filter against batch least squares on the same linear problem.
 
+use super::batch::batch_estimate;
+use crate::calibration::{NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate};
+use crate::imu::InstallationForm;
+use crate::run::Run;
+use crate::simulation::Scenario;
+use crate::units::ARCSEC;
 use nalgebra::{UnitQuaternion, Vector3};
-use turncal::calibration::{
-    NoisePolicy, Options, Outcome, PARAMETERS, Problem, batch_estimate, estimate,
-};
-use turncal::imu::InstallationForm;
-use turncal::run::Run;
-use turncal::simulation::Scenario;
-use turncal::units::ARCSEC;
 
 /// With the noise that the run states, which is that of its data.
 fn stated() -> Options {
