@@ -6,13 +6,12 @@ use std::collections::BTreeMap;
 use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
 use super::error::CalibrationError;
-use super::iterations::{Iterated, iterate};
+use super::iterations::Iterated;
 use super::layout::Layout;
 use super::linearisation::not_invertible;
 use super::noise::Learnt;
 use super::outcome::Outcome;
-use super::parameters::{ParameterMatrix, parameter_name};
-use super::pass::Gate;
+use super::parameters::parameter_name;
 use super::problem::Problem;
 use super::several::{self, Joint};
 use crate::calibration::checks::dwell_scatter::DwellScores;
@@ -20,7 +19,7 @@ use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::{FormTest, form_test};
 use crate::calibration::checks::innovation::{consistency, inconsistencies};
 use crate::calibration::checks::observability::Observability;
-use crate::calibration::checks::prior_distance::{far_from_prior, widened};
+use crate::calibration::checks::prior_distance::far_from_prior;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
 use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained;
@@ -53,33 +52,17 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         },
     };
     let Attempt {
-        start,
         priors,
         mut passes,
         feedback_history,
-        mut iterated,
+        iterated,
         learnt,
-        by_headings,
     } = attempt;
     let as_stated = &problem;
     let with_noise = learnt
         .as_ref()
         .map(|learnt| problem.with_model(learnt.model.clone()));
     let problem = with_noise.as_ref().unwrap_or(&problem);
-    let widened = widened(&problem.model, &iterated.held.both_triads());
-    let with_wide_prior = widened.map(|model| problem.with_model(model));
-    let again = with_wide_prior.as_ref().and_then(|wide| {
-        let (from, gate) = (iterated.held.estimate.clone(), Gate::Innovations);
-        let again = iterate(wide, &priors, from, gate, &mut passes, progress);
-        again.ok().map(|again| (wide, again))
-    });
-    let problem = match again {
-        Some((wide, again)) => {
-            iterated = again;
-            wide
-        }
-        None => problem,
-    };
     let form_test = form_test(problem, &priors, &iterated.held)?;
     // Noise that makes up for angles that are missing is no noise.
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
@@ -90,7 +73,6 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             converged,
         },
         report,
-        of_other_noise,
     } = match learnt {
         Some(learnt) => Learnt {
             model: problem.model.clone(),
@@ -98,14 +80,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             ..learnt
         },
         None if is_no_noise => Learnt::stated(problem, iterated),
-        None => learnt_or_stated(
-            start,
-            (as_stated, problem),
-            &priors,
-            iterated,
-            &mut passes,
-            progress,
-        ),
+        None => learnt_or_stated(problem, &priors, iterated, &mut passes, progress),
     };
     let problem = &problem.with_model(model);
     let scores = held.posteriors.split_first();
@@ -162,15 +137,11 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         passes,
         findings: Vec::new(),
     };
-    outcome.set_part(BudgetSource::Headings, by_headings);
     if let Some(scattered) = scattered {
         outcome.set_part(BudgetSource::DwellScatter, scattered);
     }
     let growth = outcome.growth_by(BudgetSource::DwellScatter);
     outcome.set_part(BudgetSource::Rounding, rounding);
-    if let Some(of_other_noise) = of_other_noise {
-        outcome.set_part(BudgetSource::LearntNoise, of_other_noise);
-    }
     outcome.findings = findings(as_stated, &outcome);
     outcome.findings.extend(of_recordings);
     if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
@@ -196,13 +167,11 @@ impl<'a> Solved<'a> {
     fn of(joint: Joint<'a>) -> Self {
         Self {
             attempt: Attempt {
-                start: None,
                 priors: joint.priors,
                 passes: joint.passes,
                 feedback_history: Vec::new(),
                 iterated: joint.iterated,
                 learnt: None,
-                by_headings: ParameterMatrix::zeros(),
             },
             problem: joint.problem,
             alone: joint.alone,
@@ -301,7 +270,7 @@ mod tests {
     use super::super::Options;
     use super::super::linearisation::Linearisation;
     use super::super::parameters::{from_vector, to_vector};
-    use super::super::pass::{Mode, pass};
+    use super::super::pass::{Gate, Mode, pass};
     use super::*;
     use crate::attitude::exp;
     use crate::imu::TermVector;

@@ -18,13 +18,14 @@
 //! | table base | one for each of East, North, Up that is on | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where a σ of it is stated |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
+use super::budget::source::BudgetSource;
 use super::model::Model;
 use super::parameters::PARAMETERS;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::several::thermal::Coefficient;
-use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
+use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS, Term};
 use crate::run::Aiding;
-use crate::turntable::{AXIS_ERRORS, TABLE_GEOMETRY};
+use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY};
 
 /// Attitude error φ.
 pub const ATTITUDE: usize = 0;
@@ -182,6 +183,60 @@ impl Layout {
     /// State and index among [`AXIS_ERRORS`] of each error of the table's axes.
     pub fn table_axes(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         placed(self.axes_begin(), &self.axes)
+    }
+
+    /// What draws a state anew, or is known of it before.
+    pub fn source(&self, state: usize) -> BudgetSource {
+        let within = |first: Option<usize>| {
+            first.and_then(|first| state.checked_sub(first).filter(|&axis| axis < 3))
+        };
+        let varying = self
+            .varying_biases()
+            .find(|&(varying, ..)| varying == state);
+        if let Some((_, sensor, _)) = varying {
+            return BudgetSource::wander(sensor);
+        }
+        if (VELOCITY..POSITION + 3).contains(&state) {
+            return BudgetSource::Place;
+        }
+        let of_base = |&(base, _): &(usize, usize)| base == state;
+        if let Some((_, axis)) = self.table_base().find(of_base) {
+            return match axis {
+                2 => BudgetSource::TableNorth,
+                _ => BudgetSource::TableLevel,
+            };
+        }
+        if within(self.table_position()).is_some() {
+            return BudgetSource::TablePosition;
+        }
+        if within(self.turn_at_rest()).is_some() {
+            return BudgetSource::Turning;
+        }
+        if self.gravity() == Some(state) {
+            return BudgetSource::Gravity;
+        }
+        if let Some((_, index)) = self.table_axes().find(|&(axis, _)| axis == state) {
+            let mut kinds = AxisError::ALL.into_iter();
+            let kind = kinds.find(|kind| kind.range().contains(&index));
+            return match kind {
+                Some(AxisError::Tilt) => BudgetSource::TableSquareness,
+                Some(AxisError::Wobble) => BudgetSource::TableWobble,
+                _ => BudgetSource::TableEncoder,
+            };
+        }
+        if let Some((_, index)) = self.terms().find(|&(term, _)| term == state) {
+            return Term::of(index).map_or(BudgetSource::Prior, BudgetSource::of_term);
+        }
+        if self.thermal().any(|(thermal, _)| thermal == state) {
+            return BudgetSource::Temperature;
+        }
+        if self.own().any(|(own, _)| own == state) {
+            return BudgetSource::Recording;
+        }
+        match self.parameters().any(|(parameter, _)| parameter == state) {
+            true => BudgetSource::Prior,
+            false => BudgetSource::InitialAttitude,
+        }
     }
 
     fn terms_begin(&self) -> usize {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::budget::source::BudgetSource;
 use super::error_term::ErrorTerm;
 use super::options::Options;
 use super::parameters::{ParameterVector, parameter, to_vector};
@@ -66,6 +67,8 @@ pub struct Model {
     pub geometry: TableGeometry,
     /// Axes of the table whose angles are read; zero where they are not.
     table_axes: usize,
+    /// The source whose variance is multiplied, and by what: how a budget tells its share.
+    pub(in crate::calibration) varied: Option<(BudgetSource, f64)>,
 }
 
 impl Model {
@@ -92,6 +95,7 @@ impl Model {
             reading_sigma: accuracy.reading_sigma,
             geometry: accuracy.geometry,
             table_axes: axes.map_or(0, |axes| axes.iter().flatten().count()),
+            varied: None,
         };
         model.set_form(run, options.form);
         for &term in &options.terms {
@@ -107,12 +111,20 @@ impl Model {
                 by_motion,
                 by_duration,
             } = *self.motion_noise.get(sensor);
+            let of_moves = self.weight(BudgetSource::moves(sensor)).sqrt();
+            let white = self.weight(BudgetSource::white(sensor)).sqrt();
             ProcessNoise {
-                random_walk: self.noise.get(sensor).random_walk,
-                by_motion,
-                by_duration,
+                random_walk: white * self.noise.get(sensor).random_walk,
+                by_motion: of_moves * by_motion,
+                by_duration: of_moves * by_duration,
             }
         })
+    }
+
+    /// What the variance of a source is multiplied by.
+    pub(in crate::calibration) fn weight(&self, source: BudgetSource) -> f64 {
+        let varied = self.varied.filter(|&(varied, _)| varied == source);
+        varied.map_or(1.0, |(_, factor)| factor)
     }
 
     /// Sets the variance at standstill over the least that is ever taken, rad² or m²/s².

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
+use super::budget::source::BudgetSource;
 use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
@@ -292,19 +293,33 @@ impl<'a> Stretch<'a> {
             Observation::Velocity => self.velocity_variance(model),
             Observation::Attitude => self.attitude_variance(model),
             Observation::Table => {
-                model.reading_sigma.powi(2) / readings as f64 + self.variance.attitude
+                let reading =
+                    model.reading_sigma.powi(2) * model.weight(BudgetSource::TableReading);
+                let pulses = self.variance.attitude * model.weight(BudgetSource::Pulses);
+                reading / readings as f64 + pulses
             }
         }
     }
 
     /// Variance of an observation of velocity per axis, m²/s².
     pub fn velocity_variance(&self, model: &Model) -> f64 {
-        self.stillness(model, Sensor::Accel).powi(2) + self.variance.pulse
+        self.at_rest(model, Sensor::Accel, self.variance.pulse)
     }
 
     /// Variance per axis of an observation of the attitude that a dwell without a table holds, rad².
     pub fn attitude_variance(&self, model: &Model) -> f64 {
-        self.stillness(model, Sensor::Gyro).powi(2) + self.variance.attitude
+        self.at_rest(model, Sensor::Gyro, self.variance.attitude)
+    }
+
+    fn at_rest(&self, model: &Model, sensor: Sensor, pulses: f64) -> f64 {
+        let still = self.stillness(model, sensor).powi(2);
+        still * model.weight(BudgetSource::at_rest(sensor))
+            + pulses * model.weight(BudgetSource::Pulses)
+    }
+
+    /// Variance of the position per axis at the begin of a dwell, m².
+    pub fn position_variance(&self, model: &Model) -> f64 {
+        self.variance.position * model.weight(BudgetSource::Place)
     }
 
     /// White 1σ at standstill that the filter uses, of attitude in rad (gyros) or velocity in m/s.

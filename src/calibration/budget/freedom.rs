@@ -1,6 +1,7 @@
 //! How well the variance of a source is known.
 
 use super::source::BudgetSource;
+use crate::calibration::noise::Source;
 use crate::calibration::outcome::Outcome;
 
 /// The end of a 95 % interval, in σ.
@@ -24,5 +25,23 @@ impl BudgetSource {
             (figures.used > 0.0 && relative > 0.0).then(|| (0.5 / relative.powi(2)).max(1.0))
         });
         freedoms.fold(f64::INFINITY, f64::min)
+    }
+
+    /// What is learnt of it from a record, if anything is.
+    fn learnt(self) -> &'static [Source] {
+        match self {
+            Self::GyroNoise => &[Source::AngleRandomWalk],
+            Self::AccelNoise => &[Source::VelocityRandomWalk],
+            Self::GyroMoves => &[Source::GyroMotion, Source::GyroMoving],
+            Self::AccelMoves => &[Source::AccelMotion, Source::AccelMoving],
+            Self::GyroWander => &[Source::GyroGaussMarkov],
+            Self::AccelWander => &[Source::AccelGaussMarkov],
+            Self::VelocityAtRest => &[Source::Velocity],
+            Self::AttitudeAtRest => &[Source::Attitude],
+            Self::Turning => &[Source::Turning],
+            Self::TablePosition => &[Source::TablePosition],
+            Self::TableReading => &[Source::TableReading],
+            _ => &[],
+        }
     }
 }

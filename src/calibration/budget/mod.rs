@@ -1,25 +1,31 @@
 //! The uncertainty budget of an estimate: its covariance by what it comes from (JCGM 100:2008, JCGM 102:2011).
 //!
-//! The estimate is linear in everything that the last pass took for random: what was known before, noise of
-//! the instrument, errors of the table, noise of each observation. Followed back through the filter, an error
-//! of one σ of each does so much to every parameter; the squares of all that is of one source are its part of
-//! the covariance, and the parts of all sources are the covariance, whatever the gains of the filter are.
+//! The covariance of a filter is homogeneous of degree one in the variances of all sources together: what was known
+//! before, noise of the instrument, errors of the table, noise of each observation. So the part of a source is its
+//! variance times the derivative by it, and the parts add up to the covariance (Euler). The derivative is had by a
+//! pass with that variance a little larger; that its gains are other ones changes nothing to first order, for the
+//! gains are those of the least covariance.
 
 pub mod curvature;
 
-mod follow;
 mod freedom;
 mod record;
-mod source;
-mod sums;
+pub mod source;
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
 
 use super::error::CalibrationError;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix};
 use super::problem::Problem;
 use crate::calibration::budget::curvature::curvature;
+use crate::calibration::layout::Layout;
+use crate::calibration::noise::Script;
+use crate::imu::{MotionNoise, Sensor};
+use crate::run::{Aiding, Run};
 use crate::statistics::student_limit;
-use follow::Held;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
 pub use source::BudgetSource;
 
@@ -46,9 +52,8 @@ pub struct BudgetPart {
     pub degrees_of_freedom: f64,
 }
 
-/// Events that are had at once, with what the filter did in them: of a longer record they are done again on the
-/// way back, part by part, for those of a day would take more memory than its samples.
-const AT_ONCE: usize = 256;
+/// By which part of itself the variance of a source becomes larger: as small as rounding lets it be.
+const STEP: f64 = 1e-3;
 
 impl Budget {
     /// The budget of an outcome's estimate.
@@ -56,22 +61,28 @@ impl Budget {
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the outcome.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
-        let problem = &problem.with_model(outcome.model.clone());
+        let problem = &outcome.as_calibrated(problem);
         let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
-        let held = Held {
-            problem,
-            priors: &outcome.prior_attitudes,
-            at: &outcome.linearised_at,
-            accepted: &accepted,
+        let script = Script::new(problem, &outcome.prior_attitudes, &outcome.linearised_at)?;
+        let covariance = |varied: Option<(BudgetSource, f64)>| {
+            let mut model = problem.model.clone();
+            model.varied = varied;
+            let replay = script.replay(&problem.with_model(model), &accepted)?;
+            Ok::<_, CalibrationError>(replay.covariance)
         };
-        let by_source: Vec<_> = held.forward(AT_ONCE)?.back()?.covariances().collect();
-        let filter: ParameterMatrix = by_source.iter().map(|(_, covariance)| covariance).sum();
+        let filter = covariance(None)?;
+        let part = |source: BudgetSource| {
+            let larger = covariance(Some((source, 1.0 + STEP)))?;
+            Ok::<_, CalibrationError>((source, (larger - filter) / STEP))
+        };
+        let sources = problem.sources().into_par_iter();
+        let by_source = sources.map(part).collect::<Result<Vec<_>, _>>()?;
         let bent = curvature(&outcome.estimate.triads, &filter);
         let beside = outcome.beside.iter().map(|(&source, &part)| (source, part));
-        let filter = by_source
+        let parts = by_source
             .into_iter()
-            .chain([(BudgetSource::Curvature, bent)]);
-        let parts = filter.chain(beside);
+            .chain([(BudgetSource::Curvature, bent)])
+            .chain(beside);
         let variance = outcome.estimate.covariance.diagonal();
         let counts = |part: &ParameterMatrix| {
             let own = part.diagonal();
@@ -124,6 +135,36 @@ impl Budget {
     /// from Student's t (JCGM 100, G.3).
     pub fn coverage_factor(&self, parameter: usize) -> f64 {
         coverage_factor(self.degrees_of_freedom(parameter))
+    }
+}
+
+impl Problem<'_> {
+    /// The sources that its filter has.
+    fn sources(&self) -> BTreeSet<BudgetSource> {
+        let model = &self.model;
+        let layout = Layout::new(model);
+        let mut all: BTreeSet<_> = (0..layout.size())
+            .map(|state| layout.source(state))
+            .collect();
+        all.insert(BudgetSource::Pulses);
+        for sensor in Sensor::ALL {
+            all.extend([BudgetSource::white(sensor), BudgetSource::at_rest(sensor)]);
+            if *model.motion_noise.get(sensor) != MotionNoise::default() {
+                all.insert(BudgetSource::moves(sensor));
+            }
+        }
+        match model.aiding {
+            Aiding::Table => all.insert(BudgetSource::TableReading),
+            Aiding::Velocity => all.insert(BudgetSource::Turning),
+        };
+        let bridged = |run: &Run| {
+            let imu = &run.recording.imu;
+            imu.bridged(&(0..imu.len())).next().is_some()
+        };
+        if self.runs().any(bridged) {
+            all.insert(BudgetSource::Interpolated);
+        }
+        all
     }
 }
 

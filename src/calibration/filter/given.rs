@@ -24,14 +24,6 @@ pub struct Unexpected<const G: usize> {
 }
 
 impl<const G: usize> Given<G> {
-    /// Exactly this.
-    pub fn certain() -> Self {
-        Self {
-            mean: [0.0; G],
-            root: [[0.0; G]; G],
-        }
-    }
-
     pub fn new(mean: [f64; G], covariance: [[f64; G]; G]) -> Self {
         let mut root = [[0.0; G]; G];
         for (k, (_, column, _)) in factor(covariance, [0.0; G]).enumerate() {

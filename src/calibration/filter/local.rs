@@ -122,14 +122,6 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         self.given.take(&look.unexpected);
     }
 
-    /// Rows of what is measured of `g`, each with the component that it took out: the rows after it have
-    /// none of that.
-    pub fn measured(&mut self) -> Vec<(usize, [f64; G])> {
-        let information = self.courses.end(self.at).information;
-        let rows = factor(information, self.vector);
-        rows.map(|(pivot, row, _)| (pivot, row)).collect()
-    }
-
     pub fn outcome(self) -> Outcome {
         let known = self.courses.end(self.at);
         let rows = factor(known.information, self.vector);

@@ -9,22 +9,18 @@ pub mod rows;
 pub mod sensitivity;
 
 mod at_rest;
-mod back;
 mod dwells;
-mod operation;
 mod propagation;
 mod standing;
-mod tape;
 mod update;
 
-pub use back::{Effect, Followed, Told};
 pub use dwells::Dwells;
-pub use operation::{Driver, Operation};
 pub use standing::{Innovations, Observer, Taken, Verdict};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::attitude::skew;
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::checks::dwell_scatter::Posterior;
 use crate::calibration::filter::sensitivity::Sensitivity;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
@@ -52,8 +48,8 @@ pub struct Filter {
     turned: Option<Turned>,
     /// What auxiliary parameters that are tried would do.
     pub sensitivity: Option<Sensitivity>,
-    /// What was done to the errors, where that is kept.
-    tape: Option<Vec<Operation>>,
+    /// The source whose variance is multiplied, and by what, see [`Model::weight`].
+    varied: Option<(BudgetSource, f64)>,
 }
 
 /// What a stretch begins after.
@@ -96,17 +92,20 @@ impl Filter {
             Some((state, variation.sigma, variation.correlation_time))
         });
         let varying = varying.collect();
+        for state in 0..n {
+            p[(state, state)] *= model.weight(layout.source(state));
+        }
         Self {
             layout,
             x,
             p,
-            turning: model.turning_at_rest,
+            turning: model.turning_at_rest * model.weight(BudgetSource::Turning).sqrt(),
             noise: model.process_noise(),
             varying,
             day_to_day: model.day_to_day,
             turned: None,
             sensitivity: None,
-            tape: None,
+            varied: model.varied,
         }
     }
 
@@ -136,15 +135,9 @@ impl Filter {
         }
         for axis in 0..3 {
             // φ starts as φ₀: fully correlated.
-            let variance = start.attitude_sigma[axis].powi(2);
+            let variance = self.p[(initial + axis, initial + axis)];
             self.p[(ATTITUDE + axis, initial + axis)] = variance;
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
-            if let Some(tape) = &mut self.tape {
-                tape.push(Operation::Drawn {
-                    states: vec![ATTITUDE + axis, initial + axis],
-                    sigma: start.attitude_sigma[axis],
-                });
-            }
         }
         self.redraw_table(table_sigma);
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
@@ -171,13 +164,17 @@ impl Filter {
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.redraw(state);
         }
-        if let Some(tape) = &mut self.tape {
-            let states = vec![state];
-            tape.push(Operation::Drawn { states, sigma });
-        }
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
-        self.p[(state, state)] = sigma.powi(2);
+        self.p[(state, state)] = sigma.powi(2) * self.weight_of(state);
+    }
+
+    /// What the variance of the source that draws a state is multiplied by.
+    fn weight_of(&self, state: usize) -> f64 {
+        let varied = self
+            .varied
+            .filter(|&(varied, _)| varied == self.layout.source(state));
+        varied.map_or(1.0, |(_, factor)| factor)
     }
 
     /// The table has left its position: its error is drawn anew.
@@ -205,9 +202,6 @@ impl Filter {
     pub fn come_to_rest(&mut self, computed: &State) {
         for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
             let turn = skew(-computed);
-            if let Some(tape) = &mut self.tape {
-                tape.push(Operation::Turned { first, by: turn });
-            }
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;

@@ -3,12 +3,12 @@
 use nalgebra::DMatrix;
 
 use super::Filter;
-use super::operation::Operation;
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::imu::{PerSensor, Sensor};
-use crate::navigation::Block;
+use crate::navigation::{Block, BlockMatrix};
 
 impl Filter {
     /// Carries mean and covariance over a block.
@@ -31,7 +31,6 @@ impl Filter {
             None => place,
         };
         let noise = self.noise_of_move::<MOVING>(block);
-        let noise = DMatrix::from_fn(MOVING, MOVING, |row, column| noise[row][column]);
         let driving = self.driving_columns(block);
         let transition = DMatrix::from_fn(MOVING, driving.len() + MOVING - NAVIGATION, |row, k| {
             match (driving.get(k), row < NAVIGATION) {
@@ -78,12 +77,32 @@ impl Filter {
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.propagate(moving, &transition, tried);
         }
-        if let Some(tape) = &mut self.tape {
-            tape.push(Operation::Carried {
-                moving: moving.to_vec(),
-                transition,
-            });
+    }
+
+    /// Covariance that a block adds to the navigation errors.
+    pub fn noise_of(&self, block: &Block) -> BlockMatrix {
+        let mut noise = block.noise.covariance(&self.noise);
+        // Of interpolated samples alone, which no density scales.
+        if let Some((BudgetSource::Interpolated, factor)) = self.varied {
+            noise += block.noise.covariance(&PerSensor::default()) * (factor - 1.0);
         }
+        noise
+    }
+
+    /// Covariance that a block of a move adds to the states that move: navigation errors and, where there is
+    /// one, the turn at rest.
+    fn noise_of_move<const MOVING: usize>(&self, block: &Block) -> DMatrix<f64> {
+        // The turn has the noise of the attitude, and its own.
+        let own = |place: usize| match place.checked_sub(NAVIGATION) {
+            Some(axis) => ATTITUDE + axis,
+            None => place,
+        };
+        let of_navigation = self.noise_of(block);
+        DMatrix::from_fn(MOVING, MOVING, |row, column| {
+            let alone = row == column && row >= NAVIGATION;
+            let turning = self.turning.powi(2) * block.duration;
+            of_navigation[(own(row), own(column))] + if alone { turning } else { 0.0 }
+        })
     }
 
     /// What navigation errors, and each state that drives them, make of the navigation errors.
@@ -146,22 +165,17 @@ impl Filter {
 
     /// Varying biases forget as time goes by, and are driven.
     pub fn vary(&mut self, duration: f64) {
-        for &(state, sigma, correlation_time) in &self.varying {
+        for k in 0..self.varying.len() {
+            let (state, sigma, correlation_time) = self.varying[k];
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
-            if let Some(tape) = &mut self.tape {
-                tape.push(Operation::Varied {
-                    state,
-                    keep,
-                    variance: sigma.powi(2) * (1.0 - keep * keep),
-                });
-            }
             if let Some(sensitivity) = &mut self.sensitivity {
                 sensitivity.scale(state, keep);
             }
             self.p.row_mut(state).scale_mut(keep);
             self.p.column_mut(state).scale_mut(keep);
-            self.p[(state, state)] += sigma.powi(2) * (1.0 - keep * keep);
+            let driven = sigma.powi(2) * self.weight_of(state);
+            self.p[(state, state)] += driven * (1.0 - keep * keep);
         }
     }
 }

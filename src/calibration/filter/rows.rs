@@ -40,12 +40,6 @@ pub fn whiten<const N: usize>(root: &Matrix3<f64>, rows: &mut [[f64; N]; 3]) {
     }
 }
 
-/// Roots r of a covariance, `Σ r rᵀ` over these.
-pub fn roots<const N: usize>(covariance: [[f64; N]; N]) -> Vec<[f64; N]> {
-    let rows = factor(covariance, [0.0; N]);
-    rows.map(|(_, row, _)| row).collect()
-}
-
 /// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector, each after the component
 /// that it takes out: Cholesky's factorisation, the largest of what is left first, until rounding is all that is left
 /// (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).

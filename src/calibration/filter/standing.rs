@@ -59,7 +59,7 @@ impl Filter {
         let models = self.models(segment, courses);
         let across = &map.given.states * &self.p;
         let mut local = Local::new(self.given(&map.given, &across), courses);
-        match self.through(&mut local, (segment, &models), observer, &mut |_| {}) {
+        match self.through(&mut local, (segment, &models), observer) {
             Taken::Whole => {}
             other => return other,
         }
@@ -74,7 +74,7 @@ impl Filter {
     }
 
     /// Numbers of a segment's models.
-    pub fn models<const M: usize, const G: usize>(
+    fn models<const M: usize, const G: usize>(
         &self,
         segment: &Segment,
         courses: &mut Courses<M, G>,
@@ -85,14 +85,12 @@ impl Filter {
         numbers.collect()
     }
 
-    /// A filter of a part alone through all of it, given the numbers of its models; `done` is told of each thing
-    /// that it does.
-    pub fn through<'a, const M: usize, const G: usize>(
+    /// A filter of a part alone through all of it, given the numbers of its models.
+    fn through<const M: usize, const G: usize>(
         &self,
         local: &mut Local<M, G>,
-        (segment, models): (&'a Segment, &[usize]),
+        (segment, models): (&Segment, &[usize]),
         observer: &mut impl Observer,
-        done: &mut impl FnMut(Done<'a>),
     ) -> Taken {
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
         for step in &segment.steps {
@@ -110,7 +108,6 @@ impl Filter {
                 }
             }
             local.propagate(models[*model]);
-            done(Done::Step(*model));
             for seen in &segment.seen[seen.clone()] {
                 let state = match seen.kind {
                     Observation::Velocity => VELOCITY,
@@ -131,14 +128,7 @@ impl Filter {
                     scalars: look.scalars,
                 };
                 match observer.judge(innovations) {
-                    Verdict::Accepted => {
-                        local.take(&look);
-                        done(Done::Observed {
-                            state,
-                            seen,
-                            point: look.to,
-                        });
-                    }
+                    Verdict::Accepted => local.take(&look),
                     Verdict::Rejected => {}
                     Verdict::Abandoned => return Taken::Abandoned,
                 }
@@ -160,16 +150,4 @@ impl Filter {
             self.x[state] += offset;
         }
     }
-}
-
-/// What a filter of a part alone has done.
-pub enum Done<'a> {
-    /// It went on over a step, by this of the segment's models.
-    Step(usize),
-    /// It took in what is observed of three errors from a state on, and came to this point of its course.
-    Observed {
-        state: usize,
-        seen: &'a Seen,
-        point: usize,
-    },
 }

@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 use super::Filter;
 use super::linear::Linear;
 use super::measurement::Measurement;
-use super::operation::Operation;
 
 impl Filter {
     /// So many quantities that no error does anything to.
@@ -53,13 +52,6 @@ impl Filter {
         self.p.fill_lower_triangle_with_upper_triangle();
         if let Some(sensitivity) = &mut self.sensitivity {
             sensitivity.update(h, &gain, (&whiten, &whitened));
-        }
-        if let Some(tape) = &mut self.tape {
-            tape.push(Operation::Taken {
-                rows: h.states.clone(),
-                gain,
-                variance,
-            });
         }
     }
 }

@@ -205,28 +205,20 @@ impl Likelihood<'_> {
         None
     }
 
-    /// The same with ln σ of each factor that is above zero: its 1σ after the data; and 1σ of the variance
-    /// over its reference of each that is zero.
+    /// 1σ after the data of ln σ of each factor that is above zero, and of the variance over its reference of each that
+    /// is zero.
     pub fn sigma(
         &self,
         factors: &Factors,
         sources: &[usize],
     ) -> Result<Vec<Option<f64>>, CalibrationError> {
-        let covariance = self.covariance(factors, sources)?;
+        let slope = self.slope(factors, sources)?;
+        let (_, information) = self.posterior(&slope, factors, sources);
+        // None where the data do not show all of them.
+        let covariance = information.cholesky().map(|factor| factor.inverse());
         Ok((0..sources.len())
             .map(|i| Some(covariance.as_ref()?[(i, i)].sqrt()))
             .collect())
-    }
-
-    /// Their covariance after the data; none where these do not show all of them.
-    pub fn covariance(
-        &self,
-        factors: &Factors,
-        sources: &[usize],
-    ) -> Result<Option<DMatrix<f64>>, CalibrationError> {
-        let slope = self.slope(factors, sources)?;
-        let (_, information) = self.posterior(&slope, factors, sources);
-        Ok(information.cholesky().map(|factor| factor.inverse()))
     }
 }
 
@@ -267,14 +259,5 @@ impl Slope {
             }
         }
         largest
-    }
-
-    /// The same against one factor alone.
-    pub fn statistic_of(&self, factor: usize, bounded: bool) -> f64 {
-        let (score, information) = (self.score[factor], self.information[(factor, factor)]);
-        if information <= 0.0 || (bounded && score <= 0.0) {
-            return 0.0;
-        }
-        score.powi(2) / information
     }
 }

@@ -14,12 +14,11 @@ use crate::calibration::iterations::{Iterated, iterate};
 use crate::calibration::linearisation::AttitudePrior;
 use crate::calibration::model::Model;
 use crate::calibration::outcome::Pass;
-use crate::calibration::parameters::ParameterMatrix;
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;
 
-/// Chance that stated figures which are right are given up; each of the two tests has half of it.
+/// Chance that stated figures which are right are given up.
 pub const FALSE_ALARM: f64 = 1e-3;
 /// Chance that the score test calls for a likelihood ratio which it does not need. The score of a variance
 /// is as skewed as χ², so it does not decide; but it costs no fit.
@@ -44,8 +43,6 @@ pub struct Learnt {
     pub model: Model,
     pub iterated: Iterated,
     pub report: NoiseReport,
-    /// Mean square by which the parameters would be others with other noise, as likely; none where it is stated.
-    pub of_other_noise: Option<ParameterMatrix>,
 }
 
 impl Learnt {
@@ -55,7 +52,6 @@ impl Learnt {
             model: problem.model.clone(),
             iterated,
             report: NoiseReport::stated(problem.options.noise, None),
-            of_other_noise: None,
         }
     }
 }
@@ -73,7 +69,6 @@ pub fn learn(
         model: problem.model.clone(),
         iterated,
         report: NoiseReport::stated(policy, test),
-        of_other_noise: None,
     };
     if policy == NoisePolicy::Stated {
         return Ok(Learnt::stated(problem, stated));
@@ -132,13 +127,10 @@ pub fn learn(
         let now = likelihood.replay(&fit.factors)?.deviance();
         let moved = before.is_none_or(|before: f64| (now - before).abs() > SETTLED);
         if (!changed && !moved) || round == ROUNDS {
-            let of_other_noise =
-                likelihood.moves_parameters_by(&fit.factors, problem, priors, &iterated)?;
             return Ok(Learnt {
                 model,
                 report: likelihood.report(policy, test, &fit.factors)?,
                 iterated,
-                of_other_noise: Some(of_other_noise),
             });
         }
         before = Some(now);
@@ -232,39 +224,16 @@ impl Likelihood<'_> {
             score: slope.statistic(&bounded),
             score_limit: limit(free.len(), bounded.len(), SCREEN),
             ratio: None,
-            ratio_limit: limit(free.len(), bounded.len(), 0.5 * FALSE_ALARM),
-            ratio_of_one: None,
-            of: None,
+            ratio_limit: limit(free.len(), bounded.len(), FALSE_ALARM),
             rejected: false,
         };
-        // A bound at zero halves the chance that a factor alone goes beyond.
-        let of_one = |i: usize, chance: f64| {
-            let chance = chance / sources.len() as f64;
-            let one_sided = usize::from(bounded.contains(&i));
-            limit(1 - one_sided, one_sided, chance)
-        };
-        let suspect = |i: &usize| slope.statistic_of(*i, bounded.contains(i)) > of_one(*i, SCREEN);
-        let suspects: Vec<usize> = (0..sources.len()).filter(suspect).collect();
-        let suspicious = test.score > test.score_limit || !suspects.is_empty();
-        if policy == NoisePolicy::Auto && !suspicious {
+        if policy == NoisePolicy::Auto && test.score <= test.score_limit {
             return Ok((test, None));
         }
-        let deviance = slope.here.deviance();
         let all = self.fit(&stated, &sources)?;
-        let ratio = deviance - all.deviance;
+        let ratio = slope.here.deviance() - all.deviance;
         test.ratio = Some(ratio);
         test.rejected = ratio > test.ratio_limit;
-        // One factor alone may be beyond its limit where all together are not.
-        let suspects = suspects.into_iter().filter(|_| !test.rejected);
-        for i in suspects.collect::<Vec<_>>() {
-            let one = self.fit(&stated, &sources[i..=i])?;
-            let ratio = (deviance - one.deviance) / of_one(i, 0.5 * FALSE_ALARM);
-            if test.ratio_of_one.is_none_or(|largest| ratio > largest) {
-                test.ratio_of_one = Some(ratio);
-                test.of = Some(Source::ALL[sources[i]]);
-            }
-        }
-        test.rejected |= test.ratio_of_one.is_some_and(|ratio| ratio > 1.0);
         Ok((test, Some(all)))
     }
 

@@ -16,13 +16,12 @@ mod report;
 mod run_toml;
 mod selection;
 mod source;
-mod uncertainty;
 
-pub use crate::calibration::record::events::{Event, Events};
 pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use fit::LOG_SIGMA;
 pub use learn::{Learnt, learn};
 pub use policy::NoisePolicy;
+pub use replay::Script;
 pub use report::{NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;
 

@@ -2,14 +2,16 @@
 //! is tried.
 
 use crate::calibration::error::CalibrationError;
+use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
+use crate::calibration::parameters::ParameterMatrix;
 use crate::calibration::pass::{
     Dwells, Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict,
     begin,
 };
 use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::record::events::{Event, Events, Rest};
+use crate::calibration::record::events::{Event, Events};
 use crate::imu::{PerSensor, Sensor};
 
 /// What a pass does at one point of linearisation, whatever the noise.
@@ -35,6 +37,8 @@ pub struct Replay {
     pub scalars: Vec<ScalarInnovation>,
     /// Squared whitened innovation of every observation of three components, let in or not.
     pub distances: Vec<f64>,
+    /// Of the parameters of both triads at the end.
+    pub covariance: ParameterMatrix,
 }
 
 impl Replay {
@@ -52,9 +56,12 @@ impl<'a> Script<'a> {
         priors: &'a [AttitudePrior],
         at: &'a Linearisation,
     ) -> Result<Self, CalibrationError> {
+        let layout = Layout::new(&problem.model);
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
-        let events = stretches
-            .map(|(stretch, initial)| Ok(Events::new(problem, stretch, at, initial)?.collect()));
+        let events = stretches.map(|(stretch, initial)| {
+            let of = (problem, stretch);
+            Ok(Events::new(of, &layout, (at, initial), true)?.collect())
+        });
         Ok(Self {
             at,
             priors,
@@ -66,7 +73,7 @@ impl<'a> Script<'a> {
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
-            if let Event::Move(block) = event {
+            if let Event::Move(block, _) = event {
                 for part in block.noise.parts() {
                     moves.duration += part.moving;
                     for sensor in Sensor::ALL {
@@ -91,6 +98,7 @@ impl<'a> Script<'a> {
             replay: Replay {
                 scalars: Vec::new(),
                 distances: Vec::new(),
+                covariance: ParameterMatrix::zeros(),
             },
         };
         let mut before = None;
@@ -101,12 +109,10 @@ impl<'a> Script<'a> {
             begin(&mut pass.filter, model, before, stretch, &start, self.at);
             before = Some(stretch);
             for event in events {
-                match event {
-                    Event::Move(block) => pass.filter.propagate(block),
-                    Event::Rest(rest) => pass.rest(stretch, rest)?,
-                }
+                pass.take_in(stretch, event)?;
             }
         }
+        pass.replay.covariance = pass.filter.parameter_covariance();
         Ok(pass.replay)
     }
 }
@@ -121,22 +127,19 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
-    fn rest(&mut self, stretch: &Stretch, rest: &Rest) -> Result<(), CalibrationError> {
-        let (filter, segment) = (&mut self.filter, &rest.segment);
-        rest.begin(filter, self.model, stretch);
+    fn take_in(&mut self, stretch: &Stretch, event: &Event) -> Result<(), CalibrationError> {
         let mut decided = Decided {
             stretch,
             model: self.model,
             accepted: self.accepted,
             replay: &mut self.replay,
         };
-        let taken = self.dwells.take_in(filter, segment, &mut decided);
+        let filter = (&mut self.filter, &mut self.dwells);
+        let taken = event.take_in(filter, (self.model, stretch), &mut decided);
         let last = self.replay.distances.last();
         match taken {
             Taken::Whole if last.is_none_or(|distance| distance.is_finite()) => Ok(()),
-            _ => Err(CalibrationError::Diverged {
-                time: segment.end(),
-            }),
+            _ => Err(CalibrationError::Diverged { time: event.end() }),
         }
     }
 }
@@ -156,7 +159,9 @@ impl Observer for Decided<'_> {
     }
 
     fn judge(&mut self, innovations: Innovations) -> Verdict {
-        let Replay { scalars, distances } = &mut *self.replay;
+        let Replay {
+            scalars, distances, ..
+        } = &mut *self.replay;
         let accepted = self.accepted.get(distances.len()).copied().unwrap_or(true);
         let three = innovations.scalars;
         let squares = three.map(|s| s.innovation.powi(2) / s.variance);

@@ -24,9 +24,8 @@ pub struct NoiseReport {
 
 /// The test of stated noise against what the data show, at one false alarm in a thousand runs.
 ///
-/// −2 ln of two likelihood ratios, each at half of that rate: against all factors at once, and the largest
-/// against one factor alone. A ratio is worked out where the score test, which costs no fit, is beyond
-/// its 5 % point; else it is none.
+/// −2 ln of the likelihood ratio against all factors at once. It is worked out where the score test, which costs no
+/// fit, is beyond its 5 % point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
     /// Score statistic against all factors …
@@ -38,13 +37,6 @@ pub struct NoiseTest {
     pub ratio: Option<f64>,
     /// … and what it stays below if what is stated is right.
     pub ratio_limit: f64,
-    /// Where that is within its limit, the largest against one factor over what it stays below; one or
-    /// less if what is stated is right …
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ratio_of_one: Option<f64>,
-    /// … and its source.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub of: Option<Source>,
     /// Whether the data contradict what is stated.
     pub rejected: bool,
 }

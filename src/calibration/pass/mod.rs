@@ -11,12 +11,11 @@ use super::error::CalibrationError;
 use super::linearisation::{AttitudePrior, Linearisation, Start};
 use super::model::Model;
 use super::problem::{Problem, Stretch};
-pub use crate::calibration::filter::measurement::{Measurement, ScalarInnovation};
+pub use crate::calibration::filter::measurement::ScalarInnovation;
 pub use crate::calibration::filter::{
-    Driver, Dwells, Effect, Filter, Followed, Innovations, Observer, Operation, PriorErrors, Since,
-    Taken, Told, Verdict,
+    Dwells, Filter, Innovations, Observer, PriorErrors, Since, Taken, Verdict,
 };
-pub use crate::calibration::record::segment::{Seen, Segment, Segments, moves, segments};
+pub use crate::calibration::record::segment::Seen;
 use earlier::Earlier;
 pub use mode::{Gate, Mode};
 use posteriors::Posteriors;
@@ -24,7 +23,6 @@ use result::Sums;
 pub use result::{Epoch, Own};
 pub use result::{PassResult, Tried};
 use stretch::OneStretch;
-pub use stretch::navigator;
 
 /// A pass over all stretches of a problem, `priors` what is known of the initial attitude of each.
 pub fn pass(

@@ -1,22 +1,15 @@
 //! A pass within a stretch.
 
-use nalgebra::Matrix3;
-
 use super::gate::{Judge, Memory};
 use super::mode::Mode;
 use super::result::Sums;
 use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
-use crate::calibration::filter::measurement::Measurement;
 use crate::calibration::filter::{Filter, Taken};
-use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
-use crate::calibration::model::Model;
 use crate::calibration::parameters::{from_vector, to_vector};
 use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::record::schedule::{AtRest, Step};
-use crate::calibration::record::segment::{Segment, moves, segments};
-use crate::navigation::{Navigator, State, TermValues};
+use crate::calibration::record::events::{Event, Events};
 
 /// Spacing of the history, s …
 const EPOCH: f64 = 1.0;
@@ -29,50 +22,23 @@ pub struct OneStretch<'a> {
     stretch: &'a Stretch<'a>,
     number: usize,
     mode: Mode<'a>,
-    navigator: Navigator<'a>,
+    events: Events<'a>,
     pub sums: Sums,
     gate: Memory,
     /// Of squared whitened innovations.
     limit: f64,
-    /// The attitude that the dwell holds without a table, as it is computed when it begins.
-    held: Matrix3<f64>,
 }
 
 /// Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an
 /// outlier that it lets in closes the gate to the good observations that follow.
 struct Begin<'a> {
-    navigator: Navigator<'a>,
+    events: Events<'a>,
     at: Linearisation,
     filter: Filter,
     innovations: usize,
     history: usize,
     cost: f64,
     log_determinant: f64,
-}
-
-/// Navigation through a stretch from this initial attitude on.
-pub fn navigator<'a>(
-    stretch: &Stretch<'a>,
-    at: &Linearisation,
-    initial: &Matrix3<f64>,
-    (model, layout): (&Model, &Layout),
-) -> Result<Navigator<'a>, CalibrationError> {
-    let run = stretch.run;
-    let tried = layout.tried_terms();
-    let on = layout.terms().chain(tried).map(|(_, index)| index);
-    let terms = TermValues {
-        on: on.collect(),
-        values: at.terms,
-    };
-    let start = State::at_rest(*initial);
-    let triads = at.in_recording(stretch.recording);
-    let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, start);
-    let navigator = navigator.ok_or_else(|| singular(&triads))?;
-    let navigator = navigator.with_terms(terms);
-    Ok(match &model.thermal {
-        Some(thermal) => navigator.with_thermal(thermal.clone(), at.thermal),
-        None => navigator,
-    })
 }
 
 impl<'a> OneStretch<'a> {
@@ -83,60 +49,39 @@ impl<'a> OneStretch<'a> {
         (mode, limit): (Mode<'a>, f64),
         sums: Sums,
     ) -> Result<Self, CalibrationError> {
-        let initial = sums.at.initial_attitudes[number];
-        let of = (&problem.model, &sums.filter.layout);
-        let navigator = navigator(stretch, &sums.at, &initial, of)?;
+        let at = (&sums.at, &sums.at.initial_attitudes[number]);
+        let held = matches!(mode, Mode::Held(_));
         Ok(Self {
             problem,
             stretch,
             number,
             mode,
-            navigator,
+            events: Events::new((problem, stretch), &sums.filter.layout, at, held)?,
             sums,
             gate: Memory::default(),
             limit,
-            held: initial,
         })
     }
 
     pub fn run(&mut self) -> Result<(), CalibrationError> {
-        let steps: &'a [Step] = &self.stretch.steps;
-        let mut next = 0;
-        while let Some(step) = steps.get(next) {
-            let imu = &self.stretch.run.recording.imu;
-            if step.at_rest.is_some() {
-                // The start holds what the first dwell says of table and position.
-                next += self.dwell(&steps[next..], next > 0)?;
-                continue;
+        let mut begin = self.begin(self.events.clone());
+        let mut again = false;
+        loop {
+            let before = self.events.clone();
+            let Some(event) = self.events.next() else {
+                return Ok(());
+            };
+            if let Event::Rest(rest) = &event
+                && rest.first
+                && !std::mem::take(&mut again)
+            {
+                begin = self.begin(before);
             }
-            let samples = step.samples.clone();
-            for samples in moves(samples, &self.sums.filter.layout, imu) {
-                let block = self.navigator.advance(samples);
-                self.sums.filter.propagate(&block);
-            }
-            self.remember(imu.time(step.samples.end));
-            next += 1;
-        }
-        Ok(())
-    }
-
-    /// The dwell that begins with the first of these steps; how many it has.
-    fn dwell(&mut self, steps: &'a [Step], new_position: bool) -> Result<usize, CalibrationError> {
-        let begin = self.begin();
-        let mut done = 0;
-        let held = matches!(self.mode, Mode::Held(_));
-        let mut parts = segments(steps, held);
-        while let Some(part) = parts.next() {
-            if self.part(&part, done == 0, new_position)? {
-                done += part.len();
-            } else {
+            if !self.take_in(&event)? {
                 self.go_back(&begin);
-                (done, parts) = (0, segments(steps, held));
+                again = true;
             }
         }
-        let posterior = self.sums.filter.constants();
-        self.sums.posteriors.after_dwell(posterior);
-        Ok(done)
     }
 
     /// Keeps what is known at this time for the history.
@@ -149,30 +94,21 @@ impl<'a> OneStretch<'a> {
         }
     }
 
-    fn begin(&mut self) -> Begin<'a> {
+    fn begin(&mut self, events: Events<'a>) -> Begin<'a> {
         self.gate = Memory::of_dwell(self.sums.innovations.len());
-        let Sums {
-            at,
-            filter,
-            innovations,
-            history,
-            cost,
-            log_determinant,
-            ..
-        } = &self.sums;
         Begin {
-            navigator: self.navigator.clone(),
-            at: at.clone(),
-            filter: filter.clone(),
-            innovations: innovations.len(),
-            history: history.len(),
-            cost: *cost,
-            log_determinant: *log_determinant,
+            events,
+            at: self.sums.at.clone(),
+            filter: self.sums.filter.clone(),
+            innovations: self.sums.innovations.len(),
+            history: self.sums.history.len(),
+            cost: self.sums.cost,
+            log_determinant: self.sums.log_determinant,
         }
     }
 
     fn go_back(&mut self, begin: &Begin<'a>) {
-        self.navigator = begin.navigator.clone();
+        self.events = begin.events.clone();
         self.sums.at = begin.at.clone();
         self.sums.filter = begin.filter.clone();
         self.sums.innovations.truncate(begin.innovations);
@@ -182,71 +118,46 @@ impl<'a> OneStretch<'a> {
         self.gate.again();
     }
 
-    /// A part of a dwell; whether it was taken in.
-    fn part(
-        &mut self,
-        steps: &[(&'a Step, &'a AtRest)],
-        first: bool,
-        new_position: bool,
-    ) -> Result<bool, CalibrationError> {
-        let (Some(&(begin, at_rest)), Some((end, _))) = (steps.first(), steps.last()) else {
-            return Ok(true);
+    /// An event; whether it was taken in.
+    fn take_in(&mut self, event: &Event) -> Result<bool, CalibrationError> {
+        let (sums, model) = (&mut self.sums, &self.problem.model);
+        let rest = match event {
+            Event::Move(..) => None,
+            Event::Rest(rest) => Some(rest),
         };
-        self.navigator.warm(&(begin.samples.start..end.samples.end));
-        let (problem, stretch) = (self.problem, self.stretch);
-        let filter = &mut self.sums.filter;
-        let held = matches!(self.mode, Mode::Held(_));
-        if held {
-            let tied = at_rest.tied(&self.navigator.state, &self.navigator.triads().accel);
-            if first {
-                filter.come_to_rest(&self.navigator.state);
-            }
-            filter.refer(&self.navigator.state, &tied);
-            self.navigator.state = tied;
-        }
-        if first {
-            filter.begin_to_hold();
-            self.held = self.navigator.state.attitude;
-        }
-        let navigator = &mut self.navigator;
-        let of = (problem, stretch);
-        let segment = Segment::navigate(navigator, of, steps, held, &self.held);
-        if first && new_position {
-            filter.redraw_table(problem.model.position_sigma);
-            // Between positions the IMU moves by its distance from the table's centre, within one
-            // not at all: one observation a dwell, however long it is.
-            let variance = stretch.variance.position;
-            filter.update(&Measurement::position(&segment.begin, variance));
-        }
-        let sums = &mut self.sums;
+        let time = event.end();
         let mut judge = Judge {
-            stretch,
-            model: &problem.model,
+            stretch: self.stretch,
+            model,
             mode: self.mode,
             limit: self.limit,
             dwell: sums.posteriors.dwells(),
-            after_move: new_position,
+            after_move: rest.is_some_and(|rest| rest.new_position),
             memory: &mut self.gate,
             innovations: &mut sums.innovations,
             cost: &mut sums.cost,
             log_determinant: &mut sums.log_determinant,
         };
-        let time = segment.end();
-        match sums.dwells.take_in(&mut sums.filter, &segment, &mut judge) {
+        let filter = (&mut sums.filter, &mut sums.dwells);
+        match event.take_in(filter, (model, self.stretch), &mut judge) {
             Taken::Whole => {}
             Taken::Abandoned => return Ok(false),
             Taken::Diverged => return Err(CalibrationError::Diverged { time }),
         }
-        if !held {
+        if rest.is_some() && matches!(self.mode, Mode::Feedback) {
             self.feed_back()?;
         }
         self.remember(time);
+        if rest.is_some_and(|rest| rest.last) {
+            let posterior = self.sums.filter.constants();
+            self.sums.posteriors.after_dwell(posterior);
+        }
         Ok(true)
     }
 
     fn feed_back(&mut self) -> Result<(), CalibrationError> {
         let feedback = self.sums.filter.take_feedback();
-        let state = &mut self.navigator.state;
+        let state = &mut self.events.navigator.state;
         state.attitude = exp(feedback.attitude) * state.attitude;
         state.velocity -= feedback.velocity;
         state.position -= feedback.position;
@@ -258,8 +169,9 @@ impl<'a> OneStretch<'a> {
             &(to_vector(&at.triads) + feedback.parameters),
         );
         at.terms += feedback.terms;
-        self.navigator.set_terms(at.terms);
-        self.navigator
+        self.events.navigator.set_terms(at.terms);
+        self.events
+            .navigator
             .set_triads(&at.triads)
             .ok_or_else(|| singular(&at.triads))
     }

@@ -82,6 +82,14 @@ pub fn segments(steps: &[Step], linearisation_held: bool) -> Segments<'_> {
     }
 }
 
+impl Segments<'_> {
+    /// Whether the dwell has no other part.
+    pub fn is_done(&self) -> bool {
+        let next = self.steps.first().and_then(|step| step.at_rest.as_ref());
+        next.is_none_or(|at_rest| at_rest.first)
+    }
+}
+
 impl<'a> Iterator for Segments<'a> {
     type Item = Vec<(&'a Step, &'a AtRest)>;
 

@@ -11,7 +11,7 @@ use crate::calibration::iterations::{Iterated, iterate};
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::noise::learn;
-use crate::calibration::parameters::{ParameterMatrix, from_vector, parameter, to_vector};
+use crate::calibration::parameters::{from_vector, parameter, to_vector};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::start::attempt::from_coarse_start;
@@ -119,12 +119,11 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     });
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
-    let alone = |(start, by_headings), priors, initial_attitudes, estimate| Alone {
+    let alone = |start, priors, initial_attitudes, estimate| Alone {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
         estimate,
-        by_headings,
         state,
         start,
         priors,
@@ -140,24 +139,23 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     let solved = stands.then(|| from_coarse_start(plain, &|_| {}));
     Ok(match solved {
         Some(Ok(solved)) => {
-            let (priors, stated, by_headings) =
-                (solved.priors, solved.iterated, solved.by_headings);
+            let (priors, stated) = (solved.priors, solved.iterated);
             let learnt = learn(plain, &priors, stated.clone(), &mut Vec::new(), &|_| {}).ok();
             let contradicted = learnt.as_ref().is_some_and(|learnt| learnt.report.learnt);
             let iterated = learnt.map_or(stated, |learnt| learnt.iterated);
             let at = &iterated.held.estimate;
             let alone = alone(
-                (to_vector(&at.triads), by_headings),
+                to_vector(&at.triads),
                 priors,
                 at.initial_attitudes.clone(),
-                estimate(iterated, by_headings),
+                estimate(iterated),
             );
             (alone, contradicted)
         }
         _ => {
             let start = coarse_start(plain)?;
             let alone = alone(
-                (to_vector(&start.at.triads), ParameterMatrix::zeros()),
+                to_vector(&start.at.triads),
                 start.attitudes,
                 start.at.initial_attitudes,
                 None,
@@ -176,13 +174,13 @@ fn with_noise(alone: &Alone, recording: &Problem) -> Option<Estimate> {
     );
     let (gate, passes) = (Gate::Innovations, &mut Vec::new());
     let iterated = iterate(recording, &alone.priors, at, gate, passes, &|_| {}).ok()?;
-    estimate(iterated, alone.by_headings)
+    estimate(iterated)
 }
 
-fn estimate(iterated: Iterated, by_headings: ParameterMatrix) -> Option<Estimate> {
+fn estimate(iterated: Iterated) -> Option<Estimate> {
     iterated.converged.then_some(Estimate {
         triads: iterated.held.estimate.triads,
-        covariance: iterated.held.covariance + by_headings,
+        covariance: iterated.held.covariance,
     })
 }
 
