@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
 use super::error::CalibrationError;
-use super::iterations::Iterated;
+use super::iterations::{Iterated, Progress};
 use super::layout::Layout;
 use super::linearisation::not_invertible;
-use super::noise::Learnt;
 use super::outcome::Outcome;
 use super::parameters::parameter_name;
 use super::problem::Problem;
-use super::several::{self, Joint};
+use super::several;
+use super::solved::Solved;
 use crate::calibration::checks::dwell_scatter::DwellScores;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::{FormTest, form_test};
@@ -23,8 +23,7 @@ use crate::calibration::checks::prior_distance::far_from_prior;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
 use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained;
-use crate::calibration::several::alone::Alone;
-use crate::calibration::start::attempt::{Attempt, Progress, from_coarse_start, learnt_or_stated};
+use crate::calibration::start::attempt::{from_coarse_start, learnt_or_stated};
 use crate::imu::Sensor;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
@@ -37,65 +36,51 @@ use crate::imu::Sensor;
 /// [`CalibrationError`] where the runs cannot give a calibration. Runs that give one without
 /// convergence are an [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
-    let Solved {
-        attempt,
-        problem,
-        alone,
-        findings: of_recordings,
-    } = match problem.varies() || problem.runs().nth(1).is_some() {
-        true => Solved::of(several::solve(problem, progress)?),
-        false => Solved {
-            attempt: from_coarse_start(problem, progress)?,
-            problem: problem.clone(),
-            alone: Vec::new(),
-            findings: Vec::new(),
-        },
+    let solved = match problem.varies() || problem.runs().nth(1).is_some() {
+        true => several::solve(problem, progress)?,
+        false => from_coarse_start(problem, progress)?,
     };
-    let Attempt {
-        priors,
-        mut passes,
-        feedback_history,
-        iterated,
-        learnt,
-    } = attempt;
-    let as_stated = &problem;
-    let with_noise = learnt
-        .as_ref()
-        .map(|learnt| problem.with_model(learnt.model.clone()));
-    let problem = with_noise.as_ref().unwrap_or(&problem);
-    let form_test = form_test(problem, &priors, &iterated.held)?;
+    let as_stated = match solved.noise.learnt {
+        true => problem.clone(),
+        false => solved.problem.clone(),
+    };
+    let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated.held)?;
     // Noise that makes up for angles that are missing is no noise.
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
-    let Learnt {
-        model,
+    let solved = match solved.noise.learnt || is_no_noise {
+        true => solved,
+        false => learnt_or_stated(solved, progress),
+    };
+    outcome(&as_stated, solved, form_test)
+}
+
+/// What was found with its covariance, to which errors that no pass knows of are added.
+fn outcome(
+    as_stated: &Problem,
+    solved: Solved,
+    form_test: Option<FormTest>,
+) -> Result<Outcome, CalibrationError> {
+    let Solved {
+        problem,
         iterated: Iterated {
             mut held,
             converged,
         },
-        report,
-    } = match learnt {
-        Some(learnt) => Learnt {
-            model: problem.model.clone(),
-            iterated,
-            ..learnt
-        },
-        None if is_no_noise => Learnt::stated(problem, iterated),
-        None => learnt_or_stated(problem, &priors, iterated, &mut passes, progress),
-    };
-    let problem = &problem.with_model(model);
+        ..
+    } = solved;
+    let model = &problem.model;
     let scores = held.posteriors.split_first();
     let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
     let by_scatter = scores.as_ref().and_then(DwellScores::widened);
     let estimate = held.both_triads();
     let scattered = by_scatter.map(|widened| {
-        held.widen(&Layout::new(&problem.model), &widened);
+        held.widen(&Layout::new(model), &widened);
         held.both_triads().covariance - estimate.covariance
     });
     if let Some(sensor) = not_invertible(&estimate.triads) {
         return Err(CalibrationError::Singular { sensor });
     }
-    let rounding = by_rounding(problem, &estimate.triads);
-    let model = &problem.model;
+    let rounding = by_rounding(&problem, &estimate.triads);
     let mut outcome = Outcome {
         form_test,
         dwell_scatter: scores.map(|scores| scores.scatter),
@@ -109,7 +94,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         beside: BTreeMap::new(),
         prior_sigma: as_stated.model.prior_sigma,
         prior_mean: model.prior_mean,
-        prior_attitudes: priors,
+        prior_attitudes: solved.priors,
         attitude_sigma: held.attitude_sigma,
         auxiliary: held.auxiliary,
         thermal: held.thermal,
@@ -118,14 +103,14 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             Some(_) => problem.warming(),
             None => Vec::new(),
         },
-        alone,
+        alone: solved.alone,
         gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
         linearised_at: held.at,
         converged,
         log_determinant: held.log_determinant,
         consistency: consistency(&held.innovations),
         history: held.history,
-        feedback_history,
+        feedback_history: solved.feedback_history,
         innovations: held.innovations,
         aiding: model.aiding,
         velocity_sigma: problem
@@ -133,8 +118,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             .first()
             .map_or(0.0, |s| s.stillness(model, Sensor::Accel)),
         model: model.clone(),
-        noise: report,
-        passes,
+        noise: solved.noise,
+        passes: solved.passes,
         findings: Vec::new(),
     };
     if let Some(scattered) = scattered {
@@ -143,7 +128,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let growth = outcome.growth_by(BudgetSource::DwellScatter);
     outcome.set_part(BudgetSource::Rounding, rounding);
     outcome.findings = findings(as_stated, &outcome);
-    outcome.findings.extend(of_recordings);
+    outcome.findings.extend(solved.findings);
     if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
         outcome.findings.push(Finding::DwellsScatter {
             mean: scatter.mean,
@@ -152,32 +137,6 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         });
     }
     Ok(outcome)
-}
-
-/// A calibration with stated noise, of one recording or of several together.
-struct Solved<'a> {
-    attempt: Attempt,
-    /// With what the data call for of what it had.
-    problem: Problem<'a>,
-    alone: Vec<Alone>,
-    findings: Vec<Finding>,
-}
-
-impl<'a> Solved<'a> {
-    fn of(joint: Joint<'a>) -> Self {
-        Self {
-            attempt: Attempt {
-                priors: joint.priors,
-                passes: joint.passes,
-                feedback_history: Vec::new(),
-                iterated: joint.iterated,
-                learnt: None,
-            },
-            problem: joint.problem,
-            alone: joint.alone,
-            findings: joint.findings,
-        }
-    }
 }
 
 fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {

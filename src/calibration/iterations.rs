@@ -21,6 +21,9 @@ const MOST_OUTLIERS: f64 = 0.05;
 /// A step that leads where no pass can be made is shortened by half so many times at most: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
+/// Told after each pass; the command line draws it.
+pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
+
 /// The last pass, and whether it moved nothing.
 #[derive(Clone)]
 pub struct Iterated {
@@ -46,7 +49,7 @@ pub fn iterate(
     from: Linearisation,
     mut gate: Gate,
     passes: &mut Vec<Pass>,
-    progress: &dyn Fn(&Pass),
+    progress: Progress,
 ) -> Result<Iterated, CalibrationError> {
     let most = passes.len() + problem.options.passes;
     let given = matches!(gate, Gate::As(_));

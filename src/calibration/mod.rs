@@ -30,6 +30,7 @@ mod pass;
 mod problem;
 pub mod result;
 mod solution;
+mod solved;
 
 pub use auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
@@ -51,6 +52,7 @@ pub use error_term::ErrorTerm;
 pub use estimate::Estimate;
 pub use gauss_newton::estimate;
 pub use group::Group;
+pub use iterations::Progress;
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
@@ -80,7 +82,6 @@ pub use several::day_to_day::{DayToDay, Difference};
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
-pub use start::attempt::Progress;
 pub use start::closed_form::{
     ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
 };

@@ -4,6 +4,7 @@ use super::budget::{Budget, BudgetSource};
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::gauss_newton::estimate;
+use super::iterations::Progress;
 use super::outcome::Outcome;
 use super::problem::Problem;
 use super::result::{Calibration, Method, Provenance};
@@ -12,7 +13,6 @@ use crate::calibration::checks::error_term_test::{
 };
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::quality::Quality;
-use crate::calibration::start::attempt::Progress;
 use crate::calibration::start::closed_form::{ClosedForm, six_position};
 use crate::calibration::start::mounting::Mounting;
 use crate::imu::PerSensor;

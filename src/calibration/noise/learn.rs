@@ -10,13 +10,11 @@ use super::selection::Selection;
 use super::source::Source;
 use crate::calibration::checks::innovation::{Innovation, Observation};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::iterations::{Iterated, iterate};
-use crate::calibration::linearisation::AttitudePrior;
-use crate::calibration::model::Model;
-use crate::calibration::outcome::Pass;
+use crate::calibration::iterations::{Progress, iterate};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;
+use crate::calibration::solved::Solved;
 
 /// Chance that stated figures which are right are given up.
 pub const FALSE_ALARM: f64 = 1e-3;
@@ -38,104 +36,78 @@ const LONGEST: usize = 10;
 pub const INTERVAL: f64 = 1.96;
 const ONE_SIDED: f64 = 1.645;
 
-/// A calibration with the noise of its record.
-pub struct Learnt {
-    pub model: Model,
-    pub iterated: Iterated,
-    pub report: NoiseReport,
-}
-
-impl Learnt {
-    /// The noise as stated, not tested.
-    pub fn stated(problem: &Problem, iterated: Iterated) -> Self {
-        Self {
-            model: problem.model.clone(),
-            iterated,
-            report: NoiseReport::stated(problem.options.noise, None),
-        }
-    }
-}
-
-/// Keeps stated noise or learns it, as the problem's options say, from what converged with it.
-pub fn learn(
-    problem: &Problem,
-    priors: &[AttitudePrior],
-    stated: Iterated,
-    passes: &mut Vec<Pass>,
-    progress: &dyn Fn(&Pass),
-) -> Result<Learnt, CalibrationError> {
+/// Keeps stated noise or estimates it, as the problem's options say, from what was solved with stated noise.
+pub fn learn<'a>(stated: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
+    let problem = &stated.problem.clone();
     let policy = problem.options.noise;
-    let keep = |iterated, test| Learnt {
-        model: problem.model.clone(),
-        iterated,
-        report: NoiseReport::stated(policy, test),
-    };
     if policy == NoisePolicy::Stated {
-        return Ok(Learnt::stated(problem, stated));
+        return Ok(stated);
     }
-    let at = stated.held.estimate.clone();
-    let mut accepted: Vec<bool> = let_in(&stated.held.innovations);
+    let at = stated.iterated.held.estimate.clone();
+    let accepted = let_in(&stated.iterated.held.innovations);
     let thinned = Thinned::new(problem, (accepted.len() / ENOUGH).clamp(1, LONGEST));
-    let script = Script::new(&thinned.problem, priors, &at)?;
+    let script = Script::new(&thinned.problem, &stated.priors, &at)?;
     let scale = Scale::new(problem, &script.moves());
     let likelihood = thinned.likelihood(&script, &scale, &accepted);
     let (test, fitted) = likelihood.test(policy)?;
-    let Some(fitted) = fitted else {
-        return Ok(keep(stated, Some(test)));
+    let contradicted = policy != NoisePolicy::Auto || test.rejected || !stated.iterated.converged;
+    let Some(fitted) = fitted.filter(|_| contradicted) else {
+        return Ok(Solved {
+            noise: NoiseReport::stated(policy, Some(test)),
+            ..stated
+        });
     };
-    if policy == NoisePolicy::Auto && !test.rejected && stated.converged {
-        return Ok(keep(stated, Some(test)));
-    }
-    let Selection {
-        mut fit,
-        mut sources,
-    } = likelihood.select(&fitted.factors, scale.present())?;
+    let selection = likelihood.select(&fitted.factors, scale.present())?;
+    with_noise(stated, (selection, test), &scale, accepted, progress)
+}
 
-    let mut iterated = stated;
-    // Stated noise may have thrown the gate open; the learnt one decides once.
+/// Iterates with noise that was estimated at one point of linearisation, and estimates it there again, until neither
+/// moves.
+fn with_noise<'a>(
+    mut solved: Solved<'a>,
+    (mut selection, test): (Selection, NoiseTest),
+    scale: &Scale,
+    mut accepted: Vec<bool>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
+    let problem = &solved.problem.clone();
+    let priors = &solved.priors.clone();
+    // Stated noise may have thrown the gate open; the estimated one decides once.
     let mut open = accepted.iter().all(|&accepted| accepted);
     // Near the end all observations count: few cannot tell white noise from random walk.
     let whole = Thinned::new(problem, 1);
     let mut before = None;
-    let mut at = at;
-    let mut round = 0;
-    loop {
-        round += 1;
-        let model = scale.apply(&fit.factors, &problem.model);
-        let with_noise = problem.with_model(model.clone());
-        let distances = Script::new(&with_noise, priors, &at)?
-            .replay(&with_noise, &accepted)?
-            .distances;
+    for round in 1.. {
+        let factors = selection.fit.factors;
+        let with_noise = problem.with_model(scale.apply(&factors, &problem.model));
+        let at = solved.iterated.held.estimate.clone();
+        let script = Script::new(&with_noise, priors, &at)?;
+        let distances = script.replay(&with_noise, &accepted)?.distances;
         let changed = regate(&mut accepted, &distances, problem.gate(), open);
         open = false;
-        let as_decided: Vec<Innovation> = iterated
-            .held
-            .innovations
-            .iter()
-            .zip(&accepted)
-            .map(|(innovation, &accepted)| Innovation {
+        let innovations = solved.iterated.held.innovations.iter().zip(&accepted);
+        let decided: Vec<Innovation> = innovations
+            .map(|(&innovation, &accepted)| Innovation {
                 accepted,
-                ..*innovation
+                ..innovation
             })
             .collect();
-        let from = iterated.held.estimate.clone();
-        let gate = Gate::As(&as_decided);
-        iterated = iterate(&with_noise, priors, from, gate, passes, progress)?;
-        at = iterated.held.estimate.clone();
-        let script = Script::new(&whole.problem, priors, &at)?;
-        let likelihood = whole.likelihood(&script, &scale, &accepted);
-        let now = likelihood.replay(&fit.factors)?.deviance();
+        let (gate, passes) = (Gate::As(&decided), &mut solved.passes);
+        solved.iterated = iterate(&with_noise, priors, at, gate, passes, progress)?;
+        let at = &solved.iterated.held.estimate;
+        let script = Script::new(&whole.problem, priors, at)?;
+        let likelihood = whole.likelihood(&script, scale, &accepted);
+        let now = likelihood.replay(&factors)?.deviance();
         let moved = before.is_none_or(|before: f64| (now - before).abs() > SETTLED);
         if (!changed && !moved) || round == ROUNDS {
-            return Ok(Learnt {
-                model,
-                report: likelihood.report(policy, test, &fit.factors)?,
-                iterated,
-            });
+            solved.noise = likelihood.report(problem.options.noise, test, &factors)?;
+            solved.problem = with_noise;
+            break;
         }
         before = Some(now);
-        Selection { fit, sources } = likelihood.select(&fit.factors, sources)?;
+        selection = likelihood.select(&factors, selection.sources)?;
     }
+    Ok(solved)
 }
 
 /// A problem of which only so many observations are looked at as noise needs: those of a dwell are thinned

@@ -19,7 +19,7 @@ mod source;
 
 pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use fit::LOG_SIGMA;
-pub use learn::{Learnt, learn};
+pub use learn::learn;
 pub use policy::NoisePolicy;
 pub use replay::Script;
 pub use report::{NoiseReport, NoiseTest, SourceFigures};

@@ -19,18 +19,16 @@ mod temperatures;
 use std::sync::Arc;
 
 use super::error::CalibrationError;
-use super::iterations::{Iterated, iterate};
+use super::iterations::{Progress, iterate};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::noise::NoisePolicy;
 use super::options::Options;
-use super::outcome::Pass;
 use super::parameters::parameter;
 use super::pass::Gate;
 use super::problem::{Problem, Stretch};
-use crate::calibration::checks::finding::Finding;
+use super::solved::Solved;
 use crate::calibration::several::alone::Alone;
 use crate::calibration::several::day_to_day::{DayToDay, Difference};
-use crate::calibration::start::attempt::Progress;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
@@ -110,20 +108,12 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Iterations of all recordings together, and what came of each alone.
-pub struct Joint<'a> {
-    /// With the orders that the data call for.
-    pub problem: Problem<'a>,
-    pub priors: Vec<AttitudePrior>,
-    pub passes: Vec<Pass>,
-    pub iterated: Iterated,
-    pub alone: Vec<Alone>,
-    pub findings: Vec<Finding>,
-}
-
 /// Solves a problem of several recordings, or one that varies, with stated noise. Recordings differ by what is stated
 /// or, where the noise may be learnt, by what they show.
-pub fn solve<'a>(problem: &Problem<'a>, progress: Progress) -> Result<Joint<'a>, CalibrationError> {
+pub fn solve<'a>(
+    problem: &Problem<'a>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
     let alone = separate::each(problem)?;
     let mut findings = Vec::new();
     let mut problem = problem.clone();
@@ -152,13 +142,10 @@ pub fn solve<'a>(problem: &Problem<'a>, progress: Progress) -> Result<Joint<'a>,
             iterated = iterate(&problem, &priors, from, gate, &mut passes, progress)?;
         }
     }
-    Ok(Joint {
-        problem,
-        priors,
-        passes,
-        iterated,
+    Ok(Solved {
         alone,
         findings,
+        ..Solved::stated(&problem, priors, iterated, passes)
     })
 }
 

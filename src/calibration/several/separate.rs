@@ -14,6 +14,7 @@ use crate::calibration::noise::learn;
 use crate::calibration::parameters::{from_vector, parameter, to_vector};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
+use crate::calibration::solved::Solved;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::calibration::start::coarse::coarse_start;
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
@@ -84,11 +85,10 @@ fn noise_of_all(problem: &Problem, alone: &[Alone]) -> Option<Model> {
     let passes = &mut Vec::new();
     let gate = Gate::Innovations;
     let iterated = iterate(&problem, &priors, at, gate, passes, &|_| {}).ok()?;
-    let learnt = learn(&problem, &priors, iterated, passes, &|_| {}).ok()?;
-    learnt
-        .report
-        .learnt
-        .then(|| plain(&problem, &learnt.model).model)
+    let stated = Solved::stated(&problem, priors, iterated, Vec::new());
+    let learnt = learn(stated, &|_| {}).ok()?;
+    let of_all = || plain(&problem, &learnt.problem.model).model;
+    learnt.noise.learnt.then(of_all)
 }
 
 /// A recording alone with the noise that is stated or that it shows, and whether it shows other than is stated.
@@ -139,14 +139,12 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     let solved = stands.then(|| from_coarse_start(plain, &|_| {}));
     Ok(match solved {
         Some(Ok(solved)) => {
-            let (priors, stated) = (solved.priors, solved.iterated);
-            let learnt = learn(plain, &priors, stated.clone(), &mut Vec::new(), &|_| {}).ok();
-            let contradicted = learnt.as_ref().is_some_and(|learnt| learnt.report.learnt);
-            let iterated = learnt.map_or(stated, |learnt| learnt.iterated);
+            let solved = learn(solved.clone(), &|_| {}).unwrap_or(solved);
+            let (contradicted, iterated) = (solved.noise.learnt, solved.iterated);
             let at = &iterated.held.estimate;
             let alone = alone(
                 to_vector(&at.triads),
-                priors,
+                solved.priors,
                 at.initial_attitudes.clone(),
                 estimate(iterated),
             );

@@ -1,0 +1,47 @@
+//! What iterations found, and with what they were made.
+
+use super::iterations::Iterated;
+use super::linearisation::AttitudePrior;
+use super::outcome::Pass;
+use super::pass::Epoch;
+use super::problem::Problem;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::noise::NoiseReport;
+use crate::calibration::several::alone::Alone;
+
+/// A problem whose iterations have ended.
+#[derive(Clone)]
+pub struct Solved<'a> {
+    /// As it was calibrated: with the noise that was estimated and the orders of temperature that the data call for.
+    pub problem: Problem<'a>,
+    pub priors: Vec<AttitudePrior>,
+    pub passes: Vec<Pass>,
+    /// Of the pass with feedback, where there was one.
+    pub feedback_history: Vec<Epoch>,
+    pub iterated: Iterated,
+    pub noise: NoiseReport,
+    /// Each recording calibrated alone, where there are several.
+    pub alone: Vec<Alone>,
+    pub findings: Vec<Finding>,
+}
+
+impl<'a> Solved<'a> {
+    /// With noise as it is stated.
+    pub fn stated(
+        problem: &Problem<'a>,
+        priors: Vec<AttitudePrior>,
+        iterated: Iterated,
+        passes: Vec<Pass>,
+    ) -> Self {
+        Self {
+            noise: NoiseReport::stated(problem.options.noise, None),
+            problem: problem.clone(),
+            priors,
+            passes,
+            feedback_history: Vec::new(),
+            iterated,
+            alone: Vec::new(),
+            findings: Vec::new(),
+        }
+    }
+}
