@@ -53,7 +53,7 @@ pub struct BudgetPart {
 }
 
 /// By which part of itself the variance of a source becomes larger: as small as rounding lets it be.
-const STEP: f64 = 1e-3;
+const STEP: f64 = 2e-4;
 
 impl Budget {
     /// The budget of an outcome's estimate.

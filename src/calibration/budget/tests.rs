@@ -8,7 +8,7 @@ use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
 
 /// Of a difference of first order in the step, and rounding of covariances that fall by ten orders of magnitude.
-const EXACT: f64 = 2e-4;
+const EXACT: f64 = 1e-4;
 
 fn simulated(scenario: &str) -> Run {
     let scenario = Scenario::load(scenario).unwrap();
