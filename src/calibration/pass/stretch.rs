@@ -16,7 +16,7 @@ use crate::calibration::parameters::{from_vector, to_vector};
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::schedule::{AtRest, Step};
 use crate::calibration::record::segment::{Segment, moves, segments};
-use crate::navigation::{Navigator, State, TermValues};
+use crate::navigation::{Navigator, State};
 
 /// Spacing of the history, s …
 const EPOCH: f64 = 1.0;
@@ -60,15 +60,11 @@ pub fn navigator<'a>(
     let run = stretch.run;
     let tried = layout.tried_terms();
     let on = layout.terms().chain(tried).map(|(_, index)| index);
-    let terms = TermValues {
-        on: on.collect(),
-        values: at.terms,
-    };
     let start = State::at_rest(*initial);
     let triads = at.in_recording(stretch.recording);
     let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, start);
     let navigator = navigator.ok_or_else(|| singular(&triads))?;
-    let navigator = navigator.with_terms(terms);
+    let navigator = navigator.with_terms(on.collect(), at.terms);
     Ok(match &model.thermal {
         Some(thermal) => navigator.with_thermal(thermal.clone(), at.thermal),
         None => navigator,
