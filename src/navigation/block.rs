@@ -2,18 +2,36 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
+use super::errors::{ErrorMatrix, ErrorVector, STATES};
 use super::process_noise::NoiseInputs;
-use super::state::State;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, ThermalState, Triad};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, ThermalState};
 
-/// Attitude, velocity and position error.
-pub const NAVIGATION: usize = 9;
-/// Navigation errors against navigation errors.
-pub type BlockMatrix = SMatrix<f64, NAVIGATION, NAVIGATION>;
 /// Navigation errors against the parameters of one triad.
-pub type ParameterBlock = SMatrix<f64, NAVIGATION, PER_TRIAD>;
+pub type ParameterBlock = SMatrix<f64, STATES, PER_TRIAD>;
+
+/// Computed attitude, velocity and position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// `C_b_n`, body to East-North-Up.
+    pub attitude: Matrix3<f64>,
+    /// Velocity relative to the Earth, East-North-Up, m/s.
+    pub velocity: Vector3<f64>,
+    /// Position relative to the site, East-North-Up, m.
+    pub position: Vector3<f64>,
+}
+
+impl State {
+    /// At rest at the site.
+    pub fn at_rest(attitude: Matrix3<f64>) -> Self {
+        Self {
+            attitude,
+            velocity: Vector3::zeros(),
+            position: Vector3::zeros(),
+        }
+    }
+}
 
 /// The error model over a stretch of samples: the rows of the transition matrix that differ from
 /// identity, what process noise acts on, and the computed state at the end.
@@ -31,11 +49,11 @@ pub struct Block {
     /// Length in s.
     pub duration: f64,
     /// Transition of the navigation errors.
-    pub navigation: Arc<BlockMatrix>,
+    pub navigation: Arc<ErrorMatrix>,
     /// Transition from the parameter errors of each triad.
     pub parameters: Arc<PerSensor<ParameterBlock>>,
     /// Transition from the error of gravity's magnitude, true − stated, in m/s².
-    pub gravity: SVector<f64, NAVIGATION>,
+    pub gravity: ErrorVector,
     /// Transition from the parameter errors of error terms that are on.
     pub terms: Vec<TermColumn>,
     /// Functions of temperature meanwhile: the transition from a coefficient's error is that from its
@@ -45,38 +63,11 @@ pub struct Block {
     pub noise: NoiseInputs,
 }
 
-impl Block {
-    /// The same of as many samples at rest in the same attitude, of which interpolated ones add this covariance
-    /// to the integral of each triad's input, rad² and (m/s)² in `n`.
-    pub(super) fn bridging(&self, bridged: PerSensor<Matrix3<f64>>) -> Self {
-        Self {
-            noise: self.noise.bridging(bridged),
-            ..self.clone()
-        }
-    }
-}
-
 /// What the error of one term parameter makes of the navigation errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermColumn {
     /// The parameter's index among [`crate::imu::TERM_PARAMETERS`].
     pub parameter: usize,
     /// Navigation errors by the parameter's error, true − estimated.
-    pub column: SVector<f64, NAVIGATION>,
-}
-
-/// `(K̂Ĉ)⁻¹ W_p` for every parameter: the error of the computed input is this times `[u; 1]`.
-#[derive(Debug, Clone)]
-pub(super) struct CorrectedResponse(pub [SMatrix<f64, 3, 4>; PER_TRIAD]);
-
-impl CorrectedResponse {
-    pub(super) fn new(triad: &Triad, correction: &Matrix3<f64>) -> Self {
-        Self(triad.response().map(|w| correction * w))
-    }
-
-    /// Of each parameter the weights of `C_b_n b_k`, for each column of `C_b_n` one `b_k` after the other.
-    pub(super) fn columns(&self) -> [SVector<f64, 12>; PER_TRIAD] {
-        self.0
-            .map(|w| SVector::from_column_slice(w.transpose().as_slice()))
-    }
+    pub column: ErrorVector,
 }

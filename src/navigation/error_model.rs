@@ -1,24 +1,18 @@
 //! The linear error model of strapdown navigation (Eq. 13), continuous and in exact discrete form.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector3};
 
-use super::sensitivity::SensedErrors;
-use super::strapdown::{Height, Solution};
-use crate::attitude::{exp, skew};
-use crate::earth::{
-    Curvature, ROTATION_RATE, SEMI_MAJOR_AXIS, earth_rate_n, normal_gravity_gradient,
-};
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Triad};
+use super::errors::{Rows, add_product, blocks};
+use super::instrument::{Response, response};
+use super::runge_kutta::step;
+use super::strapdown::{Height, Instant, Solution};
+use crate::attitude::skew;
+use crate::earth::{Curvature, SEMI_MAJOR_AXIS, earth_rate_n, normal_gravity_gradient};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::units::STANDARD_GRAVITY;
 
-/// Attitude error φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad.
-pub const ATTITUDE: usize = 0;
-/// Velocity error δV, computed − true, East-North-Up, m/s.
-pub const VELOCITY: usize = 3;
-/// Position error, computed − true: δL and δλ in rad, δh in m.
-pub const POSITION: usize = 6;
-/// Number of states.
-pub const STATES: usize = 9;
+pub use super::errors::{ATTITUDE, ErrorMatrix, ErrorVector, POSITION, STATES, VELOCITY};
+
 /// Number of inputs: errors of the sensed angular rate (rad/s) and specific force (m/s²), computed −
 /// true, along body axes.
 pub const INPUTS: usize = 6;
@@ -32,11 +26,10 @@ const UP: usize = 2;
 const LATITUDE: usize = POSITION;
 const LONGITUDE: usize = POSITION + 1;
 const HEIGHT: usize = POSITION + 2;
+/// The inputs after the states.
+const RATE: usize = STATES;
+const FORCE: usize = STATES + 3;
 
-/// A vector of the states.
-pub type ErrorVector = SVector<f64, STATES>;
-/// A matrix of the states.
-pub type ErrorMatrix = SMatrix<f64, STATES, STATES>;
 /// Navigation errors against input errors.
 pub type InputMatrix = SMatrix<f64, STATES, INPUTS>;
 
@@ -71,77 +64,46 @@ impl ErrorModel {
     /// About a true state with this specific force along body axes, m/s². Where height is held its
     /// error and that of vertical velocity are zero, and seven states remain.
     pub fn about(truth: &Solution, force: &Vector3<f64>, height: Height) -> Self {
-        let Solution {
-            velocity,
-            latitude,
-            height: h,
-            ..
-        } = *truth;
-        let (sin, cos) = latitude.sin_cos();
-        let (tan, sec) = (sin / cos, 1.0 / cos);
-        let radii = Curvature::at(latitude);
-        let slope = Curvature::slope(latitude);
-        let (r_m, r_n) = (radii.meridian + h, radii.prime_vertical + h);
+        let (latitude, transport) = (truth.latitude, truth.transport_rate());
         let earth = earth_rate_n(latitude);
-        let transport = truth.transport_rate();
+        // Columns by latitude, longitude and height.
+        let earth_by_latitude = Vector3::new(0.0, -earth.z, earth.y);
+        let earth_by_position =
+            Matrix3::from_columns(&[earth_by_latitude, Vector3::zeros(), Vector3::zeros()]);
+        let (transport_by_velocity, transport_by_position) = transport_slopes(truth, &transport);
+        let (gravity_by_latitude, gravity_by_height) =
+            normal_gravity_gradient(latitude, truth.height);
+        let gravity_by_position =
+            Vector3::z() * RowVector3::new(gravity_by_latitude, 0.0, gravity_by_height);
+        // δω_en × V = −V × δω_en.
+        let across = skew(truth.velocity);
+        let (tan, sec) = (latitude.tan(), 1.0 / latitude.cos());
+        let moves = Matrix3::from_diagonal(&Vector3::new(-1.0, sec, 0.0));
 
-        // Earth rate against latitude; transport rate against velocity and position.
-        let earth_by_latitude = Vector3::new(0.0, -ROTATION_RATE * sin, ROTATION_RATE * cos);
-        let mut by_velocity = Matrix3::zeros();
-        by_velocity[(EAST, NORTH)] = -1.0 / r_m;
-        by_velocity[(NORTH, EAST)] = 1.0 / r_n;
-        by_velocity[(UP, EAST)] = tan / r_n;
-        let by_height = Vector3::new(-transport.x / r_m, -transport.y / r_n, -transport.z / r_n);
-        let mut by_latitude = Vector3::new(
-            by_height.x * slope.meridian,
-            by_height.y * slope.prime_vertical,
-            by_height.z * slope.prime_vertical,
-        );
-        by_latitude.z += velocity.x * sec * sec / r_n;
-
-        let mut f = ErrorMatrix::zeros();
-        let mut set = |row: usize, column: usize, m: Matrix3<f64>| {
-            f.fixed_view_mut::<3, 3>(row, column).copy_from(&m);
-        };
-        set(ATTITUDE, ATTITUDE, -skew(earth + transport));
-        set(ATTITUDE, VELOCITY, by_velocity);
-        set(VELOCITY, ATTITUDE, skew(truth.attitude * force));
-        // −δω_en × V = V × δω_en.
-        let across = skew(velocity);
-        set(
-            VELOCITY,
-            VELOCITY,
-            across * by_velocity - skew(earth * 2.0 + transport),
-        );
-        let (gravity_north, gravity_up) = normal_gravity_gradient(latitude, h);
-        let positions = [
+        let coriolis_by_velocity = across * transport_by_velocity - skew(earth * 2.0 + transport);
+        let coriolis_by_position = across * (earth_by_position * 2.0 + transport_by_position);
+        let mut f: ErrorMatrix = blocks(&[
+            (ATTITUDE, ATTITUDE, -skew(earth + transport)),
+            (ATTITUDE, VELOCITY, transport_by_velocity),
             (
-                LATITUDE,
-                earth_by_latitude + by_latitude,
-                across * (earth_by_latitude * 2.0 + by_latitude),
-                gravity_north,
+                ATTITUDE,
+                POSITION,
+                earth_by_position + transport_by_position,
             ),
-            (HEIGHT, by_height, across * by_height, gravity_up),
-        ];
-        for (column, turning, acceleration, gravity) in positions {
-            f.fixed_view_mut::<3, 1>(ATTITUDE, column)
-                .copy_from(&turning);
-            f.fixed_view_mut::<3, 1>(VELOCITY, column)
-                .copy_from(&(acceleration - Vector3::z() * gravity));
-        }
-        f[(LATITUDE, VELOCITY + NORTH)] = 1.0 / r_m;
-        f[(LATITUDE, LATITUDE)] = -by_latitude.x;
-        f[(LATITUDE, HEIGHT)] = -by_height.x;
-        f[(LONGITUDE, VELOCITY + EAST)] = sec / r_n;
-        f[(LONGITUDE, LATITUDE)] = by_latitude.y * sec + transport.y * tan * sec;
-        f[(LONGITUDE, HEIGHT)] = by_height.y * sec;
+            (VELOCITY, ATTITUDE, skew(truth.attitude * force)),
+            (VELOCITY, VELOCITY, coriolis_by_velocity),
+            (
+                VELOCITY,
+                POSITION,
+                coriolis_by_position - gravity_by_position,
+            ),
+            (POSITION, VELOCITY, moves * transport_by_velocity),
+            (POSITION, POSITION, moves * transport_by_position),
+        ]);
+        f[(LONGITUDE, LATITUDE)] += transport.y * tan * sec;
         f[(HEIGHT, VELOCITY + UP)] = 1.0;
-
-        let mut g = InputMatrix::zeros();
-        g.fixed_view_mut::<3, 3>(ATTITUDE, 0)
-            .copy_from(&-truth.attitude);
-        g.fixed_view_mut::<3, 3>(VELOCITY, 3)
-            .copy_from(&truth.attitude);
+        let attitude = truth.attitude;
+        let mut g: InputMatrix = blocks(&[(ATTITUDE, 0, -attitude), (VELOCITY, 3, attitude)]);
         if matches!(height, Height::Held { .. }) {
             for state in [VELOCITY + UP, HEIGHT] {
                 f.row_mut(state).fill(0.0);
@@ -163,40 +125,53 @@ impl ErrorModel {
         // All entries of the scaled matrix are about the Schuler frequency, so the exponential keeps
         // its digits over hours.
         let schuler = (STANDARD_GRAVITY / SEMI_MAJOR_AXIS).sqrt();
-        let speed = schuler * SEMI_MAJOR_AXIS;
-        let state = ErrorVector::from_fn(|i, _| match i {
-            ATTITUDE..VELOCITY => 1.0,
-            VELOCITY..POSITION => speed,
+        let unit = SVector::<f64, { STATES + INPUTS }>::from_fn(|i, _| match i {
+            VELOCITY..POSITION => schuler * SEMI_MAJOR_AXIS,
             HEIGHT => SEMI_MAJOR_AXIS,
+            RATE..FORCE => schuler,
+            FORCE.. => STANDARD_GRAVITY,
             _ => 1.0,
         });
-        let input =
-            SVector::<f64, INPUTS>::from_fn(|i, _| if i < 3 { schuler } else { STANDARD_GRAVITY });
 
-        let mut joined = SMatrix::<f64, { STATES + INPUTS }, { STATES + INPUTS }>::zeros();
-        for row in 0..STATES {
-            for column in 0..STATES {
-                joined[(row, column)] =
-                    self.dynamics[(row, column)] * duration * state[column] / state[row];
-            }
-            for column in 0..INPUTS {
-                joined[(row, STATES + column)] =
-                    self.input[(row, column)] * duration * input[column] / state[row];
-            }
-        }
-        let exponential = joined.exp();
+        let mut joined = Joined::zeros();
+        joined
+            .fixed_view_mut::<STATES, STATES>(0, 0)
+            .copy_from(&self.dynamics);
+        joined
+            .fixed_view_mut::<STATES, INPUTS>(0, STATES)
+            .copy_from(&self.input);
+        let scaled = Joined::from_fn(|i, j| joined[(i, j)] * duration * unit[j] / unit[i]).exp();
+        let exact = Joined::from_fn(|i, j| scaled[(i, j)] * unit[i] / unit[j]);
         Transition {
-            errors: ErrorMatrix::from_fn(|row, column| {
-                exponential[(row, column)] * state[row] / state[column]
-            }),
-            input: InputMatrix::from_fn(|row, column| {
-                exponential[(row, STATES + column)] * state[row] / input[column]
-            }),
+            errors: exact.fixed_view::<STATES, STATES>(0, 0).into_owned(),
+            input: exact.fixed_view::<STATES, INPUTS>(0, STATES).into_owned(),
         }
     }
 }
 
-/// The error model over a step: `x ← Φ x + Γ ε`.
+/// States before inputs.
+type Joined = SMatrix<f64, { STATES + INPUTS }, { STATES + INPUTS }>;
+
+/// Derivatives of the transport rate by velocity, and by latitude, longitude and height.
+fn transport_slopes(truth: &Solution, transport: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let (tan, sec) = (truth.latitude.tan(), 1.0 / truth.latitude.cos());
+    let slope = Curvature::slope(truth.latitude);
+    let radii = Curvature::at(truth.latitude);
+    let r_m = radii.meridian + truth.height;
+    let r_n = radii.prime_vertical + truth.height;
+    let mut by_velocity = Matrix3::zeros();
+    by_velocity[(EAST, NORTH)] = -1.0 / r_m;
+    by_velocity[(NORTH, EAST)] = 1.0 / r_n;
+    by_velocity[(UP, EAST)] = tan / r_n;
+    let by_height = -transport.component_div(&Vector3::new(r_m, r_n, r_n));
+    let slopes = Vector3::new(slope.meridian, slope.prime_vertical, slope.prime_vertical);
+    let mut by_latitude = by_height.component_mul(&slopes);
+    by_latitude.z += truth.velocity.x * sec * sec / r_n;
+    let by_position = Matrix3::from_columns(&[by_latitude, Vector3::zeros(), by_height]);
+    (by_velocity, by_position)
+}
+
+/// The error model over a step: `x ← Φ x + Γ ε`; sensitivities to constants alike, with `∂ε/∂θ` for ε.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Φ.
@@ -205,78 +180,96 @@ pub struct Transition {
     pub input: InputMatrix,
 }
 
-/// How navigation errors depend on `N` unknown constants, followed along a trajectory.
-///
-/// The constants may be the input errors themselves (`N = 6`, [`Self::advance`] with the identity) or
-/// the parameters of both triads (`N = 24`, with [`sensed_errors`]).
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sensitivity<const N: usize>(
-    /// `∂x/∂θ`, each state by each constant.
-    pub SMatrix<f64, STATES, N>,
-);
+/// `∂x/∂θ`, navigation errors by `N` unknown constants: the input errors themselves (`N = 6`) or the parameters of both
+/// triads ([`PARAMETERS`], [`SensedErrors`]). Zero where navigation starts without errors.
+pub type Sensitivity<const N: usize> = SMatrix<f64, STATES, N>;
 
-impl<const N: usize> Sensitivity<N> {
-    /// Navigation starts without errors.
-    pub fn new() -> Self {
-        Self(SMatrix::zeros())
+/// `∂ε/∂θ`, errors of the sensed rate and force by parameter errors δθ = true − estimated:
+/// `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`, linear in `[u; 1]`.
+#[derive(Debug, Clone)]
+pub struct SensedErrors(PerSensor<Response>);
+
+impl SensedErrors {
+    /// Of these triads.
+    ///
+    /// # Errors
+    /// A triad whose sensitivity is singular.
+    pub fn new(triads: &PerSensor<Triad>) -> Result<Self, Sensor> {
+        let of = |sensor: Sensor| {
+            let triad = triads.get(sensor);
+            Ok(response(triad, &triad.correction().ok_or(sensor)?))
+        };
+        Ok(Self(PerSensor {
+            gyro: of(Sensor::Gyro)?,
+            accel: of(Sensor::Accel)?,
+        }))
     }
 
-    /// Goes on by a step in which `sensed` is `∂ε/∂θ`.
-    pub fn advance(&mut self, step: &Transition, sensed: &SMatrix<f64, INPUTS, N>) {
-        self.0 = step.errors * self.0 + step.input * sensed;
-    }
-
-    /// Navigation errors that these constants cause.
-    pub fn errors(&self, constants: &SVector<f64, N>) -> ErrorVector {
-        self.0 * constants
-    }
-
-    /// Covariance of the navigation errors from that of the constants.
-    pub fn covariance(&self, constants: &SMatrix<f64, N, N>) -> ErrorMatrix {
-        self.0 * constants * self.0.transpose()
-    }
-}
-
-impl<const N: usize> Default for Sensitivity<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// `∂ε/∂θ`, errors of the sensed rate and force by parameter errors δθ = true − estimated, at an
-/// angular rate (rad/s) and specific force (m/s²) along body axes: `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`.
-/// `None` where the sensitivity of a triad is singular.
-pub fn sensed_errors(
-    triads: &PerSensor<Triad>,
-    rate: &Vector3<f64>,
-    force: &Vector3<f64>,
-) -> Option<SMatrix<f64, INPUTS, PARAMETERS>> {
-    Some(SensedErrors::new(triads).ok()?.at(rate, force))
-}
-
-impl Solution {
-    /// The computed solution that has these errors against this true one.
-    pub fn with_errors(&self, errors: &ErrorVector) -> Self {
-        Self {
-            attitude: exp(-errors.fixed_rows::<3>(ATTITUDE)) * self.attitude,
-            velocity: self.velocity + errors.fixed_rows::<3>(VELOCITY),
-            latitude: self.latitude + errors[LATITUDE],
-            longitude: self.longitude + errors[LONGITUDE],
-            height: self.height + errors[HEIGHT],
+    /// At an angular rate (rad/s) and specific force (m/s²) along body axes.
+    pub fn at(
+        &self,
+        rate: &Vector3<f64>,
+        force: &Vector3<f64>,
+    ) -> SMatrix<f64, INPUTS, PARAMETERS> {
+        let mut sensed = SMatrix::<f64, INPUTS, PARAMETERS>::zeros();
+        for (place, (sensor, u)) in Sensor::ALL.into_iter().zip([rate, force]).enumerate() {
+            for axis in 0..3 {
+                let weights = self.0.get(sensor).fixed_rows::<4>(4 * axis);
+                sensed
+                    .fixed_view_mut::<1, PER_TRIAD>(3 * place + axis, PER_TRIAD * place)
+                    .copy_from(&u.push(1.0).tr_mul(&weights));
+            }
         }
+        sensed
+    }
+}
+
+/// The linear error model at one moment, height held: `ẋ = F x + G (∂ε/∂θ) θ`.
+#[derive(Debug, Clone)]
+pub struct Linearisation {
+    dynamics: ErrorMatrix,
+    forcing: Rows<STATES, PARAMETERS>,
+}
+
+impl Linearisation {
+    /// About a true motion.
+    pub fn about(at: &Instant, sensed: &SensedErrors) -> Self {
+        let ErrorModel { dynamics, input } = at.linear_model();
+        let forcing = (input * sensed.at(&at.rate, &at.force)).transpose();
+        Self { dynamics, forcing }
     }
 
-    /// The errors of this computed solution against the true one.
-    pub fn errors(&self, truth: &Self) -> ErrorVector {
-        let mut errors = ErrorVector::zeros();
-        let turned = crate::attitude::log(&(self.attitude * truth.attitude.transpose()));
-        errors.fixed_rows_mut::<3>(ATTITUDE).copy_from(&-turned);
-        errors
-            .fixed_rows_mut::<3>(VELOCITY)
-            .copy_from(&(self.velocity - truth.velocity));
-        errors[LATITUDE] = self.latitude - truth.latitude;
-        errors[LONGITUDE] = self.longitude - truth.longitude;
-        errors[HEIGHT] = self.height - truth.height;
-        errors
+    /// The same with what each parameter drives times a weight of its own.
+    pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
+        let mut weighted = self.clone();
+        for (parameter, mut forcing) in weighted.forcing.row_iter_mut().enumerate() {
+            forcing *= weight(parameter);
+        }
+        weighted
+    }
+
+    /// What errors by parameters become through a step of so many seconds, linearised at start, middle and end.
+    pub fn follow(
+        before: &Sensitivity<PARAMETERS>,
+        duration: f64,
+        linearised: [&Self; 3],
+    ) -> Sensitivity<PARAMETERS> {
+        let rate = |linear: &Self, at: &Rows<STATES, PARAMETERS>| {
+            let mut rate = linear.forcing;
+            add_product(&mut rate, &linear.dynamics, at);
+            rate
+        };
+        step(&before.transpose(), duration, linearised, rate).transpose()
+    }
+}
+
+impl Instant {
+    /// The linear error model here, height held.
+    pub fn linear_model(&self) -> ErrorModel {
+        let held = Height::Held {
+            height: self.truth.height,
+            velocity: self.truth.velocity.z,
+        };
+        ErrorModel::about(&self.truth, &self.force, held)
     }
 }

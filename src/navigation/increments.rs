@@ -1,6 +1,12 @@
-//! Coning and sculling: from increments to the rotation and the velocity change of one sample.
+//! Coning and sculling: from increments to the rotation and the velocity change of one sample, or of many at rest.
 
-use nalgebra::Vector3;
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::instrument::Instrument;
+use crate::imu::{PerSensor, Sensor};
+use crate::recording::ImuSamples;
 
 /// Integrals of angular rate and specific force over one sample, along body axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,6 +38,11 @@ impl Increments {
         let coning = before.angle.cross(&self.angle) / 12.0;
         let sculling =
             (before.angle.cross(&self.velocity) + before.velocity.cross(&self.angle)) / 12.0;
+        self.motion_with(&coning, &sculling)
+    }
+
+    #[inline]
+    fn motion_with(&self, coning: &Vector3<f64>, sculling: &Vector3<f64>) -> Motion {
         let across = self.angle.cross(&self.velocity);
         let rotation = across * 0.5 + self.angle.cross(&across) / 6.0;
         Motion {
@@ -41,11 +52,114 @@ impl Increments {
     }
 }
 
+/// Sums over consecutive samples of a body at rest, of what the triads give as it stands in the record: with
+/// them its motion follows to second order for any calibration, without the samples.
+///
+/// At rest what is not noise or unrest is the same in every sample, so that products are taken of the
+/// deviations from the mean. A calibration `u = A N − b` acts on the sums exactly:
+/// `A x × A y = cof(A)(x × y)`, and `Σ (A x)(B y)ᵀ = A (Σ x yᵀ) Bᵀ`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sums {
+    /// Number of samples.
+    pub samples: usize,
+    /// Σ N of both triads.
+    total: PerSensor<Vector3<f64>>,
+    /// Σ (2k − n − 1)/2 Ñ_k + (Ñ_n − Ñ_0)/12 of both triads: how much later than on average it came. Sample 0
+    /// is the one before the first.
+    later: PerSensor<Vector3<f64>>,
+    /// ½ Σ_{j<k} Ñ_j × Ñ_k + Σ Ñ_{k−1} × Ñ_k / 12 of the gyros.
+    coning: Vector3<f64>,
+    /// ½ Σ_{j<k} (g_j a_kᵀ − g_k a_jᵀ) + Σ (g_{k−1} a_kᵀ − g_k a_{k−1}ᵀ)/12 with the deviations g of the gyros
+    /// and a of the accelerometers.
+    sculling: Matrix3<f64>,
+}
+
+impl Sums {
+    /// Of these samples of a record.
+    pub fn new(imu: &ImuSamples, samples: Range<usize>) -> Self {
+        let n = samples.len() as f64;
+        let first = samples.start.saturating_sub(1);
+        let all = PerSensor::from_fn(|sensor| imu.of(sensor).part(first..samples.end));
+        let total = PerSensor::from_fn(|sensor| {
+            let of_sensor = &all.get(sensor)[samples.start - first..];
+            of_sensor.iter().sum::<Vector3<f64>>()
+        });
+        let mean = PerSensor::from_fn(|sensor| total.get(sensor) / n);
+        let deviation = |k: usize| PerSensor {
+            gyro: all.gyro[k - first] - mean.gyro,
+            accel: all.accel[k - first] - mean.accel,
+        };
+        let mut sums = Self {
+            samples: samples.len(),
+            total,
+            later: PerSensor::default(),
+            coning: Vector3::zeros(),
+            sculling: Matrix3::zeros(),
+        };
+        // Of those before it half, of the one next to it a twelfth.
+        let mut past = PerSensor::<Vector3<f64>>::default();
+        let mut before = samples.start.checked_sub(1).map(deviation);
+        for (number, k) in samples.enumerate() {
+            let now = deviation(k);
+            let beside = before.unwrap_or_default();
+            let weigh = |sensor| past.get(sensor) * 0.5 + beside.get(sensor) / 12.0;
+            let PerSensor { gyro, accel } = PerSensor::from_fn(weigh);
+            sums.coning += gyro.cross(&now.gyro);
+            sums.sculling += gyro * now.accel.transpose() - now.gyro * accel.transpose();
+            let later = number as f64 - 0.5 * (n - 1.0);
+            for sensor in Sensor::ALL {
+                let (now, beside) = (now.get(sensor), beside.get(sensor));
+                *sums.later.get_mut(sensor) += now * later + (now - beside) / 12.0;
+                *past.get_mut(sensor) += now;
+            }
+            before = Some(now);
+        }
+        sums
+    }
+
+    /// Integrals of angular rate and specific force along body axes, `A Σ N − n b` with the corrections A and
+    /// biases b of the triads.
+    pub fn increments(&self, instrument: &PerSensor<Instrument>) -> Increments {
+        let PerSensor { gyro, accel } = PerSensor::from_fn(|sensor| {
+            let triad = instrument.get(sensor);
+            triad.correction * self.total.get(sensor) - triad.bias * self.samples as f64
+        });
+        Increments {
+            angle: gyro,
+            velocity: accel,
+        }
+    }
+
+    /// Rotation and velocity change where the integrals are these: second order from the sums.
+    ///
+    /// Source: as for [`Increments::motion`], whose terms of neighbouring samples are in the sums.
+    pub fn motion(&self, increments: &Increments, instrument: &PerSensor<Instrument>) -> Motion {
+        let [gyro, accel] = [&instrument.gyro, &instrument.accel].map(|triad| &triad.correction);
+        let (later_angle, later_velocity) = (gyro * self.later.gyro, accel * self.later.accel);
+        let n = self.samples as f64;
+        let (mean_angle, mean_velocity) = (increments.angle / n, increments.velocity / n);
+        let coning = cofactors(gyro) * self.coning + mean_angle.cross(&later_angle);
+        let w = gyro * self.sculling * accel.transpose();
+        let deviations = Vector3::new(
+            w[(1, 2)] - w[(2, 1)],
+            w[(2, 0)] - w[(0, 2)],
+            w[(0, 1)] - w[(1, 0)],
+        );
+        let of_means = mean_angle.cross(&later_velocity) + mean_velocity.cross(&later_angle);
+        increments.motion_with(&coning, &(deviations + of_means))
+    }
+}
+
+/// `cof(A)`, with `A x × A y = cof(A) (x × y)`.
+fn cofactors(a: &Matrix3<f64>) -> Matrix3<f64> {
+    let [x, y, z] = [0, 1, 2].map(|row| a.row(row));
+    Matrix3::from_rows(&[y.cross(&z), z.cross(&x), x.cross(&y)])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::attitude::{exp, log};
-    use nalgebra::Matrix3;
 
     /// Integrates ω(t) and f(t) in fine steps: (increments, true rotation, true velocity change).
     fn integrate(

@@ -13,36 +13,29 @@
 
 mod block;
 pub mod error_model;
+mod errors;
 mod increments;
-mod moments;
+mod instrument;
 mod navigation_error;
 mod nonlinear_error;
 mod passage;
 mod process_noise;
-mod sensitivity;
+mod runge_kutta;
 mod site_fixed;
-mod state;
 mod strapdown;
-mod stride;
-mod sums;
 mod trajectory;
-mod transition;
-mod vectors;
 
-pub use block::{Block, BlockMatrix, NAVIGATION, ParameterBlock, TermColumn};
+pub use block::{Block, ParameterBlock, State, TermColumn};
 pub use error_model::{
-    ErrorMatrix, ErrorModel, ErrorVector, InputMatrix, Sensitivity, Transition, sensed_errors,
+    ErrorMatrix, ErrorModel, ErrorVector, InputMatrix, Linearisation, SensedErrors, Sensitivity,
+    Transition,
 };
-pub use increments::{Increments, Motion};
+pub use increments::{Increments, Motion, Sums};
 pub use navigation_error::NavigationError;
 pub use nonlinear_error::{Forcing, InputError, NonlinearError};
 pub use process_noise::{NoiseInput, NoiseInputs, ProcessNoise};
-pub use sensitivity::{Linearisation, SensedErrors};
+pub use site_fixed::Navigator;
 pub(crate) use site_fixed::samples_of;
-pub use site_fixed::{Navigator, TermValues};
-pub use state::State;
 pub(crate) use strapdown::within_reach;
-pub use strapdown::{Height, LARGEST_LATITUDE, NearPole, Solution, Strapdown};
-pub use stride::{Instant, Stride};
-pub use sums::Sums;
-pub use trajectory::{Change, Segment, Start, Strides, Trajectory, TrajectoryError, Travel};
+pub use strapdown::{Height, Instant, LARGEST_LATITUDE, NearPole, Solution, Strapdown};
+pub use trajectory::{Change, Segment, Start, Stride, Strides, Trajectory, TrajectoryError};

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
-use super::error_model::{ATTITUDE, ErrorMatrix, POSITION, STATES, VELOCITY};
+use super::errors::{ATTITUDE, ErrorMatrix, ErrorVector, POSITION, VELOCITY, blocks, joined};
 use super::strapdown::Solution;
 use crate::attitude::to_pitch_roll_heading;
 use crate::earth::Curvature;
@@ -50,15 +50,8 @@ impl NavigationError {
     }
 
     /// Pitch, roll, heading; velocity; position: the order of [`Self::by_state`].
-    pub fn to_vector(&self) -> SVector<f64, STATES> {
-        let mut v = SVector::<f64, STATES>::zeros();
-        for (part, of) in [self.attitude, self.velocity, self.position]
-            .iter()
-            .enumerate()
-        {
-            v.fixed_rows_mut::<3>(3 * part).copy_from(of);
-        }
-        v
+    pub fn to_vector(&self) -> ErrorVector {
+        joined([self.attitude, self.velocity, self.position])
     }
 
     /// `H`, which turns the states of the linear error model into these errors about a true state, and
@@ -68,27 +61,18 @@ impl NavigationError {
         let [pitch, _, heading] = to_pitch_roll_heading(&truth.attitude);
         let ((sin_p, cos_p), (sin_h, cos_h)) = (pitch.sin_cos(), heading.sin_cos());
         // −φ is what a change of each angle turns the body by.
-        let axes = Matrix3::new(
-            cos_h,
-            sin_h * cos_p,
-            0.0,
-            -sin_h,
-            cos_h * cos_p,
-            0.0,
-            0.0,
-            sin_p,
-            -1.0,
-        );
-        let mut h = ErrorMatrix::zeros();
-        h.fixed_view_mut::<3, 3>(0, ATTITUDE)
-            .copy_from(&-axes.try_inverse()?);
-        h.fixed_view_mut::<3, 3>(3, VELOCITY)
-            .copy_from(&Matrix3::identity());
+        let axes = Matrix3::from_columns(&[
+            Vector3::new(cos_h, -sin_h, 0.0),
+            Vector3::new(sin_h * cos_p, cos_h * cos_p, sin_p),
+            -Vector3::z(),
+        ]);
         let [east, north] = metres_per_radian(truth);
-        h[(6, POSITION + 1)] = east;
-        h[(7, POSITION)] = north;
-        h[(8, POSITION + 2)] = 1.0;
-        Some(h)
+        let metres = Matrix3::new(0.0, east, 0.0, north, 0.0, 0.0, 0.0, 0.0, 1.0);
+        Some(blocks(&[
+            (0, ATTITUDE, -axes.try_inverse()?),
+            (3, VELOCITY, Matrix3::identity()),
+            (6, POSITION, metres),
+        ]))
     }
 }
 
@@ -106,7 +90,7 @@ fn wrapped(angle: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::attitude::from_pitch_roll_heading;
-    use crate::navigation::ErrorVector;
+    use crate::navigation::error_model::STATES;
     use crate::units::{DEGREE, NAUTICAL_MILE};
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 

@@ -12,130 +12,72 @@
 //! samples of any instrument and taking the truth away. E is kept as a quaternion, whose vector part has the
 //! digits of a small turn.
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
-use super::error_model::{ATTITUDE, ErrorVector, INPUTS, POSITION, VELOCITY};
-use super::strapdown::{NearPole, Slow, Solution, within_reach};
-use super::stride::Instant;
+use super::error_model::INPUTS;
+use super::errors::{ATTITUDE, ErrorVector, POSITION, STATES, VELOCITY, joined};
+use super::runge_kutta::step;
+use super::strapdown::{Instant, NearPole, Solution, within_reach};
 use crate::attitude::skew;
 
 /// Errors of the sensed angular rate (rad/s), then of specific force (m/s²), computed − true, along body axes.
 pub type InputError = SVector<f64, INPUTS>;
 
-/// Computed minus true navigation, its height held to the true one.
+/// Place of the scalar part of the quaternion of `E`.
+const SCALAR: usize = STATES;
+
+/// The vector part in the place of attitude, East-North-Up's velocity and position as in an [`ErrorVector`], and the
+/// scalar part.
+type Errors = SVector<f64, { STATES + 1 }>;
+
+/// Computed minus true navigation, its height held to the true one: E takes East-North-Up to where it is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NonlinearError {
-    /// Scalar and vector part of the quaternion of `E`, which takes East-North-Up to where it is computed.
-    scalar: f64,
-    vector: Vector3<f64>,
-    /// East-North-Up, m/s.
-    velocity: Vector3<f64>,
-    /// rad.
-    latitude: f64,
-    longitude: f64,
-}
+pub struct NonlinearError(Errors);
 
 impl NonlinearError {
     /// The errors at the start, in the order of [`super::ErrorModel`]; those of the vertical channel, which is
     /// held, are left out.
     pub fn new(start: &ErrorVector) -> Self {
-        let half = -start.fixed_rows::<3>(ATTITUDE) * 0.5;
-        let angle = half.norm();
-        let sinc = if angle > 0.0 {
-            angle.sin() / angle
-        } else {
-            1.0
-        };
-        let velocity = start.fixed_rows::<3>(VELOCITY);
-        Self {
-            scalar: angle.cos(),
-            vector: half * sinc,
-            velocity: Vector3::new(velocity.x, velocity.y, 0.0),
-            latitude: start[POSITION],
-            longitude: start[POSITION + 1],
-        }
+        let turn = UnitQuaternion::from_scaled_axis(-start.fixed_rows::<3>(ATTITUDE));
+        let mut errors = start.push(turn.w);
+        let mut vector = errors.fixed_rows_mut::<3>(ATTITUDE);
+        vector.copy_from(&turn.imag());
+        errors[VELOCITY + 2] = 0.0;
+        errors[POSITION + 2] = 0.0;
+        Self(errors)
     }
 
-    /// Goes on by a step of so many seconds (Runge and Kutta, fourth order), driven thus at start, middle and end.
+    /// Continues by a step of so many seconds, driven thus at start, middle and end.
     ///
     /// # Errors
     /// If the computed position comes too near to a pole.
-    pub fn advance(
-        &mut self,
-        duration: f64,
-        [start, middle, end]: [&Forcing; 3],
-    ) -> Result<(), NearPole> {
-        let h = duration;
-        let k1 = self.rate(start);
-        let k2 = self.after(&k1, 0.5 * h).rate(middle);
-        let k3 = self.after(&k2, 0.5 * h).rate(middle);
-        let k4 = self.after(&k3, h).rate(end);
-        let mut next = self.after(&k1, h / 6.0).after(&k2, h / 3.0);
-        next = next.after(&k3, h / 3.0).after(&k4, h / 6.0);
-        let norm = next.scalar.hypot(next.vector.norm());
-        next.scalar /= norm;
-        next.vector /= norm;
-        within_reach(end.truth.latitude + next.latitude)?;
-        *self = next;
+    pub fn advance(&mut self, duration: f64, driven: [&Forcing; 3]) -> Result<(), NearPole> {
+        let mut next = step(&self.0, duration, driven, Forcing::rate);
+        let norm = next[SCALAR].hypot(next.fixed_rows::<3>(ATTITUDE).norm());
+        next[SCALAR] /= norm;
+        let mut vector = next.fixed_rows_mut::<3>(ATTITUDE);
+        vector /= norm;
+        within_reach(driven[2].truth.latitude + next[POSITION])?;
+        self.0 = next;
         Ok(())
     }
 
     /// What is computed where this is true.
     pub fn computed(&self, truth: &Solution) -> Solution {
-        let cross = skew(self.vector);
-        let turn = Matrix3::identity() + (cross * self.scalar + cross * cross) * 2.0;
+        let cross = skew(self.0.fixed_rows::<3>(ATTITUDE).into_owned());
+        let turn = Matrix3::identity() + (cross * self.0[SCALAR] + cross * cross) * 2.0;
         Solution {
             attitude: turn * truth.attitude,
-            velocity: truth.velocity + self.velocity,
-            latitude: truth.latitude + self.latitude,
-            longitude: truth.longitude + self.longitude,
-            height: truth.height,
+            ..moved(truth, &self.0)
         }
     }
+}
 
-    fn rate(&self, forcing: &Forcing) -> Self {
-        let Forcing {
-            truth,
-            drift,
-            force,
-            force_error,
-            slow,
-        } = forcing;
-        let (w, v) = (self.scalar, &self.vector);
-        let computed = self.moved(truth).coasting();
-        let turning = computed.turn - slow.turn;
-        let sensed = force + force_error;
-        let turned = v.cross(&sensed);
-        let acceleration = force_error
-            + (turned * w + v.cross(&turned)) * 2.0
-            + (computed.velocity - slow.velocity);
-        Self {
-            scalar: 0.5 * v.dot(&(turning - drift)),
-            vector: ((drift - turning) * w + v.cross(&(drift + turning))) * 0.5
-                + v.cross(&slow.turn),
-            velocity: Vector3::new(acceleration.x, acceleration.y, 0.0),
-            latitude: computed.position.x - slow.position.x,
-            longitude: computed.position.y - slow.position.y,
-        }
-    }
-
-    /// Velocity and position that are computed; attitude is left as it is.
-    fn moved(&self, truth: &Solution) -> Solution {
-        Solution {
-            velocity: truth.velocity + self.velocity,
-            latitude: truth.latitude + self.latitude,
-            ..*truth
-        }
-    }
-
-    fn after(&self, rate: &Self, time: f64) -> Self {
-        Self {
-            scalar: self.scalar + rate.scalar * time,
-            vector: self.vector + rate.vector * time,
-            velocity: self.velocity + rate.velocity * time,
-            latitude: self.latitude + rate.latitude * time,
-            longitude: self.longitude + rate.longitude * time,
-        }
+/// Velocity and position that are computed; attitude is left as it is.
+fn moved(truth: &Solution, errors: &Errors) -> Solution {
+    Solution {
+        velocity: truth.velocity + errors.fixed_rows::<3>(VELOCITY),
+        ..truth.moved(&errors.fixed_rows::<3>(POSITION).into_owned())
     }
 }
 
@@ -143,7 +85,7 @@ impl NonlinearError {
 #[derive(Debug, Clone, Copy)]
 pub struct Forcing {
     truth: Solution,
-    slow: Slow,
+    slow: ErrorVector,
     /// `C δω`, rad/s.
     drift: Vector3<f64>,
     /// `C f` and `C δf`, m/s².
@@ -162,5 +104,18 @@ impl Forcing {
             force: attitude * at.force,
             force_error: attitude * sensed.fixed_rows::<3>(3),
         }
+    }
+
+    fn rate(&self, at: &Errors) -> Errors {
+        let (w, v) = (at[SCALAR], at.fixed_rows::<3>(ATTITUDE).into_owned());
+        let slow = moved(&self.truth, at).coasting() - self.slow;
+        let [turning, velocity, position] =
+            [ATTITUDE, VELOCITY, POSITION].map(|first| slow.fixed_rows::<3>(first).into_owned());
+        let vector = ((self.drift - turning) * w + v.cross(&(self.drift + turning))) * 0.5
+            + v.cross(&self.slow.fixed_rows::<3>(ATTITUDE));
+        let turned = v.cross(&(self.force + self.force_error));
+        let mut acceleration = self.force_error + (turned * w + v.cross(&turned)) * 2.0 + velocity;
+        acceleration.z = 0.0;
+        joined([vector, acceleration, position]).push(0.5 * v.dot(&(turning - self.drift)))
     }
 }

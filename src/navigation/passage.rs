@@ -1,132 +1,245 @@
-//! The error model of many samples from the integrals over a few at a time.
+//! The error model of many samples, from integrals over a few at a time.
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, RowVector3, Vector3, Vector4};
 
-use super::block::{Block, BlockMatrix, CorrectedResponse, NAVIGATION, ParameterBlock, TermColumn};
-use super::moments::Moments;
+use super::block::{Block, State, TermColumn};
+use super::errors::{
+    ATTITUDE, ErrorMatrix, POSITION, Rows, STATES, VELOCITY, add_product, carry, change,
+};
+use super::increments::Increments;
+use super::instrument::{INPUTS, Response};
 use super::process_noise::{NoiseInput, NoiseInputs};
-use super::state::State;
-use super::transition::{Errors, Transition};
-use super::vectors::Vectors;
-use crate::imu::{PerSensor, Sensor, ThermalState};
+use crate::attitude::skew;
+use crate::imu::{PerSensor, Sensed, Sensor, Term, TermVector, ThermalState};
 
-/// The error model of short stretches of samples, one after the other.
-#[derive(Debug, Clone)]
-pub(super) struct Passage {
-    earth_rate: Vector3<f64>,
+/// Integrals over a short stretch of samples.
+///
+/// The output of a triad is linear in `b = [u; 1]` (see [`crate::imu::Triad::response`]), so the integrals of
+/// `C_b_n b_k` ([`INPUTS`]) hold the derivative with respect to every parameter of any installation form.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    /// ∫C_b_n b_k dt with the gyros' input in b.
+    gyro: Rows<3, INPUTS>,
+    /// ∫[(∫f_n dt)×] C_b_n b_k dt with the gyros' input in b.
+    forced: Rows<3, INPUTS>,
+    /// ∫C_b_n b_k dt with the accelerometers' input in b.
+    accel: Rows<3, INPUTS>,
+    /// ∫f_n dt.
+    force: Vector3<f64>,
     duration: f64,
-    /// Φ of the navigation errors: attitude, velocity and position by a column of each.
-    navigation: Errors<NAVIGATION>,
+    /// ∫|ω − ω_ie|² dt and ∫|f + g|² dt of a move.
+    motion: PerSensor<f64>,
+    /// Length of a move, s.
+    moving: f64,
+}
+
+/// What one term parameter does.
+#[derive(Debug, Clone)]
+struct TermErrors {
+    parameter: usize,
+    sensor: Sensor,
+    /// ∫C_b_n ∂t/∂q dt over the part.
+    input: Vector3<f64>,
+    /// ∫[f_n×] (∫C_b_n ∂t/∂q dt) dt over the part.
+    tilt: Vector3<f64>,
+    errors: Rows<STATES, 1>,
+}
+
+/// The error model of samples, one after the other, taken together in short parts.
+#[derive(Debug, Clone)]
+pub struct Passage {
+    /// Samples since the last part ended.
+    part: Part,
+    duration: f64,
+    /// Φ of the navigation errors.
+    navigation: Rows<STATES, STATES>,
     /// What `C_b_n b_k` at the input of each triad makes of the navigation errors.
-    inputs: PerSensor<Errors<12>>,
+    inputs: PerSensor<Rows<STATES, INPUTS>>,
     /// The same of a constant pull downwards.
-    gravity: Errors<1>,
-    terms: Vec<(usize, Errors<1>)>,
+    gravity: Rows<STATES, 1>,
+    terms: Vec<TermErrors>,
     noise: NoiseInputs,
 }
 
 impl Passage {
-    /// Of no time, with these term parameters on.
-    pub fn new(earth_rate: &Vector3<f64>, terms: &[usize]) -> Self {
-        let mut navigation = Errors::<NAVIGATION>::default();
-        for axis in 0..3 {
-            navigation.attitude.0[axis][axis] = 1.0;
-            navigation.velocity.0[axis][3 + axis] = 1.0;
-            navigation.position.0[axis][6 + axis] = 1.0;
-        }
+    /// Of no time, on an Earth of this rate in `n`, with these term parameters on; as many parts are to come.
+    pub fn new(earth_rate: &Vector3<f64>, terms: &[usize], parts: usize) -> Self {
+        let of_term = |&parameter: &usize| {
+            Some(TermErrors {
+                parameter,
+                sensor: Term::of(parameter)?.sensor(),
+                input: Vector3::zeros(),
+                tilt: Vector3::zeros(),
+                errors: Rows::<STATES, 1>::zeros(),
+            })
+        };
         Self {
-            earth_rate: *earth_rate,
+            part: Part::default(),
             duration: 0.0,
-            navigation,
-            inputs: PerSensor::from_fn(|_| Errors::default()),
-            gravity: Errors::default(),
-            terms: terms.iter().map(|&k| (k, Errors::default())).collect(),
-            noise: NoiseInputs::new(*earth_rate),
+            navigation: Rows::<STATES, STATES>::identity(),
+            inputs: PerSensor::default(),
+            gravity: Rows::<STATES, 1>::zeros(),
+            terms: terms.iter().filter_map(of_term).collect(),
+            noise: NoiseInputs {
+                earth_rate: *earth_rate,
+                parts: Vec::with_capacity(parts),
+            },
         }
     }
 
-    /// Goes on over a short stretch. `bridged` is the covariance, in `n`, that interpolated samples of each
-    /// triad add to the integral of its input over it, rad² and (m/s)².
-    pub fn add(&mut self, moments: &Moments, bridged: PerSensor<Matrix3<f64>>) {
-        let t = moments.duration;
-        let over = Transition {
-            earth_turn: self.earth_rate * t,
-            force: moments.force,
-            duration: t,
-        };
-        over.carry(&mut self.navigation);
-        let PerSensor { gyro, accel } = &mut self.inputs;
-        over.carry(gyro);
-        gyro.attitude.add(-1.0, &moments.gyro);
-        let tilt = moments.tilt();
-        gyro.velocity.add(-1.0, &tilt);
-        // A tilt that grows with time moves velocity with t² and position with t³.
-        gyro.position.add(-t / 3.0, &tilt);
-        over.carry(accel);
-        accel.velocity.add(1.0, &moments.accel);
-        accel.position.add(0.5 * t, &moments.accel);
-        over.carry(&mut self.gravity);
+    /// Adds a sample: attitude at its middle, increments along body axes, velocity change by
+    /// specific force in `n`.
+    #[inline]
+    pub fn add(
+        &mut self,
+        attitude: &Matrix3<f64>,
+        increments: &Increments,
+        force: &Vector3<f64>,
+        period: f64,
+    ) {
+        let part = &mut self.part;
+        let input = increments.angle.push(period);
+        add_outer(&mut part.gyro, attitude, &input);
+        // The tilt at the middle of the sample acts on the force of the whole sample.
+        let so_far = skew(part.force + force * 0.5);
+        add_outer(&mut part.forced, &(so_far * attitude), &input);
+        let input = increments.velocity.push(period);
+        add_outer(&mut part.accel, attitude, &input);
+        part.force += force;
+        part.duration += period;
+    }
+
+    /// Adds the motion of a sample of a move: the turn over that of the Earth, rad, and the change of
+    /// velocity over that of gravity, m/s.
+    #[inline]
+    pub fn add_motion(&mut self, turned: &Vector3<f64>, change: &Vector3<f64>, period: f64) {
+        let part = &mut self.part;
+        part.motion.gyro += turned.norm_squared() / period;
+        part.motion.accel += change.norm_squared() / period;
+        part.moving += period;
+    }
+
+    /// Adds a sample's worth of error terms of these values: attitude at its middle, what the body senses in it,
+    /// velocity change by specific force in `n`.
+    pub fn add_terms(
+        &mut self,
+        attitude: &Matrix3<f64>,
+        sensed: &Sensed,
+        values: &TermVector,
+        force: &Vector3<f64>,
+        period: f64,
+    ) {
+        let responses = PerSensor::from_fn(|sensor| sensed.response(sensor, values));
+        for term in &mut self.terms {
+            let response = responses.get(term.sensor).column(term.parameter);
+            let step = attitude * response * period;
+            term.tilt += force.cross(&(term.input + step * 0.5));
+            term.input += step;
+        }
+    }
+
+    /// Takes all errors over the samples that were added since the last part. `bridged` is the covariance, in
+    /// `n`, that interpolated samples of each triad add to the integral of its input over it, rad² and (m/s)².
+    pub fn end_part(&mut self, bridged: Option<Box<PerSensor<Matrix3<f64>>>>) {
+        let part = std::mem::take(&mut self.part);
+        let (t, force) = (part.duration, part.force);
+        let over = change(&(self.noise.earth_rate * t), &force, t);
+        carry(&mut self.navigation, &over);
+        // What tilts from the gyros make of specific force, ∫[f_n×] (∫C_b_n b_k dt) dt, by parts.
+        let mut tilt = -part.forced;
+        add_product(&mut tilt, &skew(force), &part.gyro);
+        drive(&mut self.inputs.gyro, &over, t, &part.gyro, Some(&tilt));
+        drive(&mut self.inputs.accel, &over, t, &part.accel, None);
         // Stated gravity that is too small pulls the computed velocity down too little.
-        self.gravity.velocity.0[2][0] += t;
-        self.gravity.position.0[2][0] += 0.5 * t * t;
-        for ((_, errors), moment) in self.terms.iter_mut().zip(&moments.terms) {
-            over.carry(errors);
-            let (input, tilt) = (column(&moment.input), column(&moment.tilt));
-            match moment.sensor {
-                Sensor::Gyro => {
-                    errors.attitude.add(-1.0, &input);
-                    errors.velocity.add(-1.0, &tilt);
-                    errors.position.add(-t / 3.0, &tilt);
-                }
-                Sensor::Accel => {
-                    errors.velocity.add(1.0, &input);
-                    errors.position.add(0.5 * t, &input);
-                }
-            }
+        let up = RowVector3::new(0.0, 0.0, t);
+        drive(&mut self.gravity, &over, t, &up, None);
+        for term in &mut self.terms {
+            let [input, tilt] = [&mut term.input, &mut term.tilt].map(std::mem::take);
+            let tilt = (term.sensor == Sensor::Gyro).then(|| tilt.transpose());
+            drive(
+                &mut term.errors,
+                &over,
+                t,
+                &input.transpose(),
+                tilt.as_ref(),
+            );
         }
         self.duration += t;
         // Of no time there is no mean, and no noise either.
         if t > 0.0 {
-            let mut part = NoiseInput::bridging(t, moments.force / t, bridged);
-            part.motion = moments.motion;
-            part.moving = moments.moving;
-            self.noise.push(part);
+            self.noise.parts.push(NoiseInput {
+                duration: t,
+                force: force / t,
+                motion: part.motion,
+                moving: part.moving,
+                bridged,
+            });
         }
     }
 
-    /// The block of all that was added, which ends in this computed state.
+    /// The block of all parts, which ends in this computed state.
     pub fn block(
         self,
         state: State,
-        responses: PerSensor<&CorrectedResponse>,
+        responses: PerSensor<&Response>,
         thermal: Option<ThermalState>,
     ) -> Block {
-        let parameters = PerSensor::from_fn(|sensor| {
-            let errors = self.inputs.get(sensor);
-            let columns = responses.get(sensor).columns();
-            ParameterBlock::from_columns(&columns.map(|weights| errors.times(&weights)))
-        });
-        let terms = self.terms.iter().map(|(parameter, errors)| TermColumn {
-            parameter: *parameter,
-            column: errors.times(&SVector::repeat(1.0)),
-        });
+        let parameters = |sensor| self.inputs.get(sensor).tr_mul(*responses.get(sensor));
+        let of_term = |term: &TermErrors| TermColumn {
+            parameter: term.parameter,
+            column: term.errors.transpose(),
+        };
         Block {
             state,
             duration: self.duration,
-            navigation: Arc::new(BlockMatrix::from_fn(|row, column| {
-                self.navigation.component(row, column)
-            })),
-            parameters: Arc::new(parameters),
-            gravity: self.gravity.times(&SVector::repeat(1.0)),
-            terms: terms.collect(),
+            navigation: Arc::new(self.navigation.transpose()),
+            parameters: Arc::new(PerSensor::from_fn(parameters)),
+            gravity: self.gravity.transpose(),
+            terms: self.terms.iter().map(of_term).collect(),
             thermal: thermal.map(Box::new),
-            noise: self.noise.shrunk(),
+            noise: self.noise,
         }
     }
 }
 
-fn column(v: &Vector3<f64>) -> Vectors<1> {
-    Vectors([[v.x], [v.y], [v.z]])
+/// Adds the columns of a matrix, one after the other times each of four weights.
+#[inline]
+fn add_outer(sum: &mut Rows<3, INPUTS>, matrix: &Matrix3<f64>, weights: &Vector4<f64>) {
+    for row in 0..3 {
+        for column in 0..3 {
+            let mut of_column = sum.fixed_view_mut::<4, 1>(4 * column, row);
+            of_column += weights * matrix[(row, column)];
+        }
+    }
+}
+
+/// Takes errors over a part of t seconds in which a triad's input errs by this integral. An error of a gyro tilts,
+/// and its tilts make this of specific force.
+#[inline]
+fn drive<const N: usize>(
+    errors: &mut Rows<STATES, N>,
+    over: &ErrorMatrix,
+    t: f64,
+    input: &Rows<3, N>,
+    tilt: Option<&Rows<3, N>>,
+) {
+    carry(errors, over);
+    let mut add = |kind: usize, rows: &Rows<3, N>, weight: f64| {
+        let mut of_kind = errors.fixed_columns_mut::<3>(kind);
+        of_kind += rows * weight;
+    };
+    match tilt {
+        Some(tilt) => {
+            add(ATTITUDE, input, -1.0);
+            add(VELOCITY, tilt, -1.0);
+            // A tilt that grows with time moves velocity with t² and position with t³.
+            add(POSITION, tilt, -t / 3.0);
+        }
+        None => {
+            add(VELOCITY, input, 1.0);
+            add(POSITION, input, 0.5 * t);
+        }
+    }
 }

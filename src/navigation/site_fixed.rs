@@ -5,17 +5,14 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::block::{Block, CorrectedResponse};
-use super::increments::{Increments, Motion};
-use super::moments::Moments;
+use super::block::{Block, State};
+use super::increments::{Increments, Motion, Sums};
+use super::instrument::Instrument;
 use super::passage::Passage;
-use super::state::State;
-use super::sums::Sums;
 use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
 use crate::imu::{
-    PerSensor, Sensed, Sensor, TermResponse, TermVector, ThermalCoefficients, ThermalModel,
-    ThermalState, Triad,
+    PerSensor, Sensed, Sensor, TermVector, ThermalCoefficients, ThermalModel, ThermalState, Triad,
 };
 use crate::recording::{ImuSamples, Near};
 
@@ -43,29 +40,14 @@ pub struct Navigator<'a> {
     triads: PerSensor<Triad>,
     instrument: PerSensor<Instrument>,
     thermal: Option<Thermal>,
-    terms: TermValues,
+    /// Parameters of error terms that are on, whatever their values.
+    on: Vec<usize>,
+    /// Values of all parameters of error terms; zero where off.
+    terms: TermVector,
     /// Whether any of them has a value.
     shifted: bool,
     /// Where navigation stands.
     pub state: State,
-}
-
-/// Error terms of the instrument that navigation knows of.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TermValues {
-    /// Parameters that are on, whatever their values.
-    pub on: Vec<usize>,
-    /// Values of all parameters; zero where off.
-    pub values: TermVector,
-}
-
-impl Default for TermValues {
-    fn default() -> Self {
-        Self {
-            on: Vec::new(),
-            values: TermVector::zeros(),
-        }
-    }
 }
 
 /// How the triads change with temperature.
@@ -75,15 +57,6 @@ struct Thermal {
     coefficients: PerSensor<ThermalCoefficients>,
     /// Of the samples that navigation is at.
     state: ThermalState,
-}
-
-/// A triad, ready for use sample by sample.
-#[derive(Debug, Clone)]
-struct Instrument {
-    correction: Matrix3<f64>,
-    /// Corrected bias over one sample.
-    bias: Vector3<f64>,
-    response: CorrectedResponse,
 }
 
 impl<'a> Navigator<'a> {
@@ -104,7 +77,8 @@ impl<'a> Navigator<'a> {
             triads: *triads,
             instrument: instruments(triads, imu.period)?,
             thermal: None,
-            terms: TermValues::default(),
+            on: Vec::new(),
+            terms: TermVector::zeros(),
             shifted: false,
             state,
         })
@@ -153,20 +127,20 @@ impl<'a> Navigator<'a> {
         })
     }
 
-    /// The same with error terms.
-    pub fn with_terms(mut self, terms: TermValues) -> Self {
-        self.set_terms(terms.values);
-        self.terms.on = terms.on;
+    /// The same with these parameters of error terms on, and values of all of them, zero where off.
+    pub fn with_terms(mut self, on: Vec<usize>, values: TermVector) -> Self {
+        self.on = on;
+        self.set_terms(values);
         self
     }
 
-    /// Goes on with other values of the error terms.
+    /// Continues with other values of the error terms.
     pub fn set_terms(&mut self, values: TermVector) {
         self.shifted = values != TermVector::zeros();
-        self.terms.values = values;
+        self.terms = values;
     }
 
-    /// Goes on with other triads; `None` if the sensitivity of one is singular.
+    /// Continues with other triads; `None` if the sensitivity of one is singular.
     pub fn set_triads(&mut self, triads: &PerSensor<Triad>) -> Option<()> {
         self.instrument = instruments(triads, self.imu.period)?;
         self.triads = *triads;
@@ -178,35 +152,31 @@ impl<'a> Navigator<'a> {
     #[inline]
     fn increments(&self, k: usize, attitude: &Matrix3<f64>) -> (Increments, Option<Sensed>) {
         let of_triads = self.of_triads(k);
-        if self.terms.on.is_empty() {
+        if self.on.is_empty() {
             return (of_triads, None);
         }
-        let sensed = self.sensed(k, &of_triads, attitude);
-        let (increments, sensed) = self.without_terms(of_triads, sensed, self.imu.period);
+        let (period, last) = (self.imu.period, self.imu.len() - 1);
+        let mut sensed = self.sensed(&of_triads, attitude, period);
+        // Angular acceleration at the middle of the sample, from the samples before and after it.
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(last));
+        let change = self.of_triads(after).angle - self.of_triads(before).angle;
+        let apart = (after - before).max(1) as f64 * period;
+        sensed.angular_acceleration = change / (period * apart);
+        let increments = self.without_terms(of_triads, &mut sensed, period);
         (increments, Some(sensed))
     }
 
-    /// Increments over a time without what error terms add to them, and what is then sensed.
-    fn without_terms(
-        &self,
-        of_triads: Increments,
-        mut sensed: Sensed,
-        period: f64,
-    ) -> (Increments, Sensed) {
+    /// Increments over a time without what error terms add to them; what is sensed becomes that without them.
+    fn without_terms(&self, of_triads: Increments, sensed: &mut Sensed, period: f64) -> Increments {
         let mut increments = of_triads;
-        if !self.shifted {
-            return (increments, sensed);
-        }
         // Triads see u + t(u), and u is what is looked for.
-        for _ in 0..ROUNDS {
-            let added = |sensor| sensed.added(sensor, &self.terms.values) * period;
-            increments = Increments {
-                angle: of_triads.angle - added(Sensor::Gyro),
-                velocity: of_triads.velocity - added(Sensor::Accel),
-            };
+        for _ in 0..if self.shifted { ROUNDS } else { 0 } {
+            let added = |sensor| sensed.added(sensor, &self.terms) * period;
+            increments.angle = of_triads.angle - added(Sensor::Gyro);
+            increments.velocity = of_triads.velocity - added(Sensor::Accel);
             sensed.force = increments.velocity / period;
         }
-        (increments, sensed)
+        increments
     }
 
     #[inline]
@@ -219,36 +189,28 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// What the body senses in sample `k`, of these increments, at about this attitude.
-    fn sensed(&self, k: usize, increments: &Increments, attitude: &Matrix3<f64>) -> Sensed {
-        let period = self.imu.period;
+    /// What the body senses that turns evenly, from increments over a time, at about this attitude.
+    fn sensed(&self, increments: &Increments, attitude: &Matrix3<f64>, period: f64) -> Sensed {
         let rate = increments.angle / period;
-        // Angular acceleration at the middle of the sample, from those beside it.
-        let (before, after) = (k.saturating_sub(1), (k + 1).min(self.imu.len() - 1));
-        let change = self.of_triads(after).angle - self.of_triads(before).angle;
-        let apart = (after - before).max(1) as f64 * period;
         Sensed {
             rate,
             rate_over_earth: rate - attitude.tr_mul(&self.earth_rate),
-            angular_acceleration: change / (period * apart),
+            angular_acceleration: Vector3::zeros(),
             force: increments.velocity / period,
         }
-    }
-
-    fn responses(&self, sensed: &Sensed) -> PerSensor<TermResponse> {
-        PerSensor::from_fn(|sensor| sensed.response(sensor, &self.terms.values))
     }
 
     /// Navigates through these samples of the record and gives their block. Where the record has a
     /// sample before the first of them, coning and sculling take it into account.
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let few = samples_of(PART, self.imu.period);
-        let mut passage = Passage::new(&self.earth_rate, &self.terms.on);
+        let parts = samples.len().div_ceil(few);
+        let mut passage = Passage::new(&self.earth_rate, &self.on, parts);
         for begin in samples.clone().step_by(few) {
             let part = begin..(begin + few).min(samples.end);
             self.warm(&part);
-            let moments = self.move_through(part.clone());
-            passage.add(&moments, self.bridged(&part));
+            self.move_through(part.clone(), &mut passage);
+            passage.end_part(self.bridged(&part));
         }
         // Sensitivities to what changes by parts in a thousand are those in the middle.
         self.warm(&samples);
@@ -256,118 +218,77 @@ impl<'a> Navigator<'a> {
     }
 
     /// Navigates through a few samples of a move.
-    fn move_through(&mut self, samples: Range<usize>) -> Moments {
+    fn move_through(&mut self, samples: Range<usize>, passage: &mut Passage) {
         let period = self.imu.period;
-        let mut moments = Moments::with_terms(&self.terms.on);
-        let mut underway = self.before(&samples);
+        // Coning needs the sample before, angular acceleration those on both sides.
+        self.near
+            .reach(&(samples.start.saturating_sub(2)..samples.end + 1));
+        let mut state = self.state;
+        let mut last = match samples.start.checked_sub(1) {
+            Some(before) => self.increments(before, &state.attitude).0,
+            None => Increments::default(),
+        };
         for k in samples {
-            let step = self.through(k, &mut underway);
-            let middle = &step.middle;
-            moments.add(middle, &step.increments, &step.change, period);
-            let turned = step.increments.angle - middle.tr_mul(&self.earth_rate) * period;
-            let change = step.change + self.gravity * period;
-            moments.add_motion(&turned, &change, period);
-            if let Some(sensed) = &step.sensed {
-                let responses = self.responses(sensed);
-                moments.add_terms(middle, &responses, &step.change, period);
+            let begin = state.attitude;
+            let (increments, sensed) = self.increments(k, &begin);
+            let motion = increments.motion(&last);
+            last = increments;
+            let change = self.follow(&mut state, &motion, &self.earth_turn, period);
+            let middle = (begin + state.attitude) * 0.5;
+            passage.add(&middle, &increments, &change, period);
+            let turned = increments.angle - middle.tr_mul(&self.earth_rate) * period;
+            passage.add_motion(&turned, &(change + self.gravity * period), period);
+            if let Some(sensed) = &sensed {
+                passage.add_terms(&middle, sensed, &self.terms, &change, period);
             }
         }
-        self.arrive(underway.state);
-        moments
-    }
-
-    /// The same where the table stands.
-    pub fn advance_standing(&mut self, samples: Range<usize>) -> Block {
-        let mut underway = self.before(&samples);
-        for k in samples.clone() {
-            self.through(k, &mut underway);
-        }
-        self.arrive(underway.state);
-        self.standing(&self.state.attitude, samples)
+        self.arrive(state);
     }
 
     /// Navigates through samples of a body at rest, given their sums, without an error model.
     pub fn stand(&mut self, sums: &Sums) {
-        let n = sums.samples as f64;
-        let period = n * self.imu.period;
-        let correction = PerSensor::from_fn(|sensor| self.instrument.get(sensor).correction);
-        let bias = PerSensor::from_fn(|sensor| self.instrument.get(sensor).bias * n);
-        let mut increments = sums.increments(&correction, &bias);
-        if !self.terms.on.is_empty() {
-            let rate = increments.angle / period;
-            let sensed = Sensed {
-                rate,
-                rate_over_earth: rate - self.state.attitude.tr_mul(&self.earth_rate),
-                angular_acceleration: Vector3::zeros(),
-                force: increments.velocity / period,
-            };
-            (increments, _) = self.without_terms(increments, sensed, period);
-        }
-        let motion = sums.motion(&increments, &correction);
-        let earth_turn = exp(-self.earth_rate * period);
+        let period = sums.samples as f64 * self.imu.period;
+        let mut increments = sums.increments(&self.instrument);
         let mut state = self.state;
-        self.go_on(&mut state, &motion, &earth_turn, period);
+        if !self.on.is_empty() {
+            let mut sensed = self.sensed(&increments, &state.attitude, period);
+            increments = self.without_terms(increments, &mut sensed, period);
+        }
+        let motion = sums.motion(&increments, &self.instrument);
+        let earth_turn = exp(-self.earth_rate * period);
+        self.follow(&mut state, &motion, &earth_turn, period);
         self.arrive(state);
     }
 
     /// The block of these samples where the table stands in this attitude; its state is where navigation
-    /// is now. What the instrument senses there is known, so the error model takes it from the attitude:
-    /// taken from the samples, their noise would be in both the innovations and the sensitivity to scale
-    /// factors, and the two together look like information.
+    /// is now. What the instrument senses there is known, so the error model takes it from the attitude, as of
+    /// one long sample: taken from the samples, their noise would be in both the innovations and the sensitivity
+    /// to scale factors, and the two together look like information.
     pub fn standing(&self, attitude: &Matrix3<f64>, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
-        let force = -self.gravity;
-        let mut moments = Moments::standing(attitude, &self.earth_rate, &force, duration);
-        if !self.terms.on.is_empty() {
-            let sensed = Sensed {
-                rate: attitude.tr_mul(&self.earth_rate),
-                rate_over_earth: Vector3::zeros(),
-                angular_acceleration: Vector3::zeros(),
-                force: attitude.tr_mul(&force),
-            };
-            let responses = self.responses(&sensed);
-            moments.stand_terms(&self.terms.on, attitude, &responses);
+        let change = -self.gravity * duration;
+        let increments = Increments {
+            angle: attitude.tr_mul(&self.earth_rate) * duration,
+            velocity: attitude.tr_mul(&change),
+        };
+        let mut passage = Passage::new(&self.earth_rate, &self.on, 1);
+        passage.add(attitude, &increments, &change, duration);
+        if !self.on.is_empty() {
+            let sensed = self.sensed(&increments, attitude, duration);
+            passage.add_terms(attitude, &sensed, &self.terms, &change, duration);
         }
-        let mut passage = Passage::new(&self.earth_rate, &self.terms.on);
-        passage.add(&moments, self.bridged(&samples));
+        passage.end_part(self.bridged(&samples));
         self.block(passage)
     }
 
     /// The same of samples of which some are interpolated, given the block of as many where the table stands
     /// in the same attitude.
     pub fn standing_like(&self, block: &Block, samples: &Range<usize>) -> Block {
-        block.bridging(self.bridged(samples))
-    }
-
-    /// Before these samples.
-    fn before(&mut self, samples: &Range<usize>) -> Underway {
-        // Coning asks for the sample before, angular acceleration for those beside.
-        self.near
-            .reach(&(samples.start.saturating_sub(2)..samples.end + 1));
-        let last = samples.start.checked_sub(1);
-        Underway {
-            state: self.state,
-            last: last.map_or_else(Increments::default, |k| {
-                self.increments(k, &self.state.attitude).0
-            }),
+        let mut like = block.clone();
+        for part in &mut like.noise.parts {
+            part.bridged = self.bridged(samples);
         }
-    }
-
-    /// Navigates through a sample.
-    #[inline(always)]
-    fn through(&self, k: usize, underway: &mut Underway) -> Step {
-        let Underway { state, last } = underway;
-        let (increments, sensed) = self.increments(k, &state.attitude);
-        let motion = increments.motion(last);
-        *last = increments;
-        let attitude = state.attitude;
-        let change = self.go_on(state, &motion, &self.earth_turn, self.imu.period);
-        Step {
-            middle: (attitude + state.attitude) * 0.5,
-            increments,
-            change,
-            sensed,
-        }
+        like
     }
 
     /// Is where the samples led to.
@@ -376,10 +297,10 @@ impl<'a> Navigator<'a> {
         self.state = state;
     }
 
-    /// The state goes on by this motion over a time in which the Earth turns so; the velocity change by
-    /// specific force.
+    /// Takes a state through this motion over a time in which the Earth turns so, and gives the velocity change
+    /// by specific force.
     #[inline(always)]
-    fn go_on(
+    fn follow(
         &self,
         state: &mut State,
         motion: &Motion,
@@ -404,10 +325,11 @@ impl<'a> Navigator<'a> {
         passage.block(self.state, responses, thermal)
     }
 
-    /// Covariance in `n` that interpolation adds to the integrals of both triads' input.
-    fn bridged(&self, samples: &Range<usize>) -> PerSensor<Matrix3<f64>> {
-        let mut covariance = PerSensor::<Matrix3<f64>>::default();
+    /// Covariance in `n` that interpolation adds to the integrals of both triads' input, if any does.
+    fn bridged(&self, samples: &Range<usize>) -> Option<Box<PerSensor<Matrix3<f64>>>> {
+        let mut covariance = None;
         for (bridge, part) in self.imu.bridged(samples) {
+            let covariance = covariance.get_or_insert_with(Box::<PerSensor<Matrix3<f64>>>::default);
             for (sensor, axis, variance) in bridge.each() {
                 let correction = &self.instrument.get(sensor).correction;
                 let error = self.state.attitude * correction.column(axis);
@@ -418,42 +340,11 @@ impl<'a> Navigator<'a> {
     }
 }
 
-/// Navigation within samples that follow one another.
-struct Underway {
-    state: State,
-    /// Of the sample before.
-    last: Increments,
-}
-
-/// One sample of navigation.
-struct Step {
-    /// Attitude at its middle.
-    middle: Matrix3<f64>,
-    increments: Increments,
-    /// Velocity change by specific force.
-    change: Vector3<f64>,
-    /// What the body senses, where error terms are on.
-    sensed: Option<Sensed>,
-}
-
-impl Instrument {
-    fn new(triad: &Triad, correction: Matrix3<f64>, period: f64) -> Self {
-        Self {
-            correction,
-            bias: correction * triad.bias * period,
-            response: CorrectedResponse::new(triad, &correction),
-        }
-    }
-}
-
 fn instruments(triads: &PerSensor<Triad>, period: f64) -> Option<PerSensor<Instrument>> {
-    let one = |triad: &Triad| {
-        let correction = triad.correction()?;
-        Some(Instrument::new(triad, correction, period))
-    };
+    let of = |triad: &Triad| Some(Instrument::new(triad, triad.correction()?, period));
     Some(PerSensor {
-        gyro: one(&triads.gyro)?,
-        accel: one(&triads.accel)?,
+        gyro: of(&triads.gyro)?,
+        accel: of(&triads.accel)?,
     })
 }
 

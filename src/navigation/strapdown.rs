@@ -7,11 +7,13 @@
 //! `Ċ = C [ω_ib×] − [ω_in×] C`, `V̇ = C f − (2ω_ie + ω_en) × V + g`,
 //! `L̇ = V_N / (R_M + h)`, `λ̇ = V_E / ((R_N + h) cos L)`, `ḣ = V_U`.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use thiserror::Error;
 
+use super::errors::{ATTITUDE, ErrorVector, POSITION, VELOCITY, joined};
 use super::increments::Increments;
-use crate::attitude::{exp, orthonormalised};
+use super::runge_kutta::step;
+use crate::attitude::{exp, log, orthonormalised};
 use crate::earth::{Curvature, earth_rate_n, normal_gravity};
 use crate::units::DEGREE;
 
@@ -38,12 +40,9 @@ impl Solution {
     /// Transport rate `ω_en` in East-North-Up, rad/s.
     #[inline]
     pub fn transport_rate(&self) -> Vector3<f64> {
-        let Curvature {
-            meridian,
-            prime_vertical,
-        } = Curvature::at(self.latitude);
-        let east = self.velocity.x / (prime_vertical + self.height);
-        let north = self.velocity.y / (meridian + self.height);
+        let radii = Curvature::at(self.latitude);
+        let east = self.velocity.x / (radii.prime_vertical + self.height);
+        let north = self.velocity.y / (radii.meridian + self.height);
         let (sin, cos) = self.latitude.sin_cos();
         Vector3::new(-north, east, east * (sin / cos))
     }
@@ -53,9 +52,13 @@ impl Solution {
     #[inline]
     pub fn acceleration(&self, force: &Vector3<f64>) -> Vector3<f64> {
         let turning = earth_rate_n(self.latitude) * 2.0 + self.transport_rate();
-        let mut acceleration = force - turning.cross(&self.velocity);
-        acceleration.z -= normal_gravity(self.latitude, self.height);
-        acceleration
+        let gravity = Vector3::z() * normal_gravity(self.latitude, self.height);
+        force - turning.cross(&self.velocity) - gravity
+    }
+
+    /// Latitude and longitude, rad.
+    pub(super) fn place(&self) -> Vector2<f64> {
+        Vector2::new(self.latitude, self.longitude)
     }
 
     /// Rates of latitude and longitude, rad/s, and of height, m/s.
@@ -79,15 +82,35 @@ impl Solution {
         }
     }
 
-    /// Angular rate `ω_ib` (rad/s) and specific force (m/s²) along body axes of a body that keeps its
-    /// attitude and its velocity in East-North-Up; at zero velocity, of one that stands.
-    pub fn steady(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let turning = earth_rate_n(self.latitude) + self.transport_rate();
-        let needed = -self.acceleration(&Vector3::zeros());
-        (
-            self.attitude.tr_mul(&turning),
-            self.attitude.tr_mul(&needed),
-        )
+    /// Of a body that keeps its attitude and its velocity in East-North-Up; at zero velocity, of one that stands.
+    pub fn steady(&self) -> Instant {
+        Instant::of(*self, &Vector3::zeros(), &Vector3::zeros())
+    }
+}
+
+/// A true state and what an ideal instrument senses in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    /// The true state.
+    pub truth: Solution,
+    /// Angular rate `ω_ib` along body axes, rad/s.
+    pub rate: Vector3<f64>,
+    /// Specific force along body axes, m/s².
+    pub force: Vector3<f64>,
+}
+
+impl Instant {
+    /// Of a body that turns relative to East-North-Up (rad/s) while its velocity's components change (m/s²), both in
+    /// these axes.
+    pub fn of(truth: Solution, turning: &Vector3<f64>, acceleration: &Vector3<f64>) -> Self {
+        let rate = earth_rate_n(truth.latitude) + truth.transport_rate() + turning;
+        // What an unsupported body would do is not sensed.
+        let force = acceleration - truth.acceleration(&Vector3::zeros());
+        Self {
+            truth,
+            rate: truth.attitude.tr_mul(&rate),
+            force: truth.attitude.tr_mul(&force),
+        }
     }
 }
 
@@ -131,16 +154,6 @@ pub struct Strapdown {
     solution: Solution,
 }
 
-/// Derivatives, or changes, of what moves slowly.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Slow {
-    /// Rotation vector of East-North-Up since the step began, rad.
-    pub turn: Vector3<f64>,
-    pub velocity: Vector3<f64>,
-    /// Latitude and longitude in rad, height in m.
-    pub position: Vector3<f64>,
-}
-
 impl Strapdown {
     /// Starts somewhere; every step is `period` seconds long.
     ///
@@ -165,104 +178,86 @@ impl Strapdown {
     /// # Errors
     /// If the step leads too near to a pole; navigation then stays where it was.
     pub fn advance(&mut self, increments: &Increments, height: Height) -> Result<(), NearPole> {
-        let period = self.period;
-        let start = &self.solution;
+        let (period, start) = (self.period, self.solution);
         let before = self.before.unwrap_or(*increments);
         let motion = increments.motion(&before);
 
-        // Specific force in East-North-Up as it stood when the step began: mean and change.
-        let mean = start.attitude * motion.velocity / period;
-        let change = start.attitude
-            * (increments.angle.cross(&increments.velocity) + increments.velocity
-                - before.velocity)
-            / period;
-        let at = |part: f64, change_so_far: Option<(&Slow, f64)>| {
-            let (state, turn) = start.after(change_so_far, part, period, height);
-            let force = mean + change * (part - 0.5);
-            state.slow(&turn, &force)
+        // Specific force along the body axes of the start: mean and change.
+        let mean = motion.velocity / period;
+        let turning = increments.angle.cross(&increments.velocity);
+        let change = (turning + increments.velocity - before.velocity) / period;
+        // What changes slowly since then: the turn of East-North-Up, velocity and position.
+        let after = |part: f64, slow: &ErrorVector| {
+            height.hold(start.with_errors(slow), &start, part, period)
         };
-        let k1 = at(0.0, None);
-        let k2 = at(0.5, Some((&k1, 0.5 * period)));
-        let k3 = at(0.5, Some((&k2, 0.5 * period)));
-        let k4 = at(1.0, Some((&k3, period)));
-        let mean = Slow::mean(&[k1, k2, k3, k4]);
-
-        let (mut end, turn) = start.after(Some((&mean, period)), 1.0, period, height);
+        let rate = |&part: &f64, slow: &ErrorVector| {
+            let force = mean + change * (part - 0.5);
+            let turn = slow.fixed_rows::<3>(ATTITUDE).into_owned();
+            after(part, slow).slow(&turn, &force)
+        };
+        let slow = step(&ErrorVector::zeros(), period, [&0.0, &0.5, &1.0], rate);
+        let mut end = after(1.0, &slow);
         within_reach(end.latitude)?;
-        end.attitude = orthonormalised(&(exp(-turn) * start.attitude * exp(motion.rotation)));
+        end.attitude = orthonormalised(&(end.attitude * exp(motion.rotation)));
         self.solution = end;
         self.before = Some(*increments);
         Ok(())
     }
 }
 
-impl Slow {
-    /// Of the four stages of a step, with the weights of Runge and Kutta.
+impl Height {
+    /// A state after part of a step from this start; height and vertical velocity those of the reference.
     #[inline]
-    fn mean([k1, k2, k3, k4]: &[Self; 4]) -> Self {
-        let of = |part: fn(&Self) -> Vector3<f64>| {
-            (part(k1) + (part(k2) + part(k3)) * 2.0 + part(k4)) / 6.0
+    fn hold(self, state: Solution, start: &Solution, part: f64, period: f64) -> Solution {
+        let Self::Held { height, velocity } = self else {
+            return state;
         };
-        Self {
-            turn: of(|k| k.turn),
-            velocity: of(|k| k.velocity),
-            position: of(|k| k.position),
-        }
+        let mut held = state;
+        let bulge = (start.velocity.z - velocity) * period * 0.5 * part * (1.0 - part);
+        held.velocity.z = start.velocity.z + (velocity - start.velocity.z) * part;
+        held.height = start.height + (height - start.height) * part + bulge;
+        held
     }
 }
 
 impl Solution {
-    /// Velocity and position after changing at a rate for a time, and the turn of East-North-Up till
-    /// then; `part` of the step has gone by. Attitude is left as it was.
+    /// The computed solution that has these errors against this true one.
     #[inline]
-    fn after(
-        &self,
-        changing: Option<(&Slow, f64)>,
-        part: f64,
-        period: f64,
-        height: Height,
-    ) -> (Self, Vector3<f64>) {
-        let mut state = *self;
-        let mut turn = Vector3::zeros();
-        if let Some((rate, time)) = changing {
-            turn = rate.turn * time;
-            state.velocity += rate.velocity * time;
-            state.latitude += rate.position.x * time;
-            state.longitude += rate.position.y * time;
-            state.height += rate.position.z * time;
+    pub fn with_errors(&self, errors: &ErrorVector) -> Self {
+        let position = errors.fixed_rows::<3>(POSITION).into_owned();
+        Self {
+            attitude: exp(-errors.fixed_rows::<3>(ATTITUDE)) * self.attitude,
+            velocity: self.velocity + errors.fixed_rows::<3>(VELOCITY),
+            ..self.moved(&position)
         }
-        if let Height::Held { height, velocity } = height {
-            let bulge = (self.velocity.z - velocity) * period * 0.5 * part * (1.0 - part);
-            state.velocity.z = self.velocity.z + (velocity - self.velocity.z) * part;
-            state.height = self.height + (height - self.height) * part + bulge;
-        }
-        (state, turn)
     }
 
-    /// What changes slowly, at this velocity and position, under no specific force.
+    /// The errors of this computed solution against the true one.
+    pub fn errors(&self, truth: &Self) -> ErrorVector {
+        let position = |s: &Self| s.place().push(s.height);
+        joined([
+            -log(&(self.attitude * truth.attitude.transpose())),
+            self.velocity - truth.velocity,
+            position(self) - position(truth),
+        ])
+    }
+
+    /// Rates of what changes slowly at this velocity and position under no specific force: turn of East-North-Up,
+    /// velocity, position.
     #[inline]
-    pub(super) fn coasting(&self) -> Slow {
+    pub(super) fn coasting(&self) -> ErrorVector {
         self.slow(&Vector3::zeros(), &Vector3::zeros())
     }
 
-    /// What changes slowly, at this velocity and position, when East-North-Up has turned since the
-    /// step began and the specific force is given in its axes of then.
+    /// The same when East-North-Up has turned so since the step began, under a specific force along body axes.
     #[inline]
-    fn slow(&self, turn: &Vector3<f64>, force: &Vector3<f64>) -> Slow {
-        let transport = self.transport_rate();
-        let rate = earth_rate_n(self.latitude) + transport;
+    fn slow(&self, turn: &Vector3<f64>, force: &Vector3<f64>) -> ErrorVector {
+        let rate = earth_rate_n(self.latitude) + self.transport_rate();
         // Bortz's equation to the order that the turn within a step needs.
         let across = turn.cross(&rate);
-        let force = exp(-turn) * force;
-        Slow {
-            turn: rate + across * 0.5 + turn.cross(&across) / 12.0,
-            velocity: self.acceleration(&force),
-            position: Vector3::new(
-                -transport.x,
-                transport.y / self.latitude.cos(),
-                self.velocity.z,
-            ),
-        }
+        let turning = rate + across * 0.5 + turn.cross(&across) / 12.0;
+        let acceleration = self.acceleration(&(self.attitude * force));
+        joined([turning, acceleration, self.position_rate()])
     }
 }
 

@@ -6,16 +6,12 @@
 
 mod leg;
 mod strides;
-mod travel;
 
-use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::navigation::Solution;
 use leg::Leg;
-pub use strides::Strides;
-pub use travel::Travel;
+pub use strides::{Stride, Strides};
 
 /// The least horizontal speed over the climb rate: beyond, pitch would be steeper than a body flies.
 const LEAST_GLIDE: f64 = 2.0;
@@ -97,19 +93,6 @@ pub enum TrajectoryError {
     },
 }
 
-impl Start {
-    /// Where it is, attitude and velocity still to be set.
-    fn place(&self) -> Solution {
-        Solution {
-            attitude: Matrix3::identity(),
-            velocity: Vector3::zeros(),
-            latitude: self.latitude,
-            longitude: self.longitude,
-            height: self.height,
-        }
-    }
-}
-
 impl Trajectory {
     /// A trajectory whose segments fit each other.
     ///
@@ -165,16 +148,6 @@ impl Trajectory {
         }
         self
     }
-
-    /// Goes through it in steps of `period` seconds.
-    pub fn travel(&self, period: f64) -> Travel<'_> {
-        Travel::new(self, period)
-    }
-
-    /// Goes through it in steps as long as its motion allows.
-    pub fn strides(&self) -> Strides<'_> {
-        Strides::new(self)
-    }
 }
 
 #[cfg(test)]
@@ -182,6 +155,7 @@ mod tests {
     use super::*;
     use crate::attitude::to_pitch_roll_heading;
     use crate::models::{self, Place};
+    use crate::navigation::Instant;
     use crate::units::{DEGREE, STANDARD_GRAVITY};
 
     fn embedded(name: &str) -> Trajectory {
@@ -193,11 +167,9 @@ mod tests {
         for (name, round, metres) in [("flight", 5142.0, 2000.0), ("vehicle", 775.0, 200.0)] {
             let trajectory = embedded(name);
             let start = trajectory.start;
-            let mut travel = trajectory.travel(1.0);
-            for _ in 0..round as usize {
-                travel.advance();
-            }
-            let end = travel.truth();
+            let mut strides = trajectory.strides();
+            strides.pass(round);
+            let end = strides.here().truth;
             let apart = 6.4e6 * (end.latitude - start.latitude).hypot(end.longitude * 0.7);
             assert!(apart < metres, "{name}: {apart}");
             assert!((end.height - start.height).abs() < 1.0, "{name}");
@@ -209,16 +181,14 @@ mod tests {
     #[test]
     fn a_body_that_banks_feels_no_force_to_its_side_in_a_level_turn() {
         let trajectory = embedded("flight");
-        let mut travel = trajectory.travel(1.0);
+        let mut strides = trajectory.strides();
         // In the middle of the first full circle.
-        for _ in 0..2080 {
-            travel.advance();
-        }
-        let (rate, force) = travel.sensed();
-        let [pitch, roll, _] = to_pitch_roll_heading(&travel.truth().attitude);
+        strides.pass(2080.0);
+        let Instant { truth, rate, force } = strides.here();
+        let [pitch, roll, _] = to_pitch_roll_heading(&truth.attitude);
         let expected = (230.0 * 1.0 * DEGREE / STANDARD_GRAVITY).atan();
         assert!(pitch == 0.0 && (roll - expected).abs() < 1e-9, "{roll}");
-        // But for Coriolis and the Earth's roundness.
+        // Except for Coriolis and the Earth's roundness.
         assert!(force.x.abs() < 0.1 && force.z > 10.0, "{force}");
         assert!((rate.norm() - 1.0 * DEGREE).abs() < 2e-4, "{rate}");
     }

@@ -22,7 +22,7 @@ use super::ratio::{bootstrap, median, quantile};
 use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::ModelError;
-use crate::navigation::{Sensitivity, Trajectory, sensed_errors};
+use crate::navigation::{Instant, SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
@@ -256,13 +256,13 @@ impl ExperimentStudy {
     fn way(&self, situation: Situation) -> Result<Way, ExperimentError> {
         let mission = self.mission(situation);
         let instrument = ideal();
-        let mut start = Sensitivity::new();
+        let mut start = Sensitivity::zeros();
         let mut aligned = None;
         if let (Situation::SelfAligned, Motion::Standing(at)) = (situation, &mission.motion) {
-            let (rate, force) = at.steady();
+            let Instant { rate, force, .. } = at.steady();
             let by_sensed = alignment::by_itself(at);
-            if let Some(sensed) = sensed_errors(&instrument, &rate, &force) {
-                start.0 = by_sensed * sensed;
+            if let Ok(sensed) = SensedErrors::new(&instrument) {
+                start = by_sensed * sensed.at(&rate, &force);
             }
             aligned = Some(by_sensed);
         }

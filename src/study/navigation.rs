@@ -274,7 +274,7 @@ impl Mission {
         &self,
         truth: &PerSensor<Triad>,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
-        self.exposure_from(Sensitivity::new(), truth)
+        self.exposure_from(Sensitivity::zeros(), truth)
     }
 
     /// The same where the errors at the start depend on the parameters, too.
@@ -292,7 +292,7 @@ impl Mission {
         let mut start = linear(course.here());
         // At rest one exact step does for all intervals.
         let at_rest = match &self.motion {
-            Motion::Standing(truth) => Some(Instant::steady(truth)),
+            Motion::Standing(truth) => Some(truth.steady()),
             Motion::Moving(_) => None,
         };
         let at_rest = at_rest.map(|at| (at, at.linear_model().over(self.interval)));
@@ -301,11 +301,13 @@ impl Mission {
         for interval in 1..=self.intervals {
             let time = f64::from(interval) * self.interval;
             if let Some((at, transition)) = &at_rest {
-                sensitivity.advance(transition, &sensed.at(&at.rate, &at.force));
+                let sensed = sensed.at(&at.rate, &at.force);
+                sensitivity = transition.errors * sensitivity + transition.input * sensed;
             } else {
                 course.go(time, 0.0, |stride| {
                     let [middle, end] = [&stride.middle, &stride.end].map(linear);
-                    sensitivity.follow(stride.duration, [&start, &middle, &end]);
+                    let linearised = [&start, &middle, &end];
+                    sensitivity = Linearisation::follow(&sensitivity, stride.duration, linearised);
                     start = end;
                     Ok::<_, NavigationStudyError>(())
                 })?;
@@ -350,7 +352,7 @@ fn exposure(
     let by_state = NavigationError::by_state(truth).ok_or(NavigationStudyError::Upright)?;
     Ok(Exposure {
         time,
-        by_parameter: by_state * sensitivity.0,
+        by_parameter: by_state * sensitivity,
     })
 }
 

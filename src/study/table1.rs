@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::models::{InstallationModel, Instrument, ModelError, Place};
-use crate::navigation::LARGEST_LATITUDE;
+use crate::navigation::{Instant, LARGEST_LATITUDE};
 use crate::units::DEGREE;
 use paper::Published;
 use response::{Response, standing};
@@ -244,7 +244,7 @@ impl Table1Study {
         let (sensor, form) = (published.sensor, published.form);
         let hours = reading.hours.unwrap_or(self.hours);
         let response = self.response(hours)?;
-        let (rate, force) = standing(self.latitude).steady();
+        let Instant { rate, force, .. } = standing(self.latitude).steady();
         let (input, size) = match sensor {
             Sensor::Gyro => (rate, ROTATION_RATE),
             Sensor::Accel => (force, force.norm()),

@@ -11,7 +11,7 @@ use serde_json::Value;
 use turncal::attitude::from_pitch_roll_heading;
 use turncal::earth::Curvature;
 use turncal::navigation::error_model::INPUTS;
-use turncal::navigation::{Height, Increments, NavigationError, Solution, Strapdown};
+use turncal::navigation::{Height, Increments, Instant, NavigationError, Solution, Strapdown};
 use turncal::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
 use crate::shared::shared;
@@ -56,7 +56,7 @@ fn hourly(
     step: f64,
     hours: usize,
 ) -> Vec<NavigationError> {
-    let (rate, force) = truth.steady();
+    let Instant { rate, force, .. } = truth.steady();
     let increments = Increments {
         angle: (rate + error.gyro) * step,
         velocity: (force + error.accel) * step,
@@ -160,7 +160,7 @@ fn a_steady_flight_along_a_parallel_closes_the_circle() {
             height: 10_000.0,
             ..standing(latitude * DEGREE)
         };
-        let (rate, force) = start.steady();
+        let Instant { rate, force, .. } = start.steady();
         let step = 10.0;
         let increments = Increments {
             angle: rate * step,
@@ -251,7 +251,7 @@ fn a_free_height_runs_away_as_the_hyperbolic_cosine_of_five_hundred_and_seventy_
         height: 1.0,
         ..truth
     };
-    let (rate, force) = truth.steady();
+    let Instant { rate, force, .. } = truth.steady();
     let increments = Increments {
         angle: rate,
         velocity: force,

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{Matrix3, Vector3};
 use turncal::imu::{InstallationForm, Sensor};
-use turncal::navigation::{Height, Increments, NavigationError, Solution, Strapdown};
+use turncal::navigation::{Height, Increments, Instant, NavigationError, Solution, Strapdown};
 use turncal::study::Table1Study;
 use turncal::study::table1::{Column, Installation, Quantity, Row, Table1, Verdict, paper};
 use turncal::units::DEGREE;
@@ -155,7 +155,7 @@ fn nonlinear(sensor: Sensor, sensed: &Vector3<f64>, times: &[f64]) -> Vec<[f64; 
         longitude: 0.0,
         height: 0.0,
     };
-    let (rate, force) = truth.steady();
+    let Instant { rate, force, .. } = truth.steady();
     let (gyro, accel) = match sensor {
         Gyro => (*sensed, Vector3::zeros()),
         Accel => (Vector3::zeros(), *sensed),

@@ -12,7 +12,7 @@ use crate::calibration::pass::{Gate, Mode, pass};
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::start::closed_form::{ClosedForm, Reference, six_position_by};
 use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
-use crate::navigation::{Navigator, State, TermValues};
+use crate::navigation::{Navigator, State};
 use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
 
@@ -250,12 +250,10 @@ fn navigate(
     let (imu, state) = (&run.recording.imu, State::at_rest(from));
     let navigator = Navigator::new(imu, &run.site, triads, state);
     let on = (0..at.terms.len()).filter(|&k| at.terms[k] != 0.0);
-    let terms = TermValues {
-        on: on.collect(),
-        values: at.terms,
-    };
     let navigator = navigator.ok_or_else(|| singular(triads))?;
-    let block = navigator.with_terms(terms).advance(samples);
+    let block = navigator
+        .with_terms(on.collect(), at.terms)
+        .advance(samples);
     Ok(block.state.attitude)
 }
 

@@ -380,7 +380,7 @@ pub struct Feedback {
     pub terms: TermVector,
 }
 
-const _: () = assert!(NAVIGATION == crate::navigation::NAVIGATION);
+const _: () = assert!(NAVIGATION == crate::navigation::error_model::STATES);
 
 #[cfg(test)]
 mod tests;

@@ -74,7 +74,7 @@ impl<'a> Script<'a> {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
             if let Event::Move(block, _) = event {
-                for part in block.noise.parts() {
+                for part in &block.noise.parts {
                     moves.duration += part.moving;
                     for sensor in Sensor::ALL {
                         *moves.motion.get_mut(sensor) += part.motion.get(sensor);

@@ -12,7 +12,7 @@ use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::model::Model;
 use crate::calibration::problem::{Problem, Stretch};
-use crate::navigation::{Block, Navigator, State, TermValues};
+use crate::navigation::{Block, Navigator, State};
 
 /// A move, or a piece of one, or a part of a dwell.
 pub enum Event {
@@ -207,15 +207,11 @@ fn navigator<'a>(
     let run = stretch.run;
     let tried = layout.tried_terms();
     let on = layout.terms().chain(tried).map(|(_, index)| index);
-    let terms = TermValues {
-        on: on.collect(),
-        values: at.terms,
-    };
     let start = State::at_rest(*initial);
     let triads = at.in_recording(stretch.recording);
     let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, start);
     let navigator = navigator.ok_or_else(|| singular(&triads))?;
-    let navigator = navigator.with_terms(terms);
+    let navigator = navigator.with_terms(on.collect(), at.terms);
     Ok(match &model.thermal {
         Some(thermal) => navigator.with_thermal(thermal.clone(), at.thermal),
         None => navigator,

@@ -133,10 +133,7 @@ fn transition_of_error_terms_is_the_derivative_of_navigation() {
     let with = |values: TermVector| {
         Navigator::new(&record(), &site(), &triads(), start())
             .unwrap()
-            .with_terms(TermValues {
-                on: (0..TERM_PARAMETERS).collect(),
-                values: some + values,
-            })
+            .with_terms((0..TERM_PARAMETERS).collect(), some + values)
             .advance(0..SAMPLES)
     };
     let nominal = with(TermVector::zeros());
@@ -191,7 +188,7 @@ fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
     let at_rest = State::at_rest(attitude);
     let navigator = Navigator::new(&record, &site, &ideal, at_rest).unwrap();
     let moving = navigator.clone().advance(0..SAMPLES);
-    let standing = navigator.clone().advance_standing(0..SAMPLES);
+    let standing = navigator.standing(&attitude, 0..SAMPLES);
     assert_relative_eq!(*moving.navigation, *standing.navigation, epsilon = 1e-6);
     for sensor in crate::imu::Sensor::ALL {
         let of = |block: &Block| *block.parameters.get(sensor);
@@ -201,7 +198,7 @@ fn the_error_model_of_a_standing_body_is_that_of_its_noise_free_samples() {
 
 #[test]
 fn noise_of_a_long_block_equals_that_of_its_parts() {
-    // At rest the mean force is exact, so but for the Earth's turn noise must compose: Q(0,2) = Φ Q(0,1) Φᵀ + Q(1,2).
+    // At rest the mean force is exact, so except for the Earth's turn noise must compose: Q(0,2) = Φ Q(0,1) Φᵀ + Q(1,2).
     let site = site();
     let record = ImuSamples {
         gyro: vec![Vector3::zeros(); SAMPLES].into(),
@@ -249,7 +246,7 @@ fn an_interpolated_axis_adds_its_error_along_that_axis() {
     let at_rest = State::at_rest(attitude);
     let of = |samples| {
         let navigator = Navigator::new(&record, &site, &ideal, at_rest);
-        let block = navigator.unwrap().advance_standing(samples);
+        let block = navigator.unwrap().standing(&attitude, samples);
         block.noise.covariance(&PerSensor::default())
     };
     let along = |axis: usize, variance: f64| {

@@ -1,45 +1,89 @@
 //! A journey in steps as long as what is smooth allows.
 
-use nalgebra::Vector3;
+use std::convert::Infallible;
+
+use nalgebra::Vector2;
 
 use super::Trajectory;
-use super::leg::{Kinematics, Legs};
-use crate::navigation::{Instant, Stride};
+use super::leg::Leg;
+use crate::navigation::Instant;
 
-/// At least so many steps between two breaks where motion is not steady.
+/// The longest step, s: an eightieth of a radian of the Schuler oscillation, of which Runge and Kutta then keep
+/// the phase over 40 h to 1e-7 rad.
+const LONGEST: f64 = 10.0;
+/// The largest turn in a step, rad: Simpson's rule then integrates along a turn to 4e-8.
+const LARGEST_TURN: f64 = 0.1;
+
+/// The least number of steps between two breaks where motion is not steady.
 const LEAST: u32 = 8;
+
+/// A step in which everything is smooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stride {
+    /// Its length, s.
+    pub duration: f64,
+    /// In its middle.
+    pub middle: Instant,
+    /// At its end.
+    pub end: Instant,
+}
+
+impl Stride {
+    /// Number of steps for a time in s in which something turns at a rate in rad/s.
+    pub fn count(duration: f64, rate: f64) -> u32 {
+        (duration * (rate / LARGEST_TURN).max(1.0 / LONGEST))
+            .ceil()
+            .max(1.0) as u32
+    }
+}
 
 /// A journey along a trajectory in steps that end at its breaks and follow what happens between them.
 #[derive(Debug, Clone)]
 pub struct Strides<'a> {
-    banks: bool,
-    legs: Legs<'a>,
+    trajectory: &'a Trajectory,
+    leg: Leg,
+    /// Number of the segment after the leg.
+    next: usize,
     time: f64,
     here: Instant,
 }
 
-impl<'a> Strides<'a> {
-    pub(super) fn new(trajectory: &'a Trajectory) -> Self {
-        let start = trajectory.start();
-        let mut legs = Legs::new(trajectory);
-        legs.enter(0.0);
-        let place = start.place();
-        let banks = trajectory.banks;
-        Self {
-            banks,
-            here: legs.current.at(0.0).instant(&place, banks),
-            legs,
+impl Trajectory {
+    /// Goes through it in steps as long as its motion allows.
+    pub fn strides(&self) -> Strides<'_> {
+        let leg = Leg::before(&self.start);
+        let place = Vector2::new(self.start.latitude, self.start.longitude);
+        Strides {
+            trajectory: self,
+            leg,
+            next: 0,
             time: 0.0,
+            here: leg.at(0.0).instant(place, self.banks),
         }
     }
+}
 
+impl Strides<'_> {
     /// The true state now and what is sensed in it.
     pub fn here(&self) -> &Instant {
         &self.here
     }
 
-    /// Goes on until a time in s since the start and hands over every stride. What is computed on the way turns
-    /// at so many rad/s beside the body.
+    /// Goes to the leg of this time.
+    fn enter(&mut self) {
+        let segments = &self.trajectory.segments;
+        while self.leg.end() <= self.time {
+            self.leg = self.leg.followed_by(&segments[self.next]);
+            self.next = (self.next + 1) % segments.len();
+        }
+    }
+
+    fn at(&self, time: f64, place: Vector2<f64>) -> Instant {
+        self.leg.at(time).instant(place, self.trajectory.banks)
+    }
+
+    /// Continues until a time in s since the start and hands over every stride. What is computed on the way turns
+    /// at `beside` rad/s relative to the body.
     ///
     /// # Errors
     /// The first that is returned for a stride.
@@ -51,8 +95,8 @@ impl<'a> Strides<'a> {
     ) -> Result<(), E> {
         while self.time < until {
             let from = self.time;
-            self.legs.enter(from);
-            let to = self.legs.current.next_break(from).min(until);
+            self.enter();
+            let to = self.leg.next_break(from).min(until);
             let steps = self.steps(to, beside);
             for k in 1..=steps {
                 let part = f64::from(k) / f64::from(steps);
@@ -64,39 +108,37 @@ impl<'a> Strides<'a> {
         Ok(())
     }
 
+    /// Continues until a time in s since the start.
+    pub fn pass(&mut self, until: f64) {
+        let Ok(()) = self.go(until, 0.0, |_| Ok::<_, Infallible>(()));
+    }
+
     /// Steps to a time before which nothing breaks.
     fn steps(&self, to: f64, beside: f64) -> u32 {
         let duration = to - self.time;
-        let at = |time: f64| self.legs.current.at(time);
-        let middle = at(self.time + 0.5 * duration);
-        let rate = |kinematics: &Kinematics| {
-            let there = kinematics.instant(&self.here.truth, self.banks);
-            there.rate.norm()
-        };
+        let middle = self.time + 0.5 * duration;
         // Rates of heading are largest at an end, those of roll in the middle.
-        let fastest = rate(&at(self.time)).max(rate(&middle)).max(rate(&at(to)));
-        let least = if middle.is_steady() { 1 } else { LEAST };
-        Stride::count(duration, fastest + beside).max(least)
+        let place = self.here.truth.place();
+        let rates = [self.time, middle, to].map(|time| self.at(time, place).rate.norm());
+        let fastest = rates.into_iter().fold(0.0, f64::max);
+        let steady = self.leg.at(middle).is_steady();
+        Stride::count(duration, fastest + beside).max(if steady { 1 } else { LEAST })
     }
 
     fn stride(&mut self, to: f64) -> Stride {
-        let duration = to - self.time;
-        let (start, leg) = (self.here, &self.legs.current);
-        let at = |after: f64, moved: &Vector3<f64>| {
-            let place = start.truth.moved(moved);
-            leg.at(self.time + after).instant(&place, self.banks)
-        };
+        let (from, start) = (self.time, self.here.truth);
+        let duration = to - from;
+        let at =
+            |after: f64, rate: &Vector2<f64>| self.at(from + after, start.place() + rate * after);
+        let rate = start.position_rate().xy();
         // Metres are enough for the middle: they change Earth rate and gravity by 1e-6 of themselves.
-        let half = 0.5 * duration;
-        let rate = start.truth.position_rate();
-        let middle = at(half, &(rate * half));
-        let rate_there = middle.truth.position_rate();
-        let mut end = at(duration, &(rate_there * duration));
+        let middle = at(0.5 * duration, &rate);
+        let rate_there = middle.truth.position_rate().xy();
+        let mut end = at(duration, &rate_there);
         // Simpson's rule.
-        let mean = (rate + rate_there * 4.0 + end.truth.position_rate()) / 6.0;
-        let place = start.truth.moved(&(mean * duration));
-        end.truth.latitude = place.latitude;
-        end.truth.longitude = place.longitude;
+        let mean = (rate + rate_there * 4.0 + end.truth.position_rate().xy()) / 6.0;
+        end.truth.latitude = start.latitude + mean.x * duration;
+        end.truth.longitude = start.longitude + mean.y * duration;
         self.here = end;
         self.time = to;
         Stride {

@@ -39,6 +39,7 @@ pub(super) fn by_itself(at: &Solution) -> InputMatrix {
 mod tests {
     use super::*;
     use crate::attitude::{from_pitch_roll_heading, log};
+    use crate::navigation::Instant;
     use crate::units::{DEG_PER_H, DEGREE, MICRO_G};
     use approx::assert_abs_diff_eq;
     use nalgebra::{Matrix3, SVector, Vector3};
@@ -53,7 +54,7 @@ mod tests {
                 longitude: 0.0,
                 height: 100.0,
             };
-            let (rate, force) = truth.steady();
+            let Instant { rate, force, .. } = truth.steady();
             let gyro = Vector3::new(0.03, -0.02, 0.01) * DEG_PER_H;
             let accel = Vector3::new(20.0, -40.0, 30.0) * MICRO_G;
             // Columns are East, North and Up in body axes as sensed.

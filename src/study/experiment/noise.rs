@@ -1,7 +1,7 @@
 //! What the noise of the instrument does while it aligns itself and navigates: alike after every
 //! calibration, so it is kept apart.
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -9,7 +9,7 @@ use rand_distr::StandardNormal;
 use super::Spread;
 use crate::imu::{Noise, PerSensor};
 use crate::navigation::error_model::{INPUTS, InputMatrix};
-use crate::navigation::{ErrorMatrix, ErrorModel, Height, NavigationError, Solution};
+use crate::navigation::{ErrorMatrix, Instant, NavigationError};
 use crate::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError};
 
 /// How long an instrument stands to align itself, s.
@@ -74,22 +74,20 @@ pub(super) fn position(
     let duration = f64::from(mission.intervals) * INTERVAL;
     let end = match &mission.motion {
         Motion::Standing(at) => {
-            let step = Step::new(at, &at.steady().1, STANDING_STEP, &variances);
+            let step = Step::new(&at.steady(), STANDING_STEP, &variances);
             for _ in 0..(duration / STANDING_STEP).round() as u64 {
                 covariance.advance(&step);
             }
             *at
         }
         Motion::Moving(trajectory) => {
-            let mut travel = trajectory.travel(0.5 * MOVING_STEP);
-            for _ in 0..(duration / MOVING_STEP).round() as u64 {
-                travel.advance();
-                let force = travel.sensed().1;
-                let step = Step::new(travel.truth(), &force, MOVING_STEP, &variances);
-                covariance.advance(&step);
-                travel.advance();
+            let mut strides = trajectory.strides();
+            for number in 0..(duration / MOVING_STEP).round() as u32 {
+                strides.pass((f64::from(number) + 0.5) * MOVING_STEP);
+                covariance.advance(&Step::new(strides.here(), MOVING_STEP, &variances));
             }
-            *travel.truth()
+            strides.pass(duration);
+            strides.here().truth
         }
     };
     let by_state = NavigationError::by_state(&end).ok_or(NavigationStudyError::Upright)?;
@@ -107,12 +105,8 @@ struct Step {
 }
 
 impl Step {
-    fn new(truth: &Solution, force: &Vector3<f64>, duration: f64, variances: &Variances) -> Self {
-        let held = Height::Held {
-            height: truth.height,
-            velocity: truth.velocity.z,
-        };
-        let transition = ErrorModel::about(truth, force, held).over(duration);
+    fn new(at: &Instant, duration: f64, variances: &Variances) -> Self {
+        let transition = at.linear_model().over(duration);
         let keep = variances
             .correlation_time
             .map(|time| (-duration / time).exp());

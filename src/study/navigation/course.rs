@@ -12,7 +12,7 @@ impl<'a> Course<'a> {
     pub(super) fn new(motion: &'a Motion) -> Self {
         match motion {
             Motion::Standing(truth) => Self::Standing {
-                here: Instant::steady(truth),
+                here: truth.steady(),
                 time: 0.0,
             },
             Motion::Moving(trajectory) => Self::Moving(Box::new(trajectory.strides())),

@@ -11,7 +11,7 @@ use crate::calibration::{ParameterVector, sensor_and_parameter};
 use crate::calibration::{from_vector, to_vector};
 use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
-use crate::navigation::{Height, Increments, Strapdown};
+use crate::navigation::{Height, Increments, Strapdown, Stride};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
 const FORM: InstallationForm = InstallationForm::General;
@@ -100,27 +100,44 @@ fn an_exact_calibration_navigates_without_error_wherever_it_goes() {
     }
 }
 
-/// Where navigation leads that takes what is sensed for what an instrument with these errors samples.
+/// Where navigation leads that takes what is sensed for what an ideal instrument and one with these errors sample.
 fn sampled(
     trajectory: &Trajectory,
     errors: &PerSensor<Sensed>,
     period: f64,
     steps: u32,
-) -> Solution {
-    let mut travel = trajectory.travel(period);
-    let mut navigation = Strapdown::new(*travel.truth(), period).unwrap();
-    for _ in 0..steps {
-        let mut increments = travel.advance();
+) -> [Solution; 2] {
+    let mut strides = trajectory.strides();
+    let start = Strapdown::new(strides.here().truth, period).unwrap();
+    let (mut ideal, mut wrong) = (start.clone(), start);
+    for step in 1..=steps {
+        let (mut from, mut increments) = (*strides.here(), Increments::default());
+        let mut add = |stride: &Stride| {
+            let Stride {
+                duration,
+                middle,
+                end,
+            } = stride;
+            let integral = |of: fn(&Instant) -> Vector3<f64>| {
+                (of(&from) + of(middle) * 4.0 + of(end)) * (duration / 6.0)
+            };
+            increments.angle += integral(|at| at.rate);
+            increments.velocity += integral(|at| at.force);
+            from = *end;
+            Ok::<_, NearPole>(())
+        };
+        strides.go(f64::from(step) * period, 0.0, &mut add).unwrap();
+        let held = Height::Held {
+            height: strides.here().truth.height,
+            velocity: strides.here().truth.velocity.z,
+        };
+        ideal.advance(&increments, held).unwrap();
         let Increments { angle, velocity } = increments;
         increments.angle += errors.gyro.relative * angle + errors.gyro.constant * period;
         increments.velocity += errors.accel.relative * velocity + errors.accel.constant * period;
-        let held = Height::Held {
-            height: travel.truth().height,
-            velocity: travel.truth().velocity.z,
-        };
-        navigation.advance(&increments, held).unwrap();
+        wrong.advance(&increments, held).unwrap();
     }
-    *navigation.solution()
+    [ideal, wrong].map(|navigation| *navigation.solution())
 }
 
 #[test]
@@ -132,10 +149,8 @@ fn errors_are_those_of_navigation_at_the_full_rate_of_an_instrument() {
         };
         let wrong = pair(&draw(3), None);
         let steps = (f64::from(intervals) * INTERVAL / period).round() as u32;
-        let of = |pair: &Pair| sampled(trajectory, &pair.sensed().unwrap(), period, steps);
         // What navigation itself errs by is taken away.
-        let computed = of(&wrong);
-        let ideal = of(&pair(&ParameterVector::zeros(), None));
+        let [ideal, computed] = sampled(trajectory, &wrong.sensed().unwrap(), period, steps);
         let expected = NavigationError::of(&computed, &ideal).to_vector();
         let found = mission.errors(&wrong).unwrap().pop().unwrap().error;
         let apart = found.to_vector() - expected;

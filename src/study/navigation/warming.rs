@@ -274,8 +274,8 @@ impl Mission {
         let mut functions: Vec<usize> = pair.coefficients.iter().map(|c| c.1).collect();
         functions.sort_unstable();
         functions.dedup();
-        let mut constant = Sensitivity::<PARAMETERS>::new();
-        let mut changing = vec![Sensitivity::<PARAMETERS>::new(); functions.len()];
+        let mut constant = Sensitivity::<PARAMETERS>::zeros();
+        let mut changing = vec![constant; functions.len()];
         let gather = |constant: &Sensitivity<PARAMETERS>,
                       changing: &[Sensitivity<PARAMETERS>],
                       course: &Course,
@@ -310,10 +310,11 @@ impl Mission {
             course.go(time, 0.0, |stride| {
                 let [middle, end] = [&stride.middle, &stride.end].map(linear);
                 let all = [&start, &middle, &end];
-                constant.follow(stride.duration, all);
+                constant = Linearisation::follow(&constant, stride.duration, all);
                 for (sensitivity, &function) in changing.iter_mut().zip(&functions) {
                     let [a, b, c] = all.map(|linear| of_function(linear, &state, function));
-                    sensitivity.follow(stride.duration, [&a, &b, &c]);
+                    *sensitivity =
+                        Linearisation::follow(sensitivity, stride.duration, [&a, &b, &c]);
                 }
                 start = end;
                 Ok::<_, NavigationStudyError>(())

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::quantity::ByQuantity;
 use crate::imu::{PerSensor, Sensor};
 use crate::navigation::error_model::{INPUTS, STATES};
-use crate::navigation::{ErrorModel, Height, NavigationError, Sensitivity, Solution};
+use crate::navigation::{NavigationError, Sensitivity, Solution};
 
 /// Longest output step in s. The largest of a Schuler swing of 84 min lies within half a step of an
 /// output, and is at most 1.7e-4 above it.
@@ -64,23 +64,18 @@ impl Response {
     pub(super) fn new(truth: &Solution, duration: f64) -> Option<Self> {
         let steps = (duration / STEP).ceil().max(1.0);
         let step = duration / steps;
-        let held = Height::Held {
-            height: truth.height,
-            velocity: 0.0,
-        };
-        let (_, force) = truth.steady();
-        let transition = ErrorModel::about(truth, &force, held).over(step);
+        let transition = truth.steady().linear_model().over(step);
         let by_state = NavigationError::by_state(truth)?;
         let outputs = SMatrix::<f64, OUTPUTS, STATES>::from_fn(|i, j| by_state[(ROWS[i], j)]);
-        let mut sensitivity = Sensitivity::<INPUTS>::new();
+        let mut sensitivity = Sensitivity::<INPUTS>::zeros();
         let mut by_sensor = PerSensor::<Vec<_>>::default();
         for _ in 0..=steps as usize {
-            let response = outputs * sensitivity.0;
+            let response = outputs * sensitivity;
             for (place, sensor) in Sensor::ALL.into_iter().enumerate() {
                 let of_triad = response.fixed_columns::<3>(3 * place).into_owned();
                 by_sensor.get_mut(sensor).push(of_triad);
             }
-            sensitivity.advance(&transition, &SMatrix::identity());
+            sensitivity = transition.errors * sensitivity + transition.input;
         }
         Some(Self { step, by_sensor })
     }
@@ -144,7 +139,7 @@ mod tests {
     #[test]
     fn an_accelerometer_error_tilts_by_twice_its_share_of_gravity_within_a_swing() {
         let truth = standing(45.0 * DEGREE);
-        let (_, force) = truth.steady();
+        let force = truth.steady().force;
         let response = Response::new(&truth, 3.0 * 3600.0).unwrap();
         let error = 100.0 * MICRO_G;
         let largest = response.largest(Sensor::Accel, &(Vector3::y() * error));

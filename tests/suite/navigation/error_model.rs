@@ -5,8 +5,8 @@ use turncal::earth::{Curvature, ROTATION_RATE, normal_gravity};
 use turncal::imu::{InstallationForm, PerSensor, Sensor, Triad, TriadVector};
 use turncal::navigation::error_model::{INPUTS, PARAMETERS, STATES};
 use turncal::navigation::{
-    ErrorModel, ErrorVector, Height, Increments, NavigationError, Sensitivity, Solution, Strapdown,
-    sensed_errors,
+    ErrorModel, ErrorVector, Height, Increments, Instant, NavigationError, SensedErrors,
+    Sensitivity, Solution, Strapdown,
 };
 use turncal::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, NAUTICAL_MILE, PPM};
 
@@ -20,14 +20,14 @@ const HELD: Height = Height::Held {
 /// Largest differences of the linear model from hourly pitch, roll, heading (°), velocity (m/s) and
 /// position (nmile) of a body that stands.
 pub fn apart_from(expected: &Value, truth: &Solution, error: Sensed) -> [f64; 3] {
-    let (_, force) = truth.steady();
+    let force = truth.steady().force;
     let step = ErrorModel::about(truth, &force, HELD).over(HOUR);
     let h = NavigationError::by_state(truth).unwrap();
-    let mut sensitivity = Sensitivity::<INPUTS>::new();
+    let mut sensitivity = Sensitivity::<INPUTS>::zeros();
     let mut apart = [0f64; 3];
     for row in expected.as_array().unwrap() {
         let row = numbers(row);
-        let found = h * sensitivity.errors(&error.input());
+        let found = h * sensitivity * error.input();
         let attitude = found.fixed_rows::<3>(0) / DEGREE;
         let differences = [
             (attitude - Vector3::new(row[0], row[1], row[2])).amax(),
@@ -37,14 +37,14 @@ pub fn apart_from(expected: &Value, truth: &Solution, error: Sensed) -> [f64; 3]
         for (apart, difference) in apart.iter_mut().zip(differences) {
             *apart = apart.max(difference.abs());
         }
-        sensitivity.advance(&step, &SMatrix::identity());
+        sensitivity = step.errors * sensitivity + step.input;
     }
     apart
 }
 
 /// Periods in s of the natural motions of the held model.
 fn periods(truth: &Solution) -> Vec<f64> {
-    let (_, force) = truth.steady();
+    let force = truth.steady().force;
     let dynamics = ErrorModel::about(truth, &force, HELD).dynamics;
     let modes = dynamics.complex_eigenvalues();
     let mut periods: Vec<f64> = modes
@@ -85,7 +85,7 @@ fn crossings(samples: &[f64], step: f64) -> Vec<f64> {
 
 /// Navigation of a standing body from a wrong start; latitude and north velocity errors each 60 s.
 fn swing(truth: &Solution, start: Solution, hours: f64) -> (Vec<f64>, Vec<f64>) {
-    let (rate, force) = truth.steady();
+    let Instant { rate, force, .. } = truth.steady();
     let step = 60.0;
     let increments = Increments {
         angle: rate * step,
@@ -151,7 +151,7 @@ fn linear_and_nonlinear_models_agree_within_one_percent_of_the_largest_error() {
         attitude: from_pitch_roll_heading(0.1, -0.2, 2.0),
         ..standing(-42.0 * DEGREE)
     };
-    let (_, force) = truth.steady();
+    let force = truth.steady().force;
     let model = ErrorModel::about(&truth, &force, HELD).over(HOUR);
     let cases = [
         (
@@ -168,15 +168,15 @@ fn linear_and_nonlinear_models_agree_within_one_percent_of_the_largest_error() {
     for (gyro, accel) in cases {
         let nonlinear = hourly(&truth, &truth, Sensed { gyro, accel }, 10.0, 40);
         let input = Sensed { gyro, accel }.input();
-        let mut sensitivity = Sensitivity::<INPUTS>::new();
+        let mut sensitivity = Sensitivity::<INPUTS>::zeros();
         let mut largest = SVector::<f64, STATES>::zeros();
         let mut apart = largest;
         for nonlinear in nonlinear {
-            let linear = truth.with_errors(&sensitivity.errors(&input));
+            let linear = truth.with_errors(&(sensitivity * input));
             let linear = NavigationError::of(&linear, &truth).to_vector();
             largest = largest.sup(&nonlinear.to_vector().abs());
             apart = apart.sup(&(linear - nonlinear.to_vector()).abs());
-            sensitivity.advance(&model, &SMatrix::identity());
+            sensitivity = model.errors * sensitivity + model.input;
         }
         for figure in [0, 1, 2, 3, 4, 6, 7] {
             let part = apart[figure] / largest[figure];
@@ -194,7 +194,7 @@ fn the_linear_model_is_the_derivative_of_navigation_while_flying() {
         longitude: 0.4,
         height: 8000.0,
     };
-    let (rate, force) = truth.steady();
+    let Instant { rate, force, .. } = truth.steady();
     let period = 0.5;
     let end = truth.height + truth.velocity.z * period;
     let held = Height::Held {
@@ -271,16 +271,16 @@ fn compare(model: &ErrorVector, derivative: &ErrorVector, sizes: &ErrorVector, c
 #[test]
 fn the_discrete_form_is_exact_over_hours() {
     let truth = standing(0.6);
-    let (_, force) = truth.steady();
+    let force = truth.steady().force;
     let model = ErrorModel::about(&truth, &force, HELD);
     let whole = model.over(4.0 * HOUR);
     let part = model.over(60.0);
-    let mut sensitivity = Sensitivity::<INPUTS>::new();
+    let mut sensitivity = Sensitivity::<INPUTS>::zeros();
     for _ in 0..240 {
-        sensitivity.advance(&part, &SMatrix::identity());
+        sensitivity = part.errors * sensitivity + part.input;
     }
     let unit = whole.input.map(|v| v.abs().max(1e-3));
-    let apart = (whole.input - sensitivity.0).component_div(&unit);
+    let apart = (whole.input - sensitivity).component_div(&unit);
     assert!(apart.amax() < 1e-8, "{apart:e}");
 }
 
@@ -291,12 +291,12 @@ fn covariance_of_a_calibration_gives_the_errors_that_its_parameters_cause() {
         ..standing(0.7)
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-    let (rate, force) = truth.steady();
-    let sensed = sensed_errors(&ideal, &rate, &force).unwrap();
+    let Instant { rate, force, .. } = truth.steady();
+    let sensed = SensedErrors::new(&ideal).unwrap().at(&rate, &force);
     let step = ErrorModel::about(&truth, &force, HELD).over(HOUR);
-    let mut sensitivity = Sensitivity::<PARAMETERS>::new();
+    let mut sensitivity = Sensitivity::<PARAMETERS>::zeros();
     for _ in 0..10 {
-        sensitivity.advance(&step, &sensed);
+        sensitivity = step.errors * sensitivity + step.input * sensed;
     }
     let h = NavigationError::by_state(&truth).unwrap();
     for (place, sensor) in Sensor::ALL.into_iter().enumerate() {
@@ -319,7 +319,8 @@ fn covariance_of_a_calibration_gives_the_errors_that_its_parameters_cause() {
             let mut covariance = SMatrix::<f64, PARAMETERS, PARAMETERS>::zeros();
             let index = 12 * place + parameter;
             covariance[(index, index)] = sizes[parameter].powi(2);
-            let predicted = h * sensitivity.covariance(&covariance) * h.transpose();
+            let predicted = h * sensitivity;
+            let predicted = predicted * covariance * predicted.transpose();
             for figure in [0, 1, 2, 3, 4, 6, 7] {
                 let sigma = predicted[(figure, figure)].sqrt();
                 let of_block = predicted.diagonal().rows(3 * (figure / 3), 3).sum().sqrt();

@@ -28,7 +28,7 @@ use crate::calibration::parameters::{
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::schedule::AtRest;
 use crate::imu::{PerSensor, Triad};
-use crate::navigation::{Block, BlockMatrix, Navigator, ProcessNoise, State};
+use crate::navigation::{Block, ErrorMatrix, Navigator, ProcessNoise, State};
 use crate::run::Aiding;
 
 /// The attitude error at the first sample is the initial one to within this, rad: a number so small
@@ -417,7 +417,7 @@ fn solve_upper(triangle: MatRef<'_, f64>, right: &mut Mat<f64>) {
 }
 
 /// G of as many columns as there are independent sources of noise: `G Gᵀ = Q`.
-fn sources(noise: &BlockMatrix) -> Mat<f64> {
+fn sources(noise: &ErrorMatrix) -> Mat<f64> {
     let sigma = noise.diagonal().map(f64::sqrt);
     // Units differ by orders of magnitude, correlations do not.
     let correlation = Mat::from_fn(NAVIGATION, NAVIGATION, |i, j| {

@@ -14,7 +14,7 @@ use crate::calibration::problem::Stretch;
 use crate::calibration::record::segment::{Seen, Segment, segments};
 use crate::calibration::{AttitudePrior, ErrorTerm, Options, Problem, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
-use crate::navigation::{Block, BlockMatrix, Navigator, NoiseInput, NoiseInputs, ParameterBlock};
+use crate::navigation::{Block, ErrorMatrix, Navigator, NoiseInput, NoiseInputs, ParameterBlock};
 use crate::run::Aiding;
 use crate::simulation::Scenario;
 use approx::assert_relative_eq;
@@ -63,13 +63,15 @@ fn noise_input(scale: f64, wave: &dyn Fn(usize, usize) -> f64) -> NoiseInputs {
         gyro: positive(0),
         accel: positive(3),
     };
-    let mut inputs = NoiseInputs::new(Vector3::zeros());
-    inputs.push(NoiseInput::bridging(
-        0.1,
-        Vector3::new(0.1, -0.2, 9.8),
-        bridged,
-    ));
-    inputs
+    NoiseInputs {
+        earth_rate: Vector3::zeros(),
+        parts: vec![NoiseInput {
+            duration: 0.1,
+            force: Vector3::new(0.1, -0.2, 9.8),
+            bridged: Some(Box::new(bridged)),
+            ..NoiseInput::default()
+        }],
+    }
 }
 
 /// A block with nothing special about it.
@@ -81,7 +83,7 @@ fn block(seed: f64) -> Block {
         state: State::at_rest(Matrix3::identity()),
         duration: 0.1,
         navigation: Arc::new(
-            BlockMatrix::identity() + BlockMatrix::from_fn(|r, c| 0.1 * wave(r, c)),
+            ErrorMatrix::identity() + ErrorMatrix::from_fn(|r, c| 0.1 * wave(r, c)),
         ),
         parameters: Arc::new(PerSensor {
             gyro: ParameterBlock::from_fn(wave),
@@ -247,7 +249,7 @@ fn scalar_updates_equal_the_dense_one_with_the_full_gain() {
 fn turning(seed: f64) -> Block {
     let mut block = block(seed);
     let wave = block.navigation;
-    block.navigation = Arc::new(BlockMatrix::identity());
+    block.navigation = Arc::new(ErrorMatrix::identity());
     for (row, column) in [(3, 0), (6, 3)] {
         Arc::make_mut(&mut block.navigation)
             .fixed_view_mut::<3, 3>(row, column)
