@@ -9,8 +9,20 @@ pub struct Curve {
     pub variance: Vec<f64>,
 }
 
-/// Samples that the longest cluster is shorter than, as a part of all: with fewer than four clusters
-/// nothing can be said.
+impl Curve {
+    /// The mean of the Allan variances of several curves at the same cluster times.
+    pub fn mean(curves: &[&Self]) -> Self {
+        let tau = curves.first().map_or_else(Vec::new, |of| of.tau.clone());
+        let at = |point: usize| curves.iter().map(|of| of.variance[point]).sum::<f64>();
+        let variance = (0..tau.len()).map(|point| at(point) / curves.len() as f64);
+        Self {
+            variance: variance.collect(),
+            tau,
+        }
+    }
+}
+
+/// A record has at least this many clusters: fewer show nothing.
 const FEWEST_CLUSTERS: usize = 4;
 
 /// Lengths of clusters in samples: two in an octave, from one sample to a quarter of the record.

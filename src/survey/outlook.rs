@@ -52,7 +52,7 @@ pub struct Expected {
     pub unobserved: Vec<String>,
 }
 
-pub(super) fn methods(run: &Run) -> Vec<MethodOutlook> {
+pub fn methods(run: &Run) -> Vec<MethodOutlook> {
     let outlook = |path| MethodOutlook {
         path,
         expected: expected(run, path),
