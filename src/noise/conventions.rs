@@ -254,30 +254,12 @@ impl Convention {
     }
 }
 
-/// A unit in the one way that all its ways of writing come down to.
+/// A unit in the one spelling that stands for all of its spellings.
 fn normalised(unit: &str) -> String {
-    const SAME: [(&str, &str); 15] = [
-        ("µ", "u"),
-        ("μ", "u"),
-        ("°", "deg"),
-        ("″", "arcsec"),
-        ("√", "sqrt"),
-        ("²", "2"),
-        ("³", "3"),
-        ("⁵", "5"),
-        ("–", "-"),
-        ("^", ""),
-        ("(", ""),
-        (")", ""),
-        (" ", ""),
-        ("dps", "deg/s"),
-        ("hr", "h"),
-    ];
-    let mut text = unit.to_lowercase();
-    for (from, to) in SAME {
-        text = text.replace(from, to);
-    }
-    text
+    const SAME: &str = "µ=u μ=u °=deg ″=arcsec √=sqrt ²=2 ³=3 ⁵=5 –=- dps=deg/s hr=h";
+    let text = unit.to_lowercase().replace(['^', '(', ')', ' '], "");
+    let pairs = SAME.split(' ').filter_map(|pair| pair.split_once('='));
+    pairs.fold(text, |text, (from, to)| text.replace(from, to))
 }
 
 fn hint(unit: &str) -> String {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::allan::Curve;
+use super::allan::{Curve, mean};
 use super::clusters::Clusters;
 use super::fit::{Mixture, Weighted, allan_variance};
 use super::identify::{Found, Hidden, Identified, of_kind};
@@ -56,7 +56,7 @@ impl Clusters {
         {
             return None;
         }
-        let curve = Curve::mean(curves);
+        let curve = mean(curves);
         let varies = |v: &f64| v.is_finite() && *v > 0.0;
         if curve.tau.len() < 2 || !curve.variance.iter().all(varies) {
             return None;
@@ -240,12 +240,8 @@ impl<'a> Search<'a> {
         let (tau, share) = (self.tau(), &self.shares[self.first..]);
         DMatrix::from_fn(tau.len(), tau.len(), |i, j| {
             let random = whole[(self.first + i, self.first + j)] / (share[i] * share[j]).sqrt();
-            let departure = || self.misfit * allan_variance(mixture, tau[i]);
-            if i == j {
-                random + departure().powi(2)
-            } else {
-                random
-            }
+            let misfit = if i == j { self.misfit } else { 0.0 };
+            random + (misfit * allan_variance(mixture, tau[i])).powi(2)
         })
     }
 

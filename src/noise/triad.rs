@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::allan::{Curve, overlapping};
+use super::allan::{Curve, mean, overlapping};
 use super::clusters::Clusters;
 use super::identify::{Found, Hidden, Identified, of_kind};
 use super::process::Process;
@@ -68,7 +68,7 @@ impl TriadNoise {
             is_constant: curves.is_empty(),
             curve: match curves.as_slice() {
                 [] => axes[0].curve.clone(),
-                curves => Curve::mean(curves),
+                curves => mean(curves),
             },
         };
         Self { axes, mean }
@@ -171,8 +171,8 @@ fn hold(own: &mut Vec<Found>, axes: &[&[Found]]) {
         };
         match own.iter_mut().find(|of| of.process.same_kind(process)) {
             Some(of) if is_between(of, |of| of.strength) && is_between(of, time) => {}
-            Some(of) => *of = mean(&of_axes, process),
-            None => own.push(mean(&of_axes, process)),
+            Some(of) => *of = root_mean_square(&of_axes, process),
+            None => own.push(root_mean_square(&of_axes, process)),
         }
     }
 }
@@ -183,7 +183,7 @@ fn time(of: &Found) -> f64 {
 }
 
 /// Root of the mean square of the strengths, geometric mean of the correlation times; axes are independent.
-fn mean(axes: &[&Found], process: Process) -> Found {
+fn root_mean_square(axes: &[&Found], process: Process) -> Found {
     let count = axes.len() as f64;
     let strength = (axes.iter().map(|of| of.strength.powi(2)).sum::<f64>() / count).sqrt();
     let squares = axes.iter().map(|of| (of.strength * of.sigma).powi(2));
