@@ -2,15 +2,13 @@
 //!
 //! Source: JCGM 106:2012, 8.3 (guard bands), 9.3 (specific consumer's risk); ILAC-G8:09/2019, 4.2.
 
-use statrs::function::erf::erfc;
-
 use super::laboratory::DecisionRule;
 use super::results::nominal;
 use crate::calibration::result::frame::Canonical;
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, parameter_name};
 use crate::imu::InstallationForm;
-use crate::lot::{Limit, Specification};
+use crate::lot::{Limit, Specification, probability_outside};
 
 /// Guard band over σ: the expanded uncertainty with k = 2.
 const GUARD: f64 = 2.0;
@@ -87,8 +85,7 @@ impl Conformity {
 
 /// A parameter so far from the middle of a limit.
 pub(super) fn decide(off: f64, sigma: f64, within: f64, rule: DecisionRule) -> (Decision, f64) {
-    let beyond = |distance: f64| 0.5 * erfc(distance / sigma / 2f64.sqrt());
-    let outside = beyond(within - off) + beyond(within + off);
+    let outside = probability_outside(off, sigma, within);
     let guard = match rule {
         DecisionRule::GuardBand => GUARD * sigma,
         DecisionRule::SimpleAcceptance => 0.0,

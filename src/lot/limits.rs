@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::function::erf::erfc;
 
-use super::quantity::Sample;
+use super::unit::Sample;
 
 /// What units must be, and how sure that must be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,41 +54,41 @@ pub struct Check {
     pub verdict: Verdict,
 }
 
-impl Specification {
-    /// A unit against every limit, by the value that it has of each parameter.
-    pub(super) fn checks(&self, value: impl Fn(usize) -> Option<Sample>) -> Vec<Check> {
-        let check = |&limit: &Limit| {
-            let off =
-                value(limit.parameter).map(|sample| (sample.value - limit.nominal, sample.sigma));
-            // Without a σ nothing is known of how near the value is.
-            let known = off.filter(|(_, sigma)| *sigma > 0.0);
-            let outside = known.map(|(off, sigma)| {
-                let beyond = |distance: f64| 0.5 * erfc(distance / sigma / 2f64.sqrt());
-                beyond(limit.within - off) + beyond(limit.within + off)
-            });
-            let verdict = match outside {
-                Some(outside) if outside <= 1.0 - self.confidence => Verdict::Pass,
-                Some(outside) if outside >= self.confidence => Verdict::Fail,
-                _ => Verdict::NotDecided,
-            };
-            Check {
-                limit,
-                off,
-                probability: outside.map(|outside| 1.0 - outside),
-                verdict,
-            }
+/// Probability that a value, this far from the middle of a limit, is not within it.
+pub fn probability_outside(off: f64, sigma: f64, within: f64) -> f64 {
+    let beyond = |distance: f64| 0.5 * erfc(distance / sigma / 2f64.sqrt());
+    beyond(within - off) + beyond(within + off)
+}
+
+/// A unit against every limit, by the value that it has of each parameter.
+pub fn checks(of: &Specification, value: impl Fn(usize) -> Option<Sample>) -> Vec<Check> {
+    let check = |&limit: &Limit| {
+        let off = value(limit.parameter).map(|of| (of.value - limit.nominal, of.sigma));
+        // Without a σ nothing is known of how near the value is.
+        let known = off.filter(|(_, sigma)| *sigma > 0.0);
+        let outside = known.map(|(off, sigma)| probability_outside(off, sigma, limit.within));
+        let verdict = match outside {
+            Some(outside) if outside <= 1.0 - of.confidence => Verdict::Pass,
+            Some(outside) if outside >= of.confidence => Verdict::Fail,
+            _ => Verdict::NotDecided,
         };
-        self.limits.iter().map(check).collect()
-    }
+        Check {
+            limit,
+            off,
+            probability: outside.map(|outside| 1.0 - outside),
+            verdict,
+        }
+    };
+    of.limits.iter().map(check).collect()
+}
+
+/// Of several checks: fail if one fails, pass if all pass.
+pub fn overall(checks: &[Check]) -> Verdict {
+    let worst = checks.iter().map(|check| check.verdict).max();
+    worst.unwrap_or(Verdict::NotDecided)
 }
 
 impl Verdict {
-    /// Of several: fail if one fails, pass if all pass.
-    pub(super) fn of(checks: &[Check]) -> Self {
-        let worst = checks.iter().map(|check| check.verdict).max();
-        worst.unwrap_or(Self::NotDecided)
-    }
-
     /// In words.
     pub fn name(self) -> &'static str {
         match self {

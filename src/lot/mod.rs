@@ -5,8 +5,6 @@
 
 mod limits;
 mod outlier;
-mod quantity;
-mod row;
 mod spread;
 mod statistics;
 #[cfg(test)]
@@ -21,13 +19,15 @@ use crate::calibration::result::frame::{Canonical, free_parameters};
 use crate::imu::{BodyFrame, Nominal, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::median;
 
-pub use limits::{Check, Limit, Specification, Verdict};
-pub use quantity::{Quantity, Sample};
-pub use row::Row;
+use limits::{checks, overall};
+use statistics::of_all;
+use unit::{axes, noise_at_rest};
+
+pub use limits::{Check, Limit, Specification, Verdict, probability_outside};
 pub use spread::{Scatter, Spread};
 pub use statistics::{FALSE_ALARM, FALSE_TREND, Statistics};
 pub use trend::{Against, Trend};
-pub use unit::{Calibrated, Unit};
+pub use unit::{Calibrated, Quantity, Row, Sample, Unit};
 
 /// What the units say together.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,57 +53,49 @@ impl Lot {
         let usable: Vec<Result<&Calibrated, String>> = units.iter().map(usable).collect();
         let output = common_output(usable.iter().flatten().map(|of| &of.calibration));
         let alike = |of: &&Calibrated| output.is_none() || of.calibration.unit.as_ref() == output;
-        let compared = || usable.iter().flatten().copied().filter(alike);
-        let accelerometer = |of: &Calibrated| of.calibration.body_frame == BodyFrame::Accelerometer;
-        let body_frame = match compared().any(accelerometer) {
+        let compared: Vec<&Calibrated> = usable.iter().flatten().copied().filter(alike).collect();
+        let accelerometer =
+            |of: &&Calibrated| of.calibration.body_frame == BodyFrame::Accelerometer;
+        let body_frame = match compared.iter().any(accelerometer) {
             true => BodyFrame::Accelerometer,
             false => BodyFrame::Table,
         };
         let nominal = PerSensor::from_fn(|sensor| {
             Nominal(Vector3::from_fn(|axis, _| {
-                let mut stated: Vec<f64> =
-                    compared().map(|of| of.nominal.get(sensor)[axis]).collect();
-                median(&mut stated).unwrap_or(1.0)
+                let stated = compared.iter().map(|of| of.nominal.get(sensor)[axis]);
+                median(&mut stated.collect::<Vec<_>>()).unwrap_or(1.0)
             }))
         });
-        let shared_gravity = shared_gravity(compared());
-        let canonical: Vec<Result<Canonical, String>> = units
-            .iter()
-            .zip(&usable)
-            .map(|(unit, calibrated)| {
-                let calibrated = calibrated.clone()?;
-                if !alike(&calibrated) {
-                    return Err(other_output(calibrated, output));
-                }
-                Canonical::new(&unit.name, &calibrated.calibration, &nominal, body_frame)
-                    .map_err(|error| error.to_string())
-            })
-            .collect();
-        let mut rows: Vec<Row> = units
-            .into_iter()
-            .zip(canonical)
-            .map(|(unit, canonical)| Row {
-                noise: unit.noise(&nominal),
+        let shared_gravity = shared_gravity(&compared);
+        let canonical = |(unit, usable): (&Unit, Result<&Calibrated, String>)| {
+            let calibrated = usable?;
+            if !alike(&calibrated) {
+                return Err(other_output(calibrated, output));
+            }
+            Canonical::new(&unit.name, &calibrated.calibration, &nominal, body_frame)
+                .map_err(|error| error.to_string())
+        };
+        let canonical: Vec<_> = units.iter().zip(usable.clone()).map(canonical).collect();
+        let rows = units.into_iter().zip(canonical);
+        let rows = rows.map(|(unit, canonical)| {
+            let mut row = Row {
+                noise: noise_at_rest(&unit, &nominal),
                 unit,
                 canonical,
                 checks: Vec::new(),
                 verdict: None,
-            })
-            .collect();
-        if let Some(specification) = &specification {
-            for row in &mut rows {
-                row.checks =
-                    specification.checks(|parameter| row.sample(Quantity::Parameter(parameter)));
-                row.verdict = Some(Verdict::of(&row.checks));
+            };
+            if let Some(specification) = &specification {
+                row.checks = checks(specification, |k| row.sample(Quantity::Parameter(k)));
+                row.verdict = Some(overall(&row.checks));
             }
-        }
-        let parameters = free_parameters(body_frame);
-        let quantities: Vec<Quantity> = parameters
-            .into_iter()
-            .map(Quantity::Parameter)
-            .chain(Quantity::noise())
-            .collect();
-        let statistics = Statistics::of_all(&rows, &quantities, |quantity| match quantity {
+            row
+        });
+        let rows: Vec<Row> = rows.collect();
+        let parameters = free_parameters(body_frame).into_iter();
+        let noise = axes().map(|(sensor, axis)| Quantity::Noise(sensor, axis));
+        let quantities: Vec<Quantity> = parameters.map(Quantity::Parameter).chain(noise).collect();
+        let statistics = of_all(&rows, &quantities, |quantity| match quantity {
             Quantity::Parameter(index) if is_accel_scale(index) => shared_gravity.unwrap_or(0.0),
             _ => 0.0,
         });
@@ -165,9 +157,9 @@ fn other_output(calibrated: &Calibrated, output: Option<&PerSensor<String>>) -> 
 }
 
 /// Relative 1σ of gravity, if all have it from the same place.
-fn shared_gravity<'a>(mut all: impl Iterator<Item = &'a Calibrated>) -> Option<f64> {
-    let first = all.next()?.calibration.gravity?;
-    let same = all.all(|of| of.calibration.gravity == Some(first));
+fn shared_gravity(all: &[&Calibrated]) -> Option<f64> {
+    let first = all.first()?.calibration.gravity?;
+    let same = all.iter().all(|of| of.calibration.gravity == Some(first));
     (same && first.sigma_m_s2 > 0.0).then(|| first.sigma_m_s2 / first.m_s2)
 }
 

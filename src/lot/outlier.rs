@@ -1,34 +1,32 @@
 //! Units apart from the others: the generalized extreme Studentized deviate test (Rosner, *Technometrics* 25,
 //! 1983, 165), which several outliers together do not deceive, at a stated rate of false alarms.
 
+use statrs::statistics::Statistics;
+
 use crate::statistics::{SIGMA_OF_MEDIAN, median, student_limit};
 
-/// Fewer values than this have no others to be apart from.
-const FEWEST: usize = 5;
-
-/// How many values can be apart from the rest: one in four where the limits hold for several, which Rosner
-/// found from 25 values on, and of two from 15 on; else one, for which they hold by themselves (Grubbs).
+/// How many values can be apart from the rest: one in four where the limits apply to several, which Rosner
+/// found from 25 values on, and of two from 15 on; else one, to which they apply by themselves (Grubbs). Fewer
+/// than five have no others to be apart from.
 fn most(count: usize) -> usize {
     match count {
         25.. => count / 4,
         15.. => 2,
-        _ => 1,
+        5.. => 1,
+        _ => 0,
     }
 }
 
 /// Places of the outliers among values with their variances, at this chance of any among normal ones.
-pub(super) fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
-    if samples.len() < FEWEST {
-        return Vec::new();
-    }
-    let mut left: Vec<(usize, f64)> = standardised(samples).into_iter().enumerate().collect();
+pub fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
+    let mut rest: Vec<(usize, f64)> = standardised(samples).into_iter().enumerate().collect();
     let (mut removed, mut outliers) = (Vec::new(), 0);
     for _ in 0..most(samples.len()) {
-        let Some((place, deviate)) = extreme(&left) else {
+        let Some((place, deviate)) = extreme(&rest) else {
             break;
         };
-        let beyond = deviate > limit(left.len(), chance);
-        removed.push(left.remove(place).0);
+        let beyond = deviate > limit(rest.len(), chance);
+        removed.push(rest.remove(place).0);
         if beyond {
             outliers = removed.len();
         }
@@ -38,40 +36,36 @@ pub(super) fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
     removed
 }
 
-/// Values on one scale: from the median, in what their own σ and a robust spread of the lot make together.
+/// Values on one scale: from the median, in units of their own σ and a robust spread of the lot together.
 fn standardised(samples: &[(f64, f64)]) -> Vec<f64> {
-    let middle = |values: &mut Vec<f64>| median(values).unwrap_or_default();
-    let centre = middle(&mut samples.iter().map(|s| s.0).collect());
-    let deviation = middle(&mut samples.iter().map(|s| (s.0 - centre).abs()).collect());
-    let own = middle(&mut samples.iter().map(|s| s.1).collect());
-    let spread = ((SIGMA_OF_MEDIAN * deviation).powi(2) - own).max(0.0);
-    let scale = |variance: f64| {
-        let all = spread + variance;
-        if all > 0.0 { all.sqrt() } else { 1.0 }
+    let middle = |of: &dyn Fn(&(f64, f64)) -> f64| {
+        median(&mut samples.iter().map(of).collect::<Vec<_>>()).unwrap_or_default()
+    };
+    let centre = middle(&|s| s.0);
+    let deviation = SIGMA_OF_MEDIAN * middle(&|s| (s.0 - centre).abs());
+    let spread = (deviation.powi(2) - middle(&|s| s.1)).max(0.0);
+    let sigma = |own: f64| match spread + own {
+        all if all > 0.0 => all.sqrt(),
+        _ => 1.0,
     };
     samples
         .iter()
-        .map(|s| (s.0 - centre) / scale(s.1))
+        .map(|s| (s.0 - centre) / sigma(s.1))
         .collect()
 }
 
 /// Place and Studentized deviate of the value that is farthest from the mean; none where all are the same.
 fn extreme(values: &[(usize, f64)]) -> Option<(usize, f64)> {
-    let count = values.len() as f64;
-    let mean = values.iter().map(|v| v.1).sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|v| (v.1 - mean).powi(2)).sum();
-    let deviation = (squares / (count - 1.0)).sqrt();
-    let distances = values.iter().map(|v| (v.1 - mean).abs()).enumerate();
+    let values = || values.iter().map(|v| v.1);
+    let (mean, deviation) = (values().mean(), values().std_dev());
+    let distances = values().map(|value| (value - mean).abs()).enumerate();
     let (place, distance) = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (deviation > 0.0).then(|| (place, distance / deviation))
 }
 
-/// What the largest of so many deviates stays below but for this chance.
+/// Limit of the largest deviate among this many values, exceeded with this chance.
 fn limit(count: usize, chance: f64) -> f64 {
     let n = count as f64;
-    if count < 3 {
-        return f64::INFINITY;
-    }
     let t = student_limit(n - 2.0, chance / (2.0 * n));
     (n - 1.0) * t / ((n - 2.0 + t * t) * n).sqrt()
 }
@@ -102,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn sound_lots_have_outliers_as_seldom_as_stated() {
+    fn lots_without_outliers_have_them_named_as_seldom_as_stated() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let (lots, chance) = (2000, 0.05);
         for count in [6, 20, 50] {

@@ -13,7 +13,7 @@ use crate::calibration::ChiSquare;
 const OUTSIDE: f64 = 0.05;
 
 /// The spread of a lot, the σ of its units taken out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
     /// 1σ from unit to unit; zero where the units' own σ explain all.
     pub value: f64,
@@ -24,7 +24,7 @@ pub struct Spread {
 }
 
 /// Mean and scatter of values with their own σ.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Scatter {
     /// Mean, weighted by spread and own σ.
     pub mean: f64,
@@ -38,98 +38,75 @@ pub struct Scatter {
     pub spread: Spread,
 }
 
-/// Mean and Q for a spread of this variance.
-struct Weighted {
-    mean: f64,
-    weights: f64,
-    squares: f64,
-    weights_squared: f64,
+/// Σ w of values with their variances, for a spread of this variance, with the weighted mean and Q.
+fn weighted(samples: &[(f64, f64)], spread: f64) -> (f64, f64, f64) {
+    let weighted = |of: &dyn Fn(f64) -> f64| -> f64 {
+        let parts = samples.iter().map(|s| of(s.0) * (spread + s.1).recip());
+        parts.sum()
+    };
+    let weights = weighted(&|_| 1.0);
+    let mean = weighted(&|value| value) / weights;
+    (weights, mean, weighted(&|value| (value - mean).powi(2)))
 }
 
-fn weighted(samples: &[(f64, f64)], spread: f64) -> Weighted {
-    let weight = |variance: f64| (spread + variance).recip();
-    let weights: f64 = samples.iter().map(|s| weight(s.1)).sum();
-    let mean = samples.iter().map(|s| s.0 * weight(s.1)).sum::<f64>() / weights;
-    Weighted {
+/// Mean and scatter of values with their variances; none of fewer than two.
+pub fn scatter(samples: &[(f64, f64)]) -> Option<Scatter> {
+    let freedom = samples.len().checked_sub(1).filter(|n| *n > 0)?;
+    let n = freedom as f64;
+    let centre = samples.iter().map(|s| s.0).sum::<f64>() / (n + 1.0);
+    let variance = samples.iter().map(|s| (s.0 - centre).powi(2)).sum::<f64>() / n;
+    let largest = samples.iter().map(|s| s.1).fold(0.0, f64::max);
+    if variance + largest <= 0.0 {
+        // All the same, and without σ.
+        return Some(Scatter {
+            mean: centre,
+            ..Scatter::default()
+        });
+    }
+    let chi2 = ChiSquared::new(n).ok()?;
+    let at = |q: f64| spread_where(samples, q, variance + largest);
+    let spread = at(n);
+    let value = spread.sqrt();
+    let spread = spread.max(f64::MIN_POSITIVE);
+    let (weights, mean, _) = weighted(samples, spread);
+    // The slope of Q at the true spread, in the mean.
+    let squares: f64 = samples.iter().map(|s| (spread + s.1).powi(-2)).sum();
+    let slope = weights - squares / weights;
+    let all_have_sigma = samples.iter().all(|s| s.1 > 0.0);
+    Some(Scatter {
         mean,
-        weights,
-        squares: samples
-            .iter()
-            .map(|s| (s.0 - mean).powi(2) * weight(s.1))
-            .sum(),
-        weights_squared: samples.iter().map(|s| weight(s.1).powi(2)).sum(),
-    }
-}
-
-impl Scatter {
-    /// Of values with their variances; none of fewer than two.
-    pub(super) fn of(samples: &[(f64, f64)]) -> Option<Self> {
-        let freedom = samples.len().checked_sub(1).filter(|n| *n > 0)?;
-        let n = freedom as f64;
-        let centre = samples.iter().map(|s| s.0).sum::<f64>() / (n + 1.0);
-        let variance = samples.iter().map(|s| (s.0 - centre).powi(2)).sum::<f64>() / n;
-        let largest = samples.iter().map(|s| s.1).fold(0.0, f64::max);
-        if variance + largest <= 0.0 {
-            // All the same, and without σ.
-            let spread = Spread {
-                value: 0.0,
-                sigma: None,
-                interval: (0.0, 0.0),
-            };
-            return Some(Self {
-                mean: centre,
-                mean_sigma: 0.0,
-                deviation: 0.0,
-                chi_square: None,
-                spread,
-            });
-        }
-        let chi2 = ChiSquared::new(n).ok()?;
-        let at = |q: f64| spread_where(samples, q, variance + largest);
-        let spread = at(n);
-        let found = weighted(samples, spread.max(f64::MIN_POSITIVE));
-        // The slope of Q at the true spread, in the mean.
-        let slope = found.weights - found.weights_squared / found.weights;
-        let sigma_of_square = (2.0 * n).sqrt() / slope;
-        let value = spread.sqrt();
-        let all_have_sigma = samples.iter().all(|s| s.1 > 0.0);
-        Some(Self {
-            mean: found.mean,
-            mean_sigma: found.weights.recip().sqrt(),
-            deviation: variance.sqrt(),
-            chi_square: all_have_sigma
-                .then(|| weighted(samples, 0.0).squares)
-                .and_then(|value| ChiSquare::new(value, freedom)),
-            spread: Spread {
-                value,
-                sigma: (value > 0.0).then(|| sigma_of_square / (2.0 * value)),
-                interval: (
-                    at(chi2.inverse_cdf(1.0 - 0.5 * OUTSIDE)).sqrt(),
-                    at(chi2.inverse_cdf(0.5 * OUTSIDE)).sqrt(),
-                ),
-            },
-        })
-    }
+        mean_sigma: weights.recip().sqrt(),
+        deviation: variance.sqrt(),
+        chi_square: all_have_sigma
+            .then(|| weighted(samples, 0.0).2)
+            .and_then(|value| ChiSquare::new(value, freedom)),
+        spread: Spread {
+            value,
+            sigma: (value > 0.0).then(|| (2.0 * n).sqrt() / slope / (2.0 * value)),
+            interval: (
+                at(chi2.inverse_cdf(1.0 - 0.5 * OUTSIDE)).sqrt(),
+                at(chi2.inverse_cdf(0.5 * OUTSIDE)).sqrt(),
+            ),
+        },
+    })
 }
 
 /// The variance of the spread at which Q has this value; zero where Q is below it without any spread.
 fn spread_where(samples: &[(f64, f64)], q: f64, scale: f64) -> f64 {
-    let least = scale * f64::EPSILON;
-    let above = |spread: f64| weighted(samples, spread).squares > q;
-    if !above(least) {
+    let above = |spread: f64| weighted(samples, spread).2 > q;
+    let (mut low, mut high) = (scale * f64::EPSILON, scale);
+    if !above(low) {
         return 0.0;
     }
-    let (mut low, mut high) = (least, scale);
     while above(high) {
         (low, high) = (high, 2.0 * high);
     }
     // As many halvings as the digits of a floating-point number, on a logarithmic scale.
     for _ in 0..64 {
         let middle = (low * high).sqrt();
-        if above(middle) {
-            low = middle;
-        } else {
-            high = middle;
+        match above(middle) {
+            true => low = middle,
+            false => high = middle,
         }
     }
     (low * high).sqrt()

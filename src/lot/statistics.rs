@@ -1,14 +1,13 @@
 //! One quantity over all units.
 
 use super::outlier::outliers;
-use super::quantity::Quantity;
-use super::row::Row;
-use super::spread::Scatter;
+use super::spread::{Scatter, scatter};
 use super::trend::{Against, Trend, trend};
+use super::unit::{Quantity, Row, Sample};
 
-/// Chance that any outlier is named, or any spread called real, in a sound lot: for all quantities at once.
+/// False-alarm rate of outliers, and of spreads called real: for all quantities of a lot at once.
 pub const FALSE_ALARM: f64 = 0.01;
-/// Chance that any trend is told of a lot without one: for all quantities, by serial and by date.
+/// False-alarm rate of trends: for all quantities of a lot at once, by serial and by date.
 pub const FALSE_TREND: f64 = 0.01;
 
 /// What the units say of one quantity.
@@ -28,55 +27,44 @@ pub struct Statistics {
     pub trends: Vec<Trend>,
 }
 
-impl Statistics {
-    /// Of every quantity that two units have. `shared` is the 1σ of an error that all units have in common.
-    pub(super) fn of_all(
-        rows: &[Row],
-        quantities: &[Quantity],
-        shared: impl Fn(Quantity) -> f64,
-    ) -> Vec<Self> {
-        let chances = (
-            FALSE_ALARM / quantities.len() as f64,
-            FALSE_TREND / (quantities.len() * Against::ALL.len()) as f64,
-        );
-        let of = |&quantity: &Quantity| Self::of(rows, quantity, shared(quantity), chances);
-        quantities.iter().filter_map(of).collect()
-    }
-
-    fn of(
-        rows: &[Row],
-        quantity: Quantity,
-        shared: f64,
-        (alarm, false_trend): (f64, f64),
-    ) -> Option<Self> {
+/// Statistics of every quantity that two units have. `shared` is the 1σ of an error that all units have in
+/// common.
+pub fn of_all(
+    rows: &[Row],
+    quantities: &[Quantity],
+    shared: impl Fn(Quantity) -> f64,
+) -> Vec<Statistics> {
+    let count = quantities.len() as f64;
+    let alarm = FALSE_ALARM / count;
+    let false_trend = FALSE_TREND / count / Against::ALL.len() as f64;
+    let of = |&quantity: &Quantity| {
+        let shared = shared(quantity);
         let common = shared * shared;
         let (places, samples): (Vec<usize>, Vec<(f64, f64)>) = rows
             .iter()
             .enumerate()
             .filter_map(|(place, row)| {
-                let sample = row.sample(quantity)?;
-                let own = (sample.sigma * sample.sigma - common).max(0.0);
-                Some((place, (sample.value, own)))
+                let Sample { value, sigma } = row.sample(quantity)?;
+                Some((place, (value, (sigma * sigma - common).max(0.0))))
             })
             .unzip();
         let apart = outliers(&samples, alarm);
-        let kept = |k: &usize| !apart.contains(k);
-        let of_lot: Vec<usize> = (0..samples.len()).filter(kept).collect();
+        let of_lot: Vec<usize> = (0..samples.len()).filter(|k| !apart.contains(k)).collect();
         let without: Vec<(f64, f64)> = of_lot.iter().map(|&k| samples[k]).collect();
-        let mut scatter = Scatter::of(&without)?;
+        let mut scatter = scatter(&without)?;
         scatter.mean_sigma = scatter.mean_sigma.hypot(shared);
-        let weight = |variance: f64| {
-            let all = scatter.spread.value.powi(2) + variance;
-            if all > 0.0 { all.recip() } else { 1.0 }
+        let weight = |own: f64| match scatter.spread.value.powi(2) + own {
+            all if all > 0.0 => all.recip(),
+            _ => 1.0,
         };
         let trends = Against::ALL.into_iter().filter_map(|against| {
             let points = of_lot.iter().filter_map(|&k| {
-                let place = against.place(&rows[places[k]].unit)?;
-                Some((place, samples[k].0, weight(samples[k].1)))
+                let (value, own) = samples[k];
+                Some((against.place(&rows[places[k]].unit)?, value, weight(own)))
             });
             trend(against, &points.collect::<Vec<_>>(), false_trend)
         });
-        Some(Self {
+        Some(Statistics {
             quantity,
             count: samples.len(),
             trends: trends.collect(),
@@ -84,5 +72,6 @@ impl Statistics {
             real: scatter.chi_square.is_some_and(|chi2| chi2.p < alarm),
             scatter,
         })
-    }
+    };
+    quantities.iter().filter_map(of).collect()
 }

@@ -67,28 +67,27 @@ fn days(date: &str) -> Option<f64> {
 }
 
 /// A weighted line through values: `(place, value, weight)`; none where it is within chance.
-pub(super) fn trend(against: Against, points: &[(f64, f64, f64)], chance: f64) -> Option<Trend> {
+pub fn trend(against: Against, points: &[(f64, f64, f64)], chance: f64) -> Option<Trend> {
     let freedom = points.len().checked_sub(2).filter(|n| *n >= 2)? as f64;
-    let weights: f64 = points.iter().map(|p| p.2).sum();
-    let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
-        points.iter().map(|p| of(p) * p.2).sum::<f64>() / weights
+    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        points
+            .iter()
+            .map(|(x, y, weight)| of(*x, *y) * weight)
+            .sum()
     };
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let moment =
-        |of: &dyn Fn(&(f64, f64, f64)) -> f64| -> f64 { points.iter().map(|p| of(p) * p.2).sum() };
-    let xx = moment(&|p| (p.0 - x).powi(2));
-    let xy = moment(&|p| (p.0 - x) * (p.1 - y));
-    if xx <= 0.0 {
+    let weights = sum(&|_, _| 1.0);
+    let (centre, mean) = (sum(&|x, _| x) / weights, sum(&|_, y| y) / weights);
+    let width = sum(&|x, _| (x - centre).powi(2));
+    if width <= 0.0 {
         return None;
     }
-    let slope = xy / xx;
-    let squares = moment(&|p| (p.1 - y - slope * (p.0 - x)).powi(2));
-    let sigma = (squares / freedom / xx).sqrt();
+    let slope = sum(&|x, y| (x - centre) * (y - mean)) / width;
+    let squares = sum(&|x, y| (y - mean - slope * (x - centre)).powi(2));
+    let sigma = (squares / freedom / width).sqrt();
     let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
-    let p = if sigma > 0.0 {
-        2.0 * student.sf((slope / sigma).abs())
-    } else {
-        1.0
+    let p = match sigma > 0.0 {
+        true => 2.0 * student.sf((slope / sigma).abs()),
+        false => 1.0,
     };
     (p < chance).then_some(Trend {
         against,

@@ -1,10 +1,49 @@
-//! One unit of a lot: its calibration, or why it has none.
+//! One unit of a lot, and the quantities that are compared between units.
 
 use std::collections::BTreeMap;
 
+use super::limits::{Check, Verdict};
+use crate::calibration::parameter_name;
 use crate::calibration::result::Calibration;
-use crate::imu::{Nominal, PerSensor};
+use crate::calibration::result::frame::Canonical;
+use crate::imu::{AXES, InstallationForm, Nominal, PerSensor, Sensor};
 use crate::noise::RestNoise;
+
+/// Every axis of both triads.
+pub fn axes() -> impl Iterator<Item = (Sensor, usize)> {
+    let axes = |sensor| (0..AXES.len()).map(move |axis| (sensor, axis));
+    Sensor::ALL.into_iter().flat_map(axes)
+}
+
+/// A number that every unit has one of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// A parameter of both triads by its index, in the general form.
+    Parameter(usize),
+    /// The natural logarithm of an axis' white-noise density at rest.
+    Noise(Sensor, usize),
+}
+
+impl Quantity {
+    /// Its name in files, such as `gyro.scale.x` or `gyro.noise.x`.
+    pub fn name(self) -> String {
+        match self {
+            Self::Parameter(index) => {
+                parameter_name(InstallationForm::General, index).unwrap_or_default()
+            }
+            Self::Noise(sensor, axis) => format!("{}.noise.{}", sensor.name(), AXES[axis]),
+        }
+    }
+}
+
+/// A unit's value with its 1σ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Normalised, in SI.
+    pub value: f64,
+    /// Zero where none is claimed.
+    pub sigma: f64,
+}
 
 /// A unit with what came of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +56,7 @@ pub struct Unit {
     pub calibrated: Result<Calibrated, String>,
 }
 
-/// A unit's calibration, with what its run states and shows beside it.
+/// A unit's calibration, with the nominal scales and the noise of its run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibrated {
     /// The calibration.
@@ -28,16 +67,64 @@ pub struct Calibrated {
     pub noise: Option<RestNoise>,
 }
 
-impl Unit {
-    /// Its noise at rest, normalised by these scales in the place of its run's own.
-    pub(super) fn noise(&self, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
-        let calibrated = self.calibrated.as_ref().ok()?;
-        let noise = calibrated.noise?;
-        let density = PerSensor::from_fn(|sensor| {
-            let (own, of_lot) = (calibrated.nominal.get(sensor), nominal.get(sensor).0);
-            let density = noise.density.get(sensor);
-            [0, 1, 2].map(|axis| density[axis] * (own[axis] / of_lot[axis]).abs())
+/// A unit's noise at rest, normalised by these scales in the place of its run's own.
+pub fn noise_at_rest(unit: &Unit, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
+    let calibrated = unit.calibrated.as_ref().ok()?;
+    let mut noise = calibrated.noise?;
+    for (sensor, axis) in axes() {
+        let (own, of_lot) = (calibrated.nominal.get(sensor), nominal.get(sensor).0);
+        noise.density.get_mut(sensor)[axis] *= (own[axis] / of_lot[axis]).abs();
+    }
+    Some(noise)
+}
+
+/// A unit in the lot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The unit.
+    pub unit: Unit,
+    /// Its calibration as the lot's are compared, or why there is none to be used.
+    pub canonical: Result<Canonical, String>,
+    /// Its noise at rest, by the lot's nominal scales; none if no dwell is long enough.
+    pub noise: Option<RestNoise>,
+    /// Each limit that concerns it.
+    pub checks: Vec<Check>,
+    /// What all checks come to; none without a specification.
+    pub verdict: Option<Verdict>,
+}
+
+impl Row {
+    /// The nominal scale that its run states farthest from the lot's: triad, axis and by which part; `None` if
+    /// they differ by rounding alone.
+    pub fn nominal_off(&self, lot: &PerSensor<Nominal>) -> Option<(Sensor, usize, f64)> {
+        const ROUNDING: f64 = 1e-12;
+        let own = &self.unit.calibrated.as_ref().ok()?.nominal;
+        let off = axes().map(|(sensor, axis)| {
+            let part = own.get(sensor)[axis] / lot.get(sensor).0[axis] - 1.0;
+            (sensor, axis, part)
         });
-        Some(RestNoise { density, ..noise })
+        off.filter(|off| off.2.abs() > ROUNDING)
+            .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
+    }
+
+    /// A quantity of the unit.
+    pub fn sample(&self, quantity: Quantity) -> Option<Sample> {
+        let canonical = self.canonical.as_ref().ok()?;
+        match quantity {
+            Quantity::Parameter(index) => {
+                let sigma = canonical.sigma().map_or(0.0, |sigma| sigma[index]);
+                let value = canonical.vector()[index];
+                // A parameter without σ beside others that have one was not estimated.
+                (sigma > 0.0 || canonical.covariance.is_none()).then_some(Sample { value, sigma })
+            }
+            Quantity::Noise(sensor, axis) => {
+                let noise = self.noise.as_ref()?;
+                let density = noise.density.get(sensor)[axis];
+                (density > 0.0).then(|| Sample {
+                    value: density.ln(),
+                    sigma: noise.relative_sigma(),
+                })
+            }
+        }
     }
 }

@@ -9,8 +9,18 @@ pub struct Curve {
     pub variance: Vec<f64>,
 }
 
-/// Samples that the longest cluster is shorter than, as a part of all: with fewer than four clusters
-/// nothing can be said.
+/// The mean of the Allan variances of several curves at the same cluster times.
+pub fn mean(curves: &[&Curve]) -> Curve {
+    let tau = curves.first().map_or_else(Vec::new, |of| of.tau.clone());
+    let at = |point: usize| curves.iter().map(|of| of.variance[point]).sum::<f64>();
+    let variance = (0..tau.len()).map(|point| at(point) / curves.len() as f64);
+    Curve {
+        variance: variance.collect(),
+        tau,
+    }
+}
+
+/// A record has at least this many clusters: fewer show nothing.
 const FEWEST_CLUSTERS: usize = 4;
 
 /// Lengths of clusters in samples: two in an octave, from one sample to a quarter of the record.
@@ -33,29 +43,23 @@ pub fn overlapping(increments: impl Iterator<Item = f64>, period: f64, sizes: &[
     let increments: Vec<f64> = increments.collect();
     let mean = increments.iter().sum::<f64>() / increments.len().max(1) as f64;
     // An even rate changes no second difference, but gravity would cost digits.
-    let mut integral = Vec::with_capacity(increments.len() + 1);
-    let mut sum = 0.0;
-    integral.push(sum);
-    for increment in increments {
-        sum += increment - mean;
-        integral.push(sum);
-    }
-    let (mut tau, mut variance) = (Vec::new(), Vec::new());
-    for &size in sizes {
-        if size == 0 || integral.len() <= 2 * size {
-            continue;
-        }
-        let differences = integral
-            .iter()
-            .zip(&integral[size..])
-            .zip(&integral[2 * size..])
-            .map(|((first, second), third)| third - 2.0 * second + first);
-        let count = integral.len() - 2 * size;
-        let mean_square = differences.map(|d| d * d).sum::<f64>() / count as f64;
+    let rises = increments.iter().scan(0.0, |sum, increment| {
+        *sum += increment - mean;
+        Some(*sum)
+    });
+    let integral: Vec<f64> = std::iter::once(0.0).chain(rises).collect();
+    let point = |&size: &usize| {
         let time = size as f64 * period;
-        tau.push(time);
-        variance.push(mean_square / (2.0 * time * time));
-    }
+        let count = integral
+            .len()
+            .checked_sub(2 * size)
+            .filter(|count| *count > 0)?;
+        let places = integral.windows(2 * size + 1);
+        let squares = places.map(|w| (w[2 * size] - 2.0 * w[size] + w[0]).powi(2));
+        let mean_square = squares.sum::<f64>() / count as f64;
+        (size > 0).then(|| (time, mean_square / (2.0 * time * time)))
+    };
+    let (tau, variance) = sizes.iter().filter_map(point).unzip();
     Curve { tau, variance }
 }
 

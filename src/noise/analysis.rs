@@ -1,21 +1,152 @@
-//! The noise of a standing instrument: every axis, and each triad as a whole.
+//! The stretch of a run that is examined, and its noise.
 
-use nalgebra::Vector3;
+use std::ops::Range;
 
-use super::allan::{Curve, cluster_sizes, overlapping};
-use super::identify::{Clusters, Found, Hidden, Identified, mean, of_kind};
-use super::process::Process;
-use super::standing::Stretch;
-use crate::imu::{GaussMarkov, Noise, PerSensor, Sensor};
+use super::clusters::Clusters;
+use super::triad::TriadNoise;
+use crate::imu::PerSensor;
+use crate::recording::Segment;
 use crate::run::Run;
-use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
-/// Neighbouring samples that differ by more than this many σ are no noise.
-const KNOCK: f64 = 8.0;
-/// What varies by less than this part of itself is rounding.
-const ROUNDING: f64 = 1e-9;
+/// Part of a stretch that must lie in one standstill.
+const STANDING: f64 = 0.95;
+/// Fewer samples show no slope.
+const FEWEST: usize = 256;
 
-/// What a record's standing shows of its noise.
+/// A stretch of samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// Its samples.
+    pub samples: Range<usize>,
+    /// Which it is, such as `the whole record`.
+    pub name: String,
+    /// Whether the instrument stands during it, as far as it says.
+    pub stands: bool,
+}
+
+/// No stretch to examine.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StretchError {
+    /// The label is not among the segments.
+    #[error("no segment is labelled `{label}`; {}", known(labels))]
+    UnknownLabel {
+        /// As asked for.
+        label: String,
+        /// All that there are.
+        labels: Vec<String>,
+    },
+    /// Nothing stands.
+    #[error(
+        "found no standstill in the record, expected one of minutes or better hours: let the instrument \
+         stand undisturbed, or name a section of it with --segment"
+    )]
+    NoStandstill,
+    /// Too few samples.
+    #[error(
+        "{name} has {found} samples, expected at least {FEWEST}, and for bias instability some minutes to \
+         hours: record longer standing still"
+    )]
+    TooShort {
+        /// Which stretch.
+        name: String,
+        /// Its samples.
+        found: usize,
+    },
+}
+
+fn known(labels: &[String]) -> String {
+    if labels.is_empty() {
+        return "the run has no [segments]: leave --segment out, or add them to run.toml"
+            .to_owned();
+    }
+    let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
+    quoted.dedup();
+    format!("there are {}", quoted.join(", "))
+}
+
+impl Stretch {
+    /// The longest segment of this label; without a label the longest standstill, or the longest segment
+    /// where the record is not continuous.
+    ///
+    /// # Errors
+    /// [`StretchError`] if there is none, or if it is too short.
+    pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {
+        let segments = &run.recording.segments;
+        let stretch = match label {
+            Some(label) => Self::labelled(run, label)?,
+            None if !run.recording.imu.continuous && !segments.is_empty() => segments
+                .iter()
+                .map(|segment| Self::of_segment(run, segment, "the longest static segment,"))
+                .filter(|stretch| stretch.stands)
+                .max_by_key(|stretch| stretch.samples.len())
+                .ok_or(StretchError::NoStandstill)?,
+            None => Self::standstill(run).ok_or(StretchError::NoStandstill)?,
+        };
+        match stretch.samples.len() {
+            found if found < FEWEST => Err(StretchError::TooShort {
+                name: stretch.name,
+                found,
+            }),
+            _ => Ok(stretch),
+        }
+    }
+
+    fn labelled(run: &Run, label: &str) -> Result<Self, StretchError> {
+        let of_label = || run.recording.segments.iter().filter(|s| s.label == label);
+        let length = |segment: &Segment| segment.end - segment.start;
+        let longest = of_label().max_by(|a, b| length(a).total_cmp(&length(b)));
+        let Some(segment) = longest else {
+            return Err(StretchError::UnknownLabel {
+                label: label.to_owned(),
+                labels: run.recording.labels(),
+            });
+        };
+        let which = match of_label().count() {
+            1 => "segment".to_owned(),
+            count => format!("the longest of {count} segments"),
+        };
+        Ok(Self::of_segment(run, segment, &which))
+    }
+
+    fn standstill(run: &Run) -> Option<Self> {
+        let dwells = run.dwells(run.aiding()).into_iter();
+        let samples = dwells
+            .map(|of| of.samples)
+            .max_by_key(ExactSizeIterator::len)?;
+        let name = if samples.len() == run.recording.imu.len() {
+            "the whole record".to_owned()
+        } else {
+            format!("the longest standstill, {}", times(run, &samples))
+        };
+        Some(Self {
+            samples,
+            name,
+            stands: true,
+        })
+    }
+
+    fn of_segment(run: &Run, segment: &Segment, which: &str) -> Self {
+        let samples = segment.samples.clone();
+        let needed = STANDING * samples.len() as f64;
+        let stands = run.dwells(run.aiding()).iter().any(|dwell| {
+            let begin = samples.start.max(dwell.samples.start);
+            let end = samples.end.min(dwell.samples.end);
+            end.saturating_sub(begin) as f64 >= needed
+        });
+        Self {
+            name: format!("{which} `{}`, {}", segment.label, times(run, &samples)),
+            samples,
+            stands,
+        }
+    }
+}
+
+fn times(run: &Run, samples: &Range<usize>) -> String {
+    let at = |sample| run.recording.imu.time(sample);
+    format!("{:.1} s to {:.1} s", at(samples.start), at(samples.end))
+}
+
+/// The noise of an instrument at rest, over one stretch of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseAnalysis {
     /// What was examined.
@@ -28,54 +159,18 @@ pub struct NoiseAnalysis {
     pub triads: PerSensor<TriadNoise>,
 }
 
-/// The noise of a triad.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TriadNoise {
-    /// x, y, z.
-    pub axes: [AxisNoise; 3],
-    /// The mean of the Allan variances of all axes that vary, and what it shows: where they are alike it
-    /// sees more than each alone. What all axes show lies within what they show.
-    pub mean: AxisNoise,
-}
-
-/// The noise of one axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AxisNoise {
-    /// Its Allan variance.
-    pub curve: Curve,
-    /// What it shows; none if samples do not vary at all.
-    pub identified: Option<Identified>,
-    /// Samples that jump farther than noise does.
-    pub knocks: usize,
-    /// Whether its samples do not vary but for rounding.
-    pub is_constant: bool,
-}
-
-/// Noise figures for a run, and where they come from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NoiseFigures {
-    /// As `[imu.noise]` has them.
-    pub noise: Noise,
-    /// Whether the random walk is a limit only: its slope was not found.
-    pub random_walk_is_limit: bool,
-    /// Whether the curve does not show the end of the correlation: a longer one would do as well.
-    pub correlation_is_open: bool,
-}
-
 impl NoiseAnalysis {
     /// Examines a stretch of a run.
     pub fn new(run: &Run, stretch: Stretch) -> Self {
-        let period = run.recording.imu.period;
-        let sizes = cluster_sizes(stretch.samples.len());
-        let clusters = Clusters::new(stretch.samples.len(), period, sizes);
+        let imu = &run.recording.imu;
+        let clusters = Clusters::new(stretch.samples.len(), imu.period);
         let triads = PerSensor::from_fn(|sensor| {
-            let all = run.recording.imu.of(sensor);
-            let samples = all.part(stretch.samples.clone());
-            TriadNoise::new(&samples, period, &clusters)
+            let samples = imu.of(sensor).part(stretch.samples.clone());
+            TriadNoise::new(&samples, imu.period, &clusters)
         });
         Self {
-            period,
-            pulse: run.recording.imu.pulse,
+            period: imu.period,
+            pulse: imu.pulse,
             triads,
             stretch,
         }
@@ -85,128 +180,4 @@ impl NoiseAnalysis {
     pub fn duration(&self) -> f64 {
         self.stretch.samples.len() as f64 * self.period
     }
-
-    /// What a run should state of a triad; none if nothing was found.
-    pub fn figures(&self, sensor: Sensor) -> Option<NoiseFigures> {
-        self.triads.get(sensor).figures()
-    }
-}
-
-impl TriadNoise {
-    /// Of integrals over samples of `period` s, at rest.
-    pub(crate) fn new(samples: &[Vector3<f64>], period: f64, clusters: &Clusters) -> Self {
-        let axes = [0, 1, 2].map(|axis| {
-            let values = || samples.iter().map(|sample| sample[axis]);
-            let curve = overlapping(values(), period, clusters.sizes());
-            let is_constant = is_constant(values(), &curve);
-            AxisNoise {
-                identified: if is_constant {
-                    None
-                } else {
-                    clusters.identify(&[&curve])
-                },
-                knocks: knocks(values()),
-                curve,
-                is_constant,
-            }
-        });
-        let varying: Vec<&AxisNoise> = axes.iter().filter(|axis| !axis.is_constant).collect();
-        let identified: Option<Vec<&Identified>> = varying
-            .iter()
-            .map(|axis| axis.identified.as_ref())
-            .collect();
-        let varying: Vec<&Curve> = varying.iter().map(|axis| &axis.curve).collect();
-        let mean = AxisNoise {
-            identified: clusters
-                .identify(&varying)
-                .map(|of| of.within(&identified.unwrap_or_default())),
-            knocks: axes.iter().map(|axis| axis.knocks).sum(),
-            is_constant: varying.is_empty(),
-            curve: if varying.is_empty() {
-                axes[0].curve.clone()
-            } else {
-                mean(&varying)
-            },
-        };
-        Self { axes, mean }
-    }
-
-    /// What a run should state of it; none if nothing was found.
-    pub fn figures(&self) -> Option<NoiseFigures> {
-        let mean = &self.mean;
-        let identified = mean.identified.as_ref()?;
-        let white = of_kind(&identified.for_filter, Process::RandomWalk);
-        let limit = || {
-            let mut hidden = identified.hidden.iter();
-            hidden.find(|h| h.process == Process::RandomWalk)
-        };
-        let random_walk = white
-            .map(|found| found.strength)
-            .or(limit().map(|h| h.limit))?;
-        let longest = mean.curve.tau.last().copied().unwrap_or_default();
-        let gauss_markov = identified
-            .for_filter
-            .iter()
-            .find_map(|found| match found.process {
-                Process::GaussMarkov { correlation_time } => Some(GaussMarkov {
-                    sigma: found.strength,
-                    correlation_time,
-                }),
-                _ => None,
-            });
-        Some(NoiseFigures {
-            noise: Noise {
-                random_walk,
-                gauss_markov,
-            },
-            random_walk_is_limit: white.is_none(),
-            // The hump of its Allan deviation is at 1.89 correlation times.
-            correlation_is_open: gauss_markov
-                .is_some_and(|gauss_markov| 1.89 * gauss_markov.correlation_time > longest),
-        })
-    }
-}
-
-impl AxisNoise {
-    /// The processes found.
-    pub fn found(&self) -> &[Found] {
-        self.identified.as_ref().map_or(&[], |of| &of.found)
-    }
-
-    /// The slopes not found.
-    pub fn hidden(&self) -> &[Hidden] {
-        self.identified.as_ref().map_or(&[], |of| &of.hidden)
-    }
-
-    /// Lowest Allan deviation with its cluster time, if it is not the last: what is read off a curve as
-    /// bias instability.
-    pub fn minimum(&self) -> Option<(f64, f64)> {
-        let Curve { tau, variance } = &self.curve;
-        let points = tau.iter().zip(variance);
-        let (time, lowest) = points.min_by(|a, b| a.1.total_cmp(b.1))?;
-        (tau.last() != Some(time)).then(|| (*time, lowest.sqrt()))
-    }
-}
-
-/// Whether increments vary by rounding alone.
-fn is_constant(values: impl Iterator<Item = f64>, curve: &Curve) -> bool {
-    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), v| (sum + v, count + 1));
-    let mean = (sum / count.max(1) as f64).abs();
-    match (curve.tau.first(), curve.variance.first()) {
-        (Some(tau), Some(variance)) => variance.sqrt() * tau <= ROUNDING * mean,
-        _ => true,
-    }
-}
-
-/// How many times neighbouring samples differ by what is no noise.
-fn knocks(values: impl Iterator<Item = f64>) -> usize {
-    let values: Vec<f64> = values.collect();
-    let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    let median = median(&mut steps).unwrap_or(0.0);
-    // Where most samples are equal the steps are those of quantisation.
-    let limit = KNOCK * SIGMA_OF_MEDIAN * median;
-    steps
-        .iter()
-        .filter(|step| median > 0.0 && **step > limit)
-        .count()
 }

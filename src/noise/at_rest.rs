@@ -32,12 +32,8 @@ impl RestNoise {
         let freedoms: Vec<f64> = used.iter().map(|d| freedom(d.len(), size)).collect();
         let freedom: f64 = freedoms.iter().sum();
         let density = |sensor: Sensor, axis: usize| {
-            let increments = match sensor {
-                Sensor::Gyro => &imu.gyro,
-                Sensor::Accel => &imu.accel,
-            };
             let variances = used.iter().zip(&freedoms).map(|(dwell, weight)| {
-                let of_dwell = increments.within((*dwell).clone()).map(|v| v[axis]);
+                let of_dwell = imu.of(sensor).within((*dwell).clone()).map(|v| v[axis]);
                 let curve = overlapping(of_dwell, imu.period, &[size]);
                 weight * curve.variance.first().copied().unwrap_or_default()
             });

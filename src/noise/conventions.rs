@@ -1,19 +1,20 @@
 //! The conventions in which noise figures are stated, and who uses which.
 //!
-//! One table of units drives every conversion: each says what one of it is in SI. Densities are
-//! two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that rate.
-//! Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
+//! Each row of the table is a unit: what one of it is in SI, and how the figure follows from the strength of the
+//! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
+//! rate. Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
 
-mod table;
+use Scale::{Increments, Linear, Power, Samples};
 
 use crate::imu::Sensor;
-
-use table::QUANTITIES;
+use crate::units::{
+    ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MILLIGAL, STANDARD_GRAVITY,
+};
 
 /// How a figure follows from the strength of a process in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
-    /// As so many of this unit.
+    /// As a multiple of this unit.
     Linear(f64),
     /// As the square, with the unit of its root.
     Power(f64),
@@ -24,26 +25,22 @@ enum Scale {
 }
 
 impl Scale {
-    fn needs_rate(self) -> bool {
-        matches!(self, Self::Samples(_) | Self::Increments(_))
-    }
-
     /// The strength in SI; none without a rate that is needed.
     fn strength(self, value: f64, rate: Option<f64>) -> Option<f64> {
         Some(match self {
-            Self::Linear(unit) => value * unit,
-            Self::Power(unit) => value.sqrt() * unit,
-            Self::Samples(unit) => value * unit / rate?.sqrt(),
-            Self::Increments(unit) => value * unit * rate?.sqrt(),
+            Linear(unit) => value * unit,
+            Power(unit) => value.sqrt() * unit,
+            Samples(unit) => value * unit / rate?.sqrt(),
+            Increments(unit) => value * unit * rate?.sqrt(),
         })
     }
 
     fn value(self, strength: f64, rate: Option<f64>) -> Option<f64> {
         Some(match self {
-            Self::Linear(unit) => strength / unit,
-            Self::Power(unit) => (strength / unit).powi(2),
-            Self::Samples(unit) => strength / unit * rate?.sqrt(),
-            Self::Increments(unit) => strength / unit / rate?.sqrt(),
+            Linear(unit) => strength / unit,
+            Power(unit) => (strength / unit).powi(2),
+            Samples(unit) => strength / unit * rate?.sqrt(),
+            Increments(unit) => strength / unit / rate?.sqrt(),
         })
     }
 }
@@ -59,11 +56,103 @@ struct Quantity {
 struct Convention {
     unit: &'static str,
     scale: Scale,
-    /// What it is called, and by whom.
+    /// What it is called, and by whom. Keys of programs, in backticks, name the unit, too.
     meaning: &'static str,
-    /// Other names for it, normalised.
+    /// Other ways to write the unit, normalised.
     also: &'static [&'static str],
 }
+
+const fn row(
+    unit: &'static str,
+    scale: Scale,
+    meaning: &'static str,
+    also: &'static [&'static str],
+) -> Convention {
+    Convention {
+        unit,
+        scale,
+        meaning,
+        also,
+    }
+}
+
+/// √3600: from the root of a second to that of an hour.
+const SQRT_H: f64 = 60.0;
+/// Floor of the Allan deviation of flicker noise over its coefficient, √(2 ln 2 / π).
+const FLOOR: f64 = 0.664_282;
+/// 1σ of the Gauss–Markov process whose Allan deviation peaks (at 0.617 σ) at that floor, over the
+/// coefficient.
+const MARKOV: f64 = FLOOR / 0.617_362;
+
+/// Every unit of every quantity. A unit that means several things means the first of them that can be.
+#[rustfmt::skip]
+static QUANTITIES: [Quantity; 6] = [
+    Quantity { sensor: Sensor::Gyro, name: "angle random walk", conventions: &[
+        row("°/√h", Linear(DEG_PER_SQRT_H), "angle random walk: data sheets, turncal, PSINS `web`, KF-GINS `arw`",
+            &["angle_random_walk_deg_per_sqrt_h"]),
+        row("°/h/√Hz", Linear(DEG_PER_H), "rate noise density: data sheets of optical gyros", &[]),
+        row("°/s/√Hz", Linear(DEGREE), "rate noise density: data sheets of MEMS gyros", &[]),
+        row("m°/s/√Hz", Linear(1e-3 * DEGREE), "rate noise density (mdps/√Hz): data sheets of MEMS gyros", &[]),
+        row("rad/s/√Hz", Linear(1.0), "rate noise density: Kalibr `gyroscope_noise_density`", &["rad/sqrts"]),
+        row("″/√s", Linear(ARCSEC), "angle random walk in a second", &[]),
+        row("rad²/s", Power(1.0), "power spectral density (rad/s)²/Hz, two-sided: Q of a Kalman filter, GTSAM",
+            &["rad/s2/hz", "rad2/s2/hz"]),
+        row("°²/h", Power(DEG_PER_SQRT_H), "angle variance in an hour", &[]),
+        row("rad/s", Samples(1.0), "1σ of each rate sample", &[]),
+        row("°/s", Samples(DEGREE), "1σ of each rate sample", &[]),
+        row("°/h", Samples(DEG_PER_H), "1σ of each rate sample", &[]),
+        row("rad", Increments(1.0), "1σ of each angle increment", &[]),
+        row("″", Increments(ARCSEC), "1σ of each angle increment", &[]),
+    ] },
+    Quantity { sensor: Sensor::Accel, name: "velocity random walk", conventions: &[
+        row("µg/√Hz", Linear(MICRO_G), "noise density: data sheets, turncal, PSINS `wdb`",
+            &["velocity_random_walk_ug_per_sqrt_hz"]),
+        row("mg/√Hz", Linear(1e3 * MICRO_G), "noise density: data sheets", &[]),
+        row("m/s²/√Hz", Linear(1.0), "noise density: Kalibr `accelerometer_noise_density`; m/s/√s", &["m/s/sqrts"]),
+        row("m/s/√h", Linear(1.0 / SQRT_H), "velocity random walk: data sheets, KF-GINS `vrw`", &[]),
+        row("g/√Hz", Linear(STANDARD_GRAVITY), "noise density: data sheets", &[]),
+        row("m²/s³", Power(1.0), "power spectral density (m/s²)²/Hz, two-sided: Q of a Kalman filter, GTSAM",
+            &["m/s22/hz", "m2/s4/hz"]),
+        row("m/s²", Samples(1.0), "1σ of each sample", &[]),
+        row("mg", Samples(1e3 * MICRO_G), "1σ of each sample", &[]),
+        row("µg", Samples(MICRO_G), "1σ of each sample", &[]),
+        row("mGal", Samples(MILLIGAL), "1σ of each sample", &[]),
+        row("m/s", Increments(1.0), "1σ of each velocity increment", &[]),
+    ] },
+    Quantity { sensor: Sensor::Gyro, name: "gyro rate random walk", conventions: &[
+        row("°/h/√h", Linear(DEG_PER_H / SQRT_H), "rate random walk: IEEE Std 952", &["deg/h1.5", "deg/h3/2"]),
+        row("°/h/√s", Linear(DEG_PER_H), "rate random walk in a second", &[]),
+        row("rad/s²/√Hz", Linear(1.0), "Kalibr `gyroscope_random_walk`; rad/s/√s", &["rad/s/sqrts"]),
+        row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk in an hour", &[]),
+        row("rad²/s³", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
+    ] },
+    Quantity { sensor: Sensor::Accel, name: "accelerometer bias random walk", conventions: &[
+        row("µg/√h", Linear(MICRO_G / SQRT_H), "acceleration random walk: IEEE Std 1293", &[]),
+        row("µg/√s", Linear(MICRO_G), "acceleration random walk in a second", &[]),
+        row("m/s³/√Hz", Linear(1.0), "Kalibr `accelerometer_random_walk`; m/s²/√s", &["m/s2/sqrts"]),
+        row("m²/s⁵", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
+    ] },
+    Quantity { sensor: Sensor::Gyro, name: "gyro bias instability", conventions: &[
+        row("°/h", Linear(DEG_PER_H), "coefficient B: IEEE Std 952, many data sheets", &[]),
+        row("°/s", Linear(DEGREE), "coefficient B: data sheets of MEMS gyros", &[]),
+        row("rad/s", Linear(1.0), "coefficient B", &[]),
+        row("°/h floor", Linear(DEG_PER_H / FLOOR), "minimum of the Allan deviation, 0.664 B: other data sheets",
+            &["floor_deg/h"]),
+        row("°/h Gauss–Markov", Linear(DEG_PER_H / MARKOV), "1σ whose Allan deviation peaks at that minimum: \
+            turncal `gyro_gauss_markov_sigma_deg_per_h`, KF-GINS `gbstd`", &[]),
+        row("rad/s Gauss–Markov", Linear(1.0 / MARKOV), "the same 1σ in SI", &[]),
+    ] },
+    Quantity { sensor: Sensor::Accel, name: "accelerometer bias instability", conventions: &[
+        row("µg", Linear(MICRO_G), "coefficient B: IEEE Std 1293, many data sheets", &[]),
+        row("mg", Linear(1e3 * MICRO_G), "coefficient B: data sheets", &[]),
+        row("m/s²", Linear(1.0), "coefficient B", &[]),
+        row("µg floor", Linear(MICRO_G / FLOOR), "minimum of the Allan deviation, 0.664 B: other data sheets",
+            &["floor_ug"]),
+        row("µg Gauss–Markov", Linear(MICRO_G / MARKOV), "1σ whose Allan deviation peaks at that minimum: \
+            turncal `accel_gauss_markov_sigma_ug`", &[]),
+        row("mGal Gauss–Markov", Linear(MILLIGAL / MARKOV), "the same 1σ: KF-GINS `abstd`", &["mgal"]),
+    ] },
+];
 
 /// A noise figure in every convention.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,109 +213,81 @@ pub enum ConversionError {
 /// [`ConversionError`] if the unit is not known, or needs a rate.
 pub fn convert(value: f64, unit: &str, rate: Option<f64>) -> Result<Conversion, ConversionError> {
     let wanted = normalised(unit);
-    let matching = || {
-        QUANTITIES.iter().flat_map(|quantity| {
-            let all = quantity.conventions.iter();
-            all.filter(|convention| convention.names().any(|name| name == wanted))
-                .map(move |convention| (quantity, convention))
-        })
-    };
-    let usable = matching().find_map(|(quantity, convention)| {
-        let strength = convention.scale.strength(value, rate)?;
-        Some((quantity, convention, strength))
-    });
-    let Some((quantity, convention, strength)) = usable else {
+    let matching = || all().filter(|(_, row)| row.names().any(|name| name == wanted));
+    let usable = matching()
+        .find_map(|(quantity, row)| Some((quantity, row, row.scale.strength(value, rate)?)));
+    let Some((quantity, given, strength)) = usable else {
         let unit = unit.to_owned();
         return Err(match matching().next() {
             Some(_) => ConversionError::NoRate { unit },
             None => ConversionError::Unknown { unit },
         });
     };
-    let line = |value, convention: &Convention| Line {
+    let line = |row: &Convention, value| Line {
         value,
-        unit: convention.unit,
-        meaning: convention.meaning,
+        unit: row.unit,
+        meaning: row.meaning,
     };
+    let rows = quantity.conventions.iter();
     Ok(Conversion {
         sensor: quantity.sensor,
         quantity: quantity.name,
-        given: line(value, convention),
+        given: line(given, value),
         rate,
-        lines: quantity
-            .conventions
-            .iter()
-            .filter_map(|c| Some(line(c.scale.value(strength, rate)?, c)))
+        lines: rows
+            .filter_map(|row| Some(line(row, row.scale.value(strength, rate)?)))
             .collect(),
     })
 }
 
+fn all() -> impl Iterator<Item = (&'static Quantity, &'static Convention)> {
+    let quantities = QUANTITIES.iter();
+    quantities.flat_map(|quantity| quantity.conventions.iter().map(move |row| (quantity, row)))
+}
+
 impl Convention {
+    /// Every name that is accepted, normalised.
     fn names(&self) -> impl Iterator<Item = String> {
-        let also = self.also.iter().map(|name| (*name).to_owned());
-        std::iter::once(normalised(self.unit)).chain(also)
+        let keys = self.meaning.split('`').skip(1).step_by(2);
+        let names = keys.chain(self.also.iter().copied()).map(str::to_owned);
+        std::iter::once(normalised(self.unit)).chain(names)
     }
 }
 
-/// A unit in the one way that all its ways of writing come down to.
+/// A unit in the one spelling that stands for all of its spellings.
 fn normalised(unit: &str) -> String {
-    const SAME: [(&str, &str); 15] = [
-        ("µ", "u"),
-        ("μ", "u"),
-        ("°", "deg"),
-        ("″", "arcsec"),
-        ("√", "sqrt"),
-        ("²", "2"),
-        ("³", "3"),
-        ("⁵", "5"),
-        ("–", "-"),
-        ("^", ""),
-        ("(", ""),
-        (")", ""),
-        (" ", ""),
-        ("dps", "deg/s"),
-        ("hr", "h"),
-    ];
-    let mut text = unit.to_lowercase();
-    for (from, to) in SAME {
-        text = text.replace(from, to);
-    }
-    text
+    const SAME: &str = "µ=u μ=u °=deg ″=arcsec √=sqrt ²=2 ³=3 ⁵=5 –=- dps=deg/s hr=h";
+    let text = unit.to_lowercase().replace(['^', '(', ')', ' '], "");
+    let pairs = SAME.split(' ').filter_map(|pair| pair.split_once('='));
+    pairs.fold(text, |text, (from, to)| text.replace(from, to))
 }
 
 fn hint(unit: &str) -> String {
     let wanted = normalised(unit);
-    let all = QUANTITIES.iter().flat_map(|quantity| quantity.conventions);
-    let likeness = |convention: &Convention| {
-        let names = convention.names();
+    let likeness = |row: &Convention| {
+        let names = row.names();
         names
             .map(|name| strsim::normalized_damerau_levenshtein(&wanted, &name))
             .fold(0.0, f64::max)
     };
-    let nearest = all
-        .map(|convention| (likeness(convention), convention.unit))
+    all()
+        .map(|(_, row)| (likeness(row), row.unit))
         .filter(|(likeness, _)| *likeness >= 0.6)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    nearest.map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
 }
 
 /// All units, a line for each quantity.
 pub fn known() -> String {
-    let lines = QUANTITIES.iter().map(|quantity| {
-        let mut units: Vec<String> = Vec::new();
-        for convention in quantity.conventions {
-            let rate = if convention.scale.needs_rate() {
-                " (with --rate)"
-            } else {
-                ""
-            };
-            let unit = format!("{}{rate}", convention.unit);
-            if !units.contains(&unit) {
-                units.push(unit);
-            }
-        }
+    let unit = |row: &Convention| match row.scale.strength(1.0, None) {
+        Some(_) => row.unit.to_owned(),
+        None => format!("{} (with --rate)", row.unit),
+    };
+    let line = |quantity: &Quantity| {
+        let units: Vec<String> = quantity.conventions.iter().map(unit).collect();
         format!("  {}: {}", quantity.name, units.join(", "))
-    });
-    lines.collect::<Vec<_>>().join("\n")
+    };
+    QUANTITIES.each_ref().map(line).join("\n")
 }
 
 #[cfg(test)]

@@ -11,28 +11,13 @@
 //! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least
 //! squares with the covariance of the points).
 
-mod clusters;
-mod search;
-#[cfg(test)]
-mod tests;
-mod triad;
-
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::allan::Curve;
 use super::process::Process;
 
-pub use clusters::Clusters;
-pub(super) use clusters::mean;
-
-/// What each process must raise twice the logarithm of the likelihood by: three standard deviations,
-/// squared.
-const SIGNIFICANT: f64 = 9.0;
-/// What its correlation time must raise it by besides: two, for this only tells which process it is that
-/// varies.
-const TELLS_TIME: f64 = 4.0;
-/// From so many degrees of freedom on a variance is as good as normal.
-const MANY: f64 = 1e4;
+/// With more degrees of freedom than this a variance is as good as normal.
+pub const MANY: f64 = 1e4;
 
 /// A process that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]

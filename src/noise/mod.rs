@@ -5,18 +5,23 @@
 //! from the integrals of the output over each sample. Two-sided conventions: white noise of strength N
 //! has the two-sided power spectral density N², and its integral over t the variance `N² t`.
 
-pub mod allan;
+mod allan;
 mod analysis;
 mod at_rest;
+mod clusters;
 pub mod conventions;
-mod covariance;
 mod fit;
 mod identify;
 mod process;
-mod standing;
+mod search;
+#[cfg(test)]
+mod tests;
+mod triad;
 
-pub use analysis::{AxisNoise, NoiseAnalysis, NoiseFigures, TriadNoise};
+pub use allan::Curve;
+pub use analysis::{NoiseAnalysis, Stretch, StretchError};
 pub use at_rest::RestNoise;
-pub use identify::{Clusters, Found, Hidden, Identified, of_kind};
+pub use clusters::Clusters;
+pub use identify::{Found, Hidden, Identified, of_kind};
 pub use process::Process;
-pub use standing::{Stretch, StretchError};
+pub use triad::{AxisNoise, NoiseFigures, TriadNoise};

@@ -37,9 +37,30 @@ impl Process {
         Self::RateRamp,
     ];
 
+    /// Stands for a Gauss–Markov process of any correlation time.
+    pub const MARKOV: Self = Self::GaussMarkov {
+        correlation_time: 1.0,
+    };
+
     /// Whether both are of one kind, whatever their correlation times.
     pub fn same_kind(self, other: Self) -> bool {
         std::mem::discriminant(&self) == std::mem::discriminant(&other)
+    }
+
+    /// In s, where it has one.
+    pub fn correlation_time(self) -> Option<f64> {
+        match self {
+            Self::GaussMarkov { correlation_time } => Some(correlation_time),
+            _ => None,
+        }
+    }
+
+    /// With its correlation time, if it has one, longer by a factor.
+    pub fn stretched(self, factor: f64) -> Self {
+        self.correlation_time()
+            .map_or(self, |time| Self::GaussMarkov {
+                correlation_time: time * factor,
+            })
     }
 
     /// Allan variance at a cluster time in s, for strength one.
@@ -58,12 +79,13 @@ impl Process {
         }
     }
 
-    /// Generalised autocovariance of the integral at a lag in s, for strength one. Zero for
-    /// quantisation, which has one at lag zero alone, and for the ramp, which has none.
-    pub(super) fn autocovariance(self, lag: f64) -> f64 {
+    /// Generalised autocovariance of the integral at a lag in s, for strength one; zero for the ramp, which is
+    /// not random.
+    pub fn autocovariance(self, lag: f64) -> f64 {
         let t = lag.abs();
         match self {
-            Self::Quantisation | Self::RateRamp => 0.0,
+            Self::Quantisation => f64::from(u8::from(t == 0.0)),
+            Self::RateRamp => 0.0,
             Self::RandomWalk => -t / 2.0,
             Self::BiasInstability if t == 0.0 => 0.0,
             Self::BiasInstability => t * t * t.ln() / (2.0 * PI),
@@ -94,6 +116,7 @@ mod tests {
     fn the_autocovariance_of_every_process_gives_its_allan_variance() {
         let markov = |correlation_time| Process::GaussMarkov { correlation_time };
         for process in [
+            Process::Quantisation,
             Process::RandomWalk,
             Process::BiasInstability,
             Process::RateRandomWalk,

@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use crate::imu::PerSensor;
-use crate::noise::allan::cluster_sizes;
 use crate::noise::{Clusters, NoiseFigures, TriadNoise};
 
 /// Fewer samples show no noise.
@@ -17,7 +16,7 @@ pub(super) fn figures(
     per_second: f64,
 ) -> PerSensor<Option<NoiseFigures>> {
     let count = samples.gyro.len();
-    let clusters = Clusters::new(count, period, cluster_sizes(count));
+    let clusters = Clusters::new(count, period);
     PerSensor::from_fn(|sensor| {
         let rows = samples.get(sensor).iter();
         let increments: Vec<Vector3<f64>> = rows.map(|row| row * per_second * period).collect();

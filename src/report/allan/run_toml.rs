@@ -52,7 +52,7 @@ pub(super) fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
 }
 
 fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
-    let Some(figures) = analysis.figures(sensor) else {
+    let Some(figures) = analysis.triads.get(sensor).figures() else {
         return Vec::new();
     };
     let walk = quantity(Process::RandomWalk, sensor);

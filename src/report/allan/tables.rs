@@ -7,11 +7,6 @@ use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind};
 
-/// In the place of any correlation time.
-const MARKOV: Process = Process::GaussMarkov {
-    correlation_time: 1.0,
-};
-
 /// What was found in a triad: a row for each process, a column for each axis and one for their mean.
 pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     let triad = analysis.triads.get(sensor);
@@ -22,7 +17,7 @@ pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         row
     };
     let mut rows = Vec::new();
-    for process in Process::SLOPES.into_iter().chain([MARKOV]) {
+    for process in Process::SLOPES.into_iter().chain([Process::MARKOV]) {
         let found = |axis: &AxisNoise| of_kind(axis.found(), process).copied();
         let limit = |axis: &AxisNoise| axis.hidden().iter().find(|h| h.process == process).copied();
         let always = Process::SLOPES[..4].contains(&process);
@@ -39,7 +34,7 @@ pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
                 (None, None) => NONE.to_owned(),
             },
         ));
-        if process == MARKOV {
+        if process == Process::MARKOV {
             rows.push(row("Gauss–Markov correlation time", "s", &|axis| {
                 found(axis).map_or(NONE.to_owned(), correlation_time)
             }));

@@ -4,7 +4,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::super::allan::{cluster_sizes, overlapping};
+use super::allan::{Curve, cluster_sizes, overlapping};
+use super::identify::MANY;
+use super::triad::within;
 use super::*;
 
 const PERIOD: f64 = 0.01;
@@ -53,7 +55,7 @@ impl Made {
 }
 
 fn clusters(samples: usize) -> Clusters {
-    Clusters::new(samples, PERIOD, cluster_sizes(samples))
+    Clusters::new(samples, PERIOD)
 }
 
 /// Mean square of (found − true)/σ of one process over seeds, with how often it was found; and how often
@@ -279,7 +281,7 @@ fn pulses(random_walk: f64, pulse: f64, rate: f64, samples: usize, seed: u64) ->
 
 /// In how many of 100 records white noise is found and is within its 95 % interval, and by how much of itself
 /// it is off at most.
-fn within(samples: usize, random_walk: f64, record: impl Fn(u64) -> Vec<f64>) -> (u64, f64) {
+fn accuracy(samples: usize, random_walk: f64, record: impl Fn(u64) -> Vec<f64>) -> (u64, f64) {
     let clusters = clusters(samples);
     let (mut times, mut most) = (0, 0.0);
     for seed in 0..100 {
@@ -300,7 +302,7 @@ fn white_noise_under_pulses_coarser_than_it_is_found_within_its_interval_in_95_o
     let (random_walk, pulse) = (2.909e-7, 4.848e-7);
     for rate in [0.0, 5.3e-5, 7.3e-7] {
         let record = |seed| pulses(random_walk, pulse, rate, 120_000, seed);
-        let (times, most) = within(120_000, random_walk, record);
+        let (times, most) = accuracy(120_000, random_walk, record);
         assert!(times >= 95, "{times} at {rate} rad/s");
         assert!(most < 0.2, "{most} at {rate} rad/s");
     }
@@ -353,7 +355,7 @@ fn filtered(bandwidth: f64, samples: usize, seed: u64) -> Vec<f64> {
 fn a_bandwidth_of_two_poles_leaves_the_white_noise_within_its_interval() {
     for (bandwidth, largest) in [(40.0, 0.03), (10.0, 0.1)] {
         let record = |seed| filtered(bandwidth, 120_000, seed);
-        let (times, most) = within(120_000, 1.0, record);
+        let (times, most) = accuracy(120_000, 1.0, record);
         assert!(
             times >= 93 && most < largest,
             "{times} {most} at {bandwidth} Hz"
@@ -429,11 +431,11 @@ fn a_triads_figure_lies_within_those_of_its_axes() {
         (Some(1.5), mean_square),
         (None, mean_square),
     ] {
-        let held = shows(own).within(&axes.each_ref());
+        let held = within(shows(own), &axes.each_ref());
         assert!((held.found[0].strength - expected).abs() < 1e-12, "{own:?}");
         assert!(held.found.len() == 1 && held.hidden.is_empty());
     }
     // One axis that does not show it says nothing of the others.
-    let held = shows(Some(0.8)).within(&[&axes[0], &axes[1], &shows(None)]);
+    let held = within(shows(Some(0.8)), &[&axes[0], &axes[1], &shows(None)]);
     assert_eq!(held.found[0].strength, 0.8);
 }

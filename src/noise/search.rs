@@ -1,0 +1,442 @@
+//! The search for the most likely combination of processes.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::allan::{Curve, mean};
+use super::clusters::Clusters;
+use super::fit::{Mixture, Weighted, allan_variance};
+use super::identify::{Found, Hidden, Identified, of_kind};
+use super::process::Process;
+
+/// What each process must raise twice the logarithm of the likelihood by: three standard deviations,
+/// squared.
+const SIGNIFICANT: f64 = 9.0;
+/// What its correlation time must raise it by besides: two, for this only shows which process it is that
+/// varies.
+const SIGNIFICANT_TIME: f64 = 4.0;
+/// A fit less probable than this does not describe the curve.
+const IMPROBABLE: f64 = 1e-3;
+/// Where cluster times have to be left out, a start less probable than this is taken only if no later one is
+/// more so: one too late costs little, one too early is wrong.
+const DOUBTFUL: f64 = 0.05;
+/// Cluster times left out in a step: an octave.
+const STEP: usize = 2;
+/// Departure from all models that is looked for, as a part of the Allan variance.
+const MISFITS: (f64, f64) = (1e-3, 10.0);
+/// Rounds of weights and fit.
+const ROUNDS: usize = 5;
+/// Halvings of the step between correlation times tried.
+const REFINEMENTS: usize = 10;
+/// Of a normal distribution, below which 95 % lie.
+const BELOW_95: f64 = 1.645;
+/// Points to either side of one whose scatter counts as its own.
+const NEAR: usize = 3;
+/// The octaves at the short end of a curve, in points, whose departure is looked for by itself.
+const SHORT_ENDS: [usize; 2] = [2, 4];
+/// What a filter models as a Gauss–Markov process.
+const VARYING: [Process; 3] = [
+    Process::BiasInstability,
+    Process::RateRandomWalk,
+    Process::MARKOV,
+];
+
+impl Clusters {
+    /// What the mean of some curves over these clusters shows; `None` if they are of others, too short or
+    /// zero somewhere. Axes that are averaged count as independent.
+    ///
+    /// Pulses coarser than the noise and the bandwidth of a sensor make the deviations at short cluster
+    /// times, and no process describes them: where none does, the shortest ones are left out, up to half of
+    /// all, and one octave more for a remainder just below notice. What no start helps is taken as it is, with
+    /// a misfit.
+    pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
+        if curves
+            .iter()
+            .any(|of| of.variance.len() != self.sizes().len())
+        {
+            return None;
+        }
+        let curve = mean(curves);
+        let varies = |v: &f64| v.is_finite() && *v > 0.0;
+        if curve.tau.len() < 2 || !curve.variance.iter().all(varies) {
+            return None;
+        }
+        let whole = Search {
+            clusters: self,
+            curve: &curve,
+            shares: &shares(curves),
+            first: 0,
+            misfit: 0.0,
+        };
+        let mut doubtful = None;
+        let mut starts = (0..=curve.tau.len() / 2).step_by(STEP);
+        let sound = starts.find_map(|first| {
+            let (found, probability) = whole.from(first).probable()?;
+            if first == 0 || probability > DOUBTFUL {
+                return Some(found);
+            }
+            doubtful = doubtful.take().or(Some(found));
+            None
+        });
+        let Some(sound) = sound.or(doubtful) else {
+            return whole.with_misfit();
+        };
+        let further = (sound.first > 0).then(|| whole.from(sound.first + STEP).probable());
+        Some(further.flatten().map_or(sound, |(found, _)| found))
+    }
+}
+
+/// As how many equal ones the averaged curves count at each cluster time.
+fn shares(curves: &[&Curve]) -> Vec<f64> {
+    let points = curves.iter().map(|curve| curve.variance.len()).min();
+    let share = |point: usize| {
+        let at = || curves.iter().map(|curve| curve.variance[point]);
+        at().sum::<f64>().powi(2) / at().map(|v| v * v).sum::<f64>()
+    };
+    (0..points.unwrap_or(0)).map(share).collect()
+}
+
+/// A curve that is searched.
+#[derive(Clone, Copy)]
+struct Search<'a> {
+    clusters: &'a Clusters,
+    curve: &'a Curve,
+    /// As how many equal curves it counts, at each point.
+    shares: &'a [f64],
+    /// Points at its begin that are left out.
+    first: usize,
+    /// Departure from every model that is allowed for, as a part of the Allan variance.
+    misfit: f64,
+}
+
+/// A mixture and how likely it is.
+#[derive(Clone)]
+struct Candidate {
+    mixture: Mixture,
+    /// Whitened residuals of the cube roots, from the longest cluster time to the shortest.
+    residual: DVector<f64>,
+    /// Minus twice the logarithm of the likelihood, without its constant.
+    unlikelihood: f64,
+}
+
+impl Candidate {
+    fn processes(&self) -> Vec<Process> {
+        self.mixture.iter().map(|(process, _)| *process).collect()
+    }
+
+    fn has_time(&self) -> bool {
+        let mut processes = self.mixture.iter();
+        processes.any(|(process, _)| process.same_kind(Process::MARKOV))
+    }
+
+    fn chi_square(&self) -> f64 {
+        self.residual.norm_squared()
+    }
+
+    fn score(&self) -> f64 {
+        let time = f64::from(u8::from(self.has_time()));
+        self.unlikelihood + SIGNIFICANT * self.mixture.len() as f64 + SIGNIFICANT_TIME * time
+    }
+
+    /// How probable its residuals are.
+    fn probability(&self) -> f64 {
+        let parameters = self.mixture.len() + usize::from(self.has_time());
+        let freedom = self.residual.len().saturating_sub(parameters).max(1);
+        beyond(self.chi_square(), freedom)
+    }
+
+    /// How probable those of an octave or two at the short end are, given the others.
+    fn probability_of_ends(&self) -> f64 {
+        let of_end = |points: usize| {
+            let shortest = self.residual.iter().rev().take(points);
+            beyond(shortest.map(|r| r * r).sum(), points)
+        };
+        SHORT_ENDS.map(of_end).into_iter().fold(1.0, f64::min)
+    }
+}
+
+/// Probability of a larger χ².
+fn beyond(chi_square: f64, freedom: usize) -> f64 {
+    ChiSquared::new(freedom as f64).map_or(0.0, |of| of.sf(chi_square))
+}
+
+impl<'a> Search<'a> {
+    fn from(self, first: usize) -> Self {
+        Self { first, ..self }
+    }
+
+    fn tau(&self) -> &'a [f64] {
+        &self.curve.tau[self.first..]
+    }
+
+    fn variance(&self) -> &'a [f64] {
+        &self.curve.variance[self.first..]
+    }
+
+    /// What it shows, and how probable the residuals of the most likely mixture are: all of them, and those of
+    /// an octave or two at its short end.
+    fn probable(&self) -> Option<(Identified, f64)> {
+        let best = self.most_likely()?;
+        let probability = best.probability().min(best.probability_of_ends());
+        let identified = (probability > IMPROBABLE).then(|| self.identified(best));
+        Some((identified.flatten()?, probability))
+    }
+
+    /// What it shows if all may depart from every model, by as little as makes the most likely one probable.
+    fn with_misfit(self) -> Option<Identified> {
+        let with = |misfit: f64| Self { misfit, ..self };
+        let (mut low, mut high) = MISFITS;
+        let mut best = with(high).most_likely()?;
+        while high / low > 1.1 {
+            let middle = (low * high).sqrt();
+            match with(middle).most_likely() {
+                Some(likely) if likely.probability() > IMPROBABLE => {
+                    (high, best) = (middle, likely)
+                }
+                _ => low = middle,
+            }
+        }
+        with(high).identified(best)
+    }
+
+    fn identified(&self, best: Candidate) -> Option<Identified> {
+        let best = self.refined(best);
+        let weighted = self.weighted(&best.mixture)?;
+        let found = found(&weighted, &best.mixture)?;
+        Some(Identified {
+            hidden: self.hidden(&weighted, &best, &found),
+            found,
+            misfit: self.misfit,
+            first: self.first,
+            freedom: self.degrees(&best.mixture),
+            for_filter: self.for_filter(&best)?,
+        })
+    }
+
+    /// Equivalent degrees of freedom of every point: those of the mixture, and where it does not describe
+    /// the curve no more than neighbouring points show by their scatter.
+    fn degrees(&self, mixture: &[(Process, f64)]) -> Vec<f64> {
+        let mixture = &positive(mixture);
+        let covariance = self.clusters.covariance(mixture);
+        let logarithms: Vec<f64> = self.curve.variance.iter().map(|v| v.ln()).collect();
+        let bends = logarithms.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]);
+        // Of three independent ones it has six times the variance of one.
+        let scatter: Vec<f64> = bends.map(|bend| bend * bend / 6.0).collect();
+        let of_point = |(i, &tau): (usize, &f64)| {
+            let square = allan_variance(mixture, tau).powi(2);
+            let model = 2.0 * self.shares[i] * square / covariance[(i, i)];
+            if i >= self.first && self.misfit == 0.0 {
+                return model;
+            }
+            let near = &scatter[i.saturating_sub(1 + NEAR)..(i + NEAR).min(scatter.len())];
+            model.min(2.0 * near.len().max(1) as f64 / near.iter().sum::<f64>())
+        };
+        self.curve.tau.iter().enumerate().map(of_point).collect()
+    }
+
+    /// The covariance of the points under a mixture, with the departure from every model.
+    fn covariance(&self, mixture: &[(Process, f64)]) -> DMatrix<f64> {
+        let whole = self.clusters.covariance(&positive(mixture));
+        let (tau, share) = (self.tau(), &self.shares[self.first..]);
+        DMatrix::from_fn(tau.len(), tau.len(), |i, j| {
+            let random = whole[(self.first + i, self.first + j)] / (share[i] * share[j]).sqrt();
+            let misfit = if i == j { self.misfit } else { 0.0 };
+            random + (misfit * allan_variance(mixture, tau[i])).powi(2)
+        })
+    }
+
+    fn weighted(&self, mixture: &[(Process, f64)]) -> Option<Weighted<'a>> {
+        Weighted::new(self.tau(), self.variance(), self.covariance(mixture))
+    }
+
+    /// The fit of a combination of processes, weighted by itself; none if one of them is not positive.
+    fn candidate(&self, processes: &[Process]) -> Option<Candidate> {
+        let (tau, variance) = (self.tau(), self.variance());
+        // To begin with every point counts by its length alone.
+        let diagonal = variance.iter().zip(tau).map(|(v, tau)| v * v * tau);
+        let diagonal = DVector::from_iterator(tau.len(), diagonal);
+        let mut covariance = DMatrix::from_diagonal(&diagonal);
+        let mut mixture = Mixture::new();
+        for _ in 0..ROUNDS {
+            mixture = Weighted::new(tau, variance, covariance)?.solve(processes)?;
+            if !self.is_possible(&mixture) {
+                return None;
+            }
+            covariance = self.covariance(&mixture);
+        }
+        self.judged(mixture, &covariance)
+    }
+
+    /// Whether every process of a mixture is there and positive, and so is the whole at every point.
+    fn is_possible(&self, mixture: &[(Process, f64)]) -> bool {
+        let (tau, variance) = (self.tau(), self.variance());
+        let is_there = |&(process, strength): &(Process, f64)| {
+            let share =
+                |(&tau, v): (&f64, &f64)| (strength * process.allan_variance(tau) / v).abs();
+            let most = tau.iter().zip(variance).map(share).fold(0.0, f64::max);
+            // What a bandwidth takes away from the integral of white noise falls with the same slope.
+            most >= 1e-6 && (strength >= 0.0 || process == Process::Quantisation)
+        };
+        // A Gauss–Markov process that is most of the shortest cluster time is no bias, but the output's own noise,
+        // whose bandwidth is less than that of the samples.
+        let varying = mixture.iter().filter(|of| of.0.same_kind(Process::MARKOV));
+        let varying: Mixture = varying.copied().collect();
+        let is_bandwidth = allan_variance(&varying, tau[0]) > 0.5 * allan_variance(mixture, tau[0]);
+        mixture.iter().all(is_there)
+            && tau.iter().all(|&tau| allan_variance(mixture, tau) > 0.0)
+            && !is_bandwidth
+    }
+
+    /// How likely a mixture is, under which the points have this covariance. The cube roots of the variances
+    /// count as normal (Wilson, Hilferty 1931), for at long cluster times they have few degrees of freedom.
+    fn judged(&self, mixture: Mixture, covariance: &DMatrix<f64>) -> Option<Candidate> {
+        let (tau, variance, count) = (self.tau(), self.variance(), self.tau().len());
+        let model: Vec<f64> = tau
+            .iter()
+            .map(|&tau| allan_variance(&mixture, tau))
+            .collect();
+        // The longest cluster times first, so that each adds what those longer than it do not show.
+        let place = |i: usize| count - 1 - i;
+        let residual = DVector::from_fn(count, |i, _| {
+            let i = place(i);
+            // The mean of a cube root is less than the cube root of the mean.
+            let bias = covariance[(i, i)] / (9.0 * model[i] * model[i]);
+            variance[i].cbrt() - model[i].cbrt() * (1.0 - bias)
+        });
+        let slope = |i: usize| model[i].cbrt().powi(-2) / 3.0;
+        let covariance = DMatrix::from_fn(count, count, |i, j| {
+            let (i, j) = (place(i), place(j));
+            covariance[(i, j)] * slope(i) * slope(j)
+        });
+        let root = covariance.cholesky()?;
+        let log_determinant: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        let residual = root.l_dirty().solve_lower_triangular(&residual)?;
+        Some(Candidate {
+            mixture,
+            unlikelihood: residual.norm_squared() + 2.0 * log_determinant,
+            residual,
+        })
+    }
+
+    /// Of all combinations the most likely one by its score.
+    fn most_likely(&self) -> Option<Candidate> {
+        let mut others = Process::SLOPES.to_vec();
+        others.retain(|process| *process != Process::BiasInstability);
+        let all = subsets(&Process::SLOPES).chain(self.with_markov(&others));
+        // Cluster times that are left out leave a tail behind, significant or not.
+        let is_whole = |of: &Vec<Process>| self.first == 0 || of.contains(&Process::Quantisation);
+        self.least(all.filter(is_whole), Candidate::score)
+    }
+
+    /// Of some combinations, among those that fit, the one for which a figure is least.
+    fn least(
+        &self,
+        combinations: impl Iterator<Item = Vec<Process>>,
+        figure: fn(&Candidate) -> f64,
+    ) -> Option<Candidate> {
+        combinations
+            .filter_map(|processes| self.candidate(&processes))
+            .min_by(|a, b| figure(a).total_cmp(&figure(b)))
+    }
+
+    /// Some processes with Gauss–Markov processes of many correlation times.
+    fn with_markov(&self, others: &[Process]) -> impl Iterator<Item = Vec<Process>> {
+        let markov = self.clusters.markov(self.tau()[0]);
+        markov.flat_map(|process| {
+            subsets(others).map(move |mut processes| {
+                processes.push(process);
+                processes
+            })
+        })
+    }
+
+    /// With a correlation time between those tried, if it has one.
+    fn refined(&self, mut best: Candidate) -> Candidate {
+        let shortest = self.clusters.shortest_time(self.tau()[0]);
+        let mut step = std::f64::consts::SQRT_2;
+        let rounds = if best.has_time() { REFINEMENTS } else { 0 };
+        for _ in 0..rounds {
+            step = step.sqrt();
+            for factor in [step.recip(), step] {
+                let processes = best.processes().into_iter().map(|of| of.stretched(factor));
+                let processes: Vec<Process> = processes.collect();
+                let mut times = processes.iter().filter_map(|of| of.correlation_time());
+                if times.all(|time| time >= shortest)
+                    && let Some(tried) = self.candidate(&processes)
+                    && tried.chi_square() < best.chi_square()
+                {
+                    best = tried;
+                }
+            }
+        }
+        best
+    }
+
+    /// Slopes that are not found, each with its upper limit.
+    fn hidden(&self, weighted: &Weighted, best: &Candidate, found: &[Found]) -> Vec<Hidden> {
+        let limit = |process: Process| -> Option<Hidden> {
+            let mut processes = best.processes();
+            processes.retain(|other| *other != process);
+            processes.insert(0, process);
+            let mixture = weighted.solve(&processes)?;
+            let sigma = weighted.covariance(&mixture)?[(0, 0)].sqrt();
+            let limit = (mixture.first()?.1.max(0.0) + BELOW_95 * sigma).sqrt();
+            Some(Hidden { process, limit })
+        };
+        let is_hidden = |process: &Process| match process {
+            Process::RateRamp => false,
+            // What varies with a correlation time has no floor besides.
+            Process::BiasInstability if best.has_time() => false,
+            _ => of_kind(found, *process).is_none(),
+        };
+        let slopes = Process::SLOPES.into_iter();
+        slopes.filter(is_hidden).filter_map(limit).collect()
+    }
+
+    /// With the nearest Gauss–Markov process in the place of whatever varies.
+    fn for_filter(&self, best: &Candidate) -> Option<Vec<Found>> {
+        let is_varying = |process: &Process| VARYING.iter().any(|of| of.same_kind(*process));
+        let (varying, others): (Vec<Process>, Vec<Process>) =
+            best.processes().into_iter().partition(is_varying);
+        let mixture = if varying.is_empty() {
+            best.mixture.clone()
+        } else {
+            let nearest = self.least(self.with_markov(&others), |of| of.unlikelihood)?;
+            self.refined(nearest).mixture
+        };
+        found(&self.weighted(&mixture)?, &mixture)
+    }
+}
+
+/// The processes that are there, without what a bandwidth takes away.
+fn positive(mixture: &[(Process, f64)]) -> Mixture {
+    mixture.iter().copied().filter(|of| of.1 > 0.0).collect()
+}
+
+/// A fit's strengths with their σ.
+fn found(weighted: &Weighted, mixture: &[(Process, f64)]) -> Option<Vec<Found>> {
+    let covariance = weighted.covariance(mixture)?;
+    let sigma = |i: usize| covariance[(i, i)].sqrt();
+    let found = |(i, &(process, squared)): (usize, &(Process, f64))| {
+        let is_there = process != Process::Quantisation || squared > SIGNIFICANT.sqrt() * sigma(i);
+        let strength = squared.sqrt();
+        let time = process.correlation_time();
+        is_there.then(|| Found {
+            process,
+            strength,
+            sigma: sigma(i) / (2.0 * strength),
+            sigma_log_time: time.map(|_| sigma(mixture.len())),
+        })
+    };
+    Some(mixture.iter().enumerate().filter_map(found).collect())
+}
+
+/// Every combination of some processes, none at all included.
+fn subsets(processes: &[Process]) -> impl Iterator<Item = Vec<Process>> + use<> {
+    let processes = processes.to_vec();
+    (0..1u32 << processes.len()).map(move |bits| {
+        let chosen = processes.iter().enumerate();
+        let chosen = chosen.filter(|(i, _)| bits >> i & 1 == 1);
+        chosen.map(|(_, process)| *process).collect()
+    })
+}
