@@ -47,7 +47,7 @@ impl Moments {
         let moment = |&parameter: &usize| {
             Some(TermMoment {
                 parameter,
-                sensor: Term::of(parameter)?.sensor(),
+                sensor: Term::of(parameter)?.entry().sensor,
                 input: Vector3::zeros(),
                 tilt: Vector3::zeros(),
             })
