@@ -1,6 +1,7 @@
 //! Output of an accelerometer with the product of specific force along two axes.
 
-use super::{Columns, Effect, Sensed, TermEntry, accel_second_order};
+use super::accel_second_order;
+use super::entry::{Columns, Effect, Sensed, TermEntry};
 
 /// The two components of specific force that are multiplied, in the order of the parameters.
 const PRODUCTS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];

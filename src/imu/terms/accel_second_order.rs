@@ -1,6 +1,6 @@
 //! Output of an accelerometer with the square of specific force along its axis.
 
-use super::{Effect, TermEntry, per_axis};
+use super::entry::{Effect, TermEntry, per_axis};
 use crate::imu::Sensor;
 use crate::units::{MICRO_G, STANDARD_GRAVITY};
 

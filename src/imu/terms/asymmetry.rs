@@ -1,6 +1,6 @@
 //! Another scale factor for one sign of the input than for the other, of either triad.
 
-use super::{Effect, TermEntry, per_axis};
+use super::entry::{Effect, TermEntry, per_axis};
 use crate::imu::Sensor;
 use crate::units::PPM;
 

@@ -1,6 +1,6 @@
 //! Bias of the gyros with specific force, along and across their axes.
 
-use super::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
 use crate::imu::Sensor;
 use crate::units::{DEG_PER_H, STANDARD_GRAVITY};
 

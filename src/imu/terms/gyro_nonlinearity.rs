@@ -1,7 +1,8 @@
 //! Scale factor of a gyro that changes with the magnitude of its rate: odd in the rate, of second and
 //! third order.
 
-use super::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry, gyro_second_order};
+use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::gyro_second_order;
 
 pub const ENTRY: TermEntry = TermEntry {
     name: "gyro-nonlinearity",

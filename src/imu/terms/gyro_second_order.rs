@@ -1,6 +1,7 @@
 //! Output of a gyro with the square of its rate: even in the rate, as an asymmetry is.
 
-use super::{Effect, REFERENCE_RATE, TermEntry, asymmetry, per_axis};
+use super::asymmetry;
+use super::entry::{Effect, REFERENCE_RATE, TermEntry, per_axis};
 use crate::units::PPM;
 
 pub const ENTRY: TermEntry = TermEntry {

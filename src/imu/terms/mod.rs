@@ -1,19 +1,17 @@
 //! Error terms of an instrument, in addition to `K`, `E` and `D`: each changes what a triad takes for
 //! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
 //!
-//! A term is an [`TermEntry`] in a file of its own and a line of the registry below. Options, files,
+//! A term is a [`TermEntry`] in a file of its own and a line of the registry below. Options, files,
 //! simulation, estimation, budget, report and exports read the entry.
 //!
 //! Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
 //! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
 //! scale factor); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect, time offset).
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-use super::Sensor;
-use crate::units::DEGREE;
-
+mod entry;
 mod sensed;
 
 mod accel_cross_coupling;
@@ -26,67 +24,7 @@ mod gyro_second_order;
 mod size_effect;
 mod time_offset;
 
-pub use sensed::Sensed;
-
-/// Rate at which nonlinearity of the gyros is stated, 100 °/s, in rad/s.
-pub const REFERENCE_RATE: f64 = 100.0 * DEGREE;
-
-/// How a term is called, and what it does.
-pub struct TermEntry {
-    /// The name that files and commands use.
-    pub name: &'static str,
-    /// In tables of reports.
-    pub title: &'static str,
-    /// In the help of commands.
-    pub help: &'static str,
-    /// What a parameter q adds to specific force f or angular rate w.
-    pub adds: &'static str,
-    /// Whose input it changes.
-    pub sensor: Sensor,
-    /// The unit of its parameters in files and reports: its symbol, and its value in SI.
-    pub unit: (&'static str, f64),
-    /// Their SI unit.
-    pub si_unit: &'static str,
-    /// The same as D-SI spells it.
-    pub d_si_unit: &'static str,
-    /// 1σ of each parameter where nothing better is known, in `unit`: ten
-    /// times what precise instruments have.
-    pub usual_sigma: f64,
-    /// A parameter beyond this makes of gravity, or of a turn at [`REFERENCE_RATE`], as much again, as no
-    /// instrument does, in SI.
-    pub largest: f64,
-    /// The names of its parameters in files.
-    pub parameters: &'static [&'static str],
-    effect: Effect,
-}
-
-/// What a term adds to the input of its triad, rad/s or m/s².
-enum Effect {
-    /// In proportion to its parameters: `∂t/∂q`, a column each.
-    Linear(fn(&Sensed, &mut Columns)),
-    /// In another way.
-    Nonlinear {
-        /// `t(q)`.
-        added: fn(&Sensed, &[f64]) -> Vector3<f64>,
-        /// `∂t/∂q` at these parameters, a column each.
-        response: fn(&Sensed, &[f64], &mut Columns),
-    },
-}
-
-/// The columns of a term in a [`TermResponse`].
-type Columns<'a> = nalgebra::MatrixViewMut3xX<'a, f64>;
-
-/// The names of one parameter per axis.
-macro_rules! per_axis {
-    ($stem:literal) => {
-        &[
-            concat!($stem, ".x"),
-            concat!($stem, ".y"),
-            concat!($stem, ".z"),
-        ]
-    };
-}
-use per_axis;
+pub use entry::{REFERENCE_RATE, Sensed, TermEntry};
 
 /// Declares [`Term`] with one line per term, in the order of the parameters.
 macro_rules! registry {

@@ -2,21 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Columns, Effect, Term, TermResponse, TermVector};
+use super::entry::{Columns, Effect, Sensed};
+use super::{Term, TermResponse, TermVector};
 use crate::imu::Sensor;
-
-/// How a body moves in a sample, along body axes.
-#[derive(Debug, Clone, Copy)]
-pub struct Sensed {
-    /// Angular rate against inertial space, rad/s.
-    pub rate: Vector3<f64>,
-    /// Angular rate against the Earth, rad/s.
-    pub rate_over_earth: Vector3<f64>,
-    /// Angular acceleration, rad/s².
-    pub angular_acceleration: Vector3<f64>,
-    /// Specific force, m/s².
-    pub force: Vector3<f64>,
-}
 
 impl Sensed {
     /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².

@@ -1,7 +1,7 @@
 //! Accelerometers that stand apart: x and y stand away from z by lever arms r_x and r_y and sense row i of
 //! `([ω̇×] + [ω×]²) r_i` besides. One lever arm common to all three cannot be told from rest.
 
-use super::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
 use crate::imu::Sensor;
 use crate::units::STANDARD_GRAVITY;
 

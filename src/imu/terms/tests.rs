@@ -1,6 +1,9 @@
 //! Claims of the error terms.
 
+use nalgebra::Vector3;
+
 use super::*;
+use crate::imu::Sensor;
 
 /// With nothing special about it.
 fn any() -> Sensed {

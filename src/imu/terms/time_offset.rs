@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
 use crate::attitude::exp;
 use crate::imu::Sensor;
 

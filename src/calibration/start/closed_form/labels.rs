@@ -5,7 +5,6 @@
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
 //! g-sensitivity.
 
-
 use nalgebra::{DMatrix, Vector3};
 
 use super::both_triads::both_triads;
