@@ -1,5 +1,6 @@
 //! Order statistics, which a few wild values do not move, and what χ² and Student's t stay below.
 
+use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::beta::beta_reg;
 use statrs::statistics::{Data, OrderStatistics};
@@ -47,6 +48,12 @@ pub(crate) fn student_limit(degrees: f64, chance: f64) -> f64 {
 /// The median of some numbers, which lose their order; none of none.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
+}
+
+/// Median of each axis; `None` of no vectors.
+pub(crate) fn median_of_axes(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    let of = |axis: usize| median(&mut vectors.iter().map(|v| v[axis]).collect::<Vec<_>>());
+    Some(Vector3::new(of(0)?, of(1)?, of(2)?))
 }
 
 #[cfg(test)]

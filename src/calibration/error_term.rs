@@ -21,23 +21,18 @@ pub enum ErrorTerm {
 impl ErrorTerm {
     /// Every error term. Of two that explain a record equally well, the one that stands first here is
     /// the more usual.
-    pub const ALL: [Self; 15] = [
-        Self::GaussMarkovBias,
-        Self::TableBase,
-        Self::TableAxes(AxisError::Tilt),
-        Self::Instrument(Term::AccelSecondOrder),
-        Self::Instrument(Term::AccelAsymmetry),
-        Self::Instrument(Term::SizeEffect),
-        Self::Instrument(Term::TimeOffset),
-        Self::Instrument(Term::GSensitivity),
-        Self::Instrument(Term::GyroAsymmetry),
-        Self::Instrument(Term::GyroSecondOrder),
-        Self::Instrument(Term::GyroNonlinearity),
-        Self::Instrument(Term::AccelThirdOrder),
-        Self::Instrument(Term::AccelCrossCoupling),
-        Self::TableAxes(AxisError::Wobble),
-        Self::TableAxes(AxisError::Encoder),
-    ];
+    pub const ALL: [Self; 5 + Term::ALL.len()] = {
+        let mut all = [Self::GaussMarkovBias; 5 + Term::ALL.len()];
+        (all[1], all[2]) = (Self::TableBase, Self::TableAxes(AxisError::Tilt));
+        let mut k = 0;
+        while k < Term::ALL.len() {
+            all[3 + k] = Self::Instrument(Term::ALL[k]);
+            k += 1;
+        }
+        all[3 + k] = Self::TableAxes(AxisError::Wobble);
+        all[4 + k] = Self::TableAxes(AxisError::Encoder);
+        all
+    };
 
     /// Those that are constant over a run.
     pub fn constant() -> impl Iterator<Item = Self> {

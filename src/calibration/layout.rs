@@ -225,7 +225,7 @@ impl Layout {
             };
         }
         if let Some((_, index)) = self.terms().find(|&(term, _)| term == state) {
-            return Term::of(index).map_or(BudgetSource::Prior, BudgetSource::of_term);
+            return Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term);
         }
         if self.thermal().any(|(thermal, _)| thermal == state) {
             return BudgetSource::Temperature;

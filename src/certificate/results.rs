@@ -35,19 +35,7 @@ impl Quantity {
     /// Its SI unit as D-SI spells it.
     pub fn si_unit(self) -> &'static str {
         match self {
-            Self::Term(term) => match term {
-                Term::AccelSecondOrder | Term::AccelCrossCoupling => {
-                    "\\second\\tothe{2}\\metre\\tothe{-1}"
-                }
-                Term::AccelThirdOrder => "\\second\\tothe{4}\\metre\\tothe{-2}",
-                Term::AccelAsymmetry
-                | Term::GyroAsymmetry
-                | Term::GyroSecondOrder
-                | Term::GyroNonlinearity => "\\one",
-                Term::SizeEffect => "\\metre",
-                Term::TimeOffset => "\\second",
-                Term::GSensitivity => "\\radian\\second\\metre\\tothe{-1}",
-            },
+            Self::Term(term) => term.entry().d_si_unit,
             Self::Parameters(group) => match (group.kind(), group.sensor()) {
                 (ParameterKind::Scale, _) => "\\one",
                 (ParameterKind::Installation, _) => "\\radian",
@@ -140,9 +128,9 @@ pub(super) fn results(
 pub(super) fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
-        let record = calibration.terms.get(&name)?;
+        let record = calibration.terms.get(name)?;
         Some(Measured {
-            name,
+            name: name.to_owned(),
             quantity: Quantity::Term(Term::of(k)?),
             value: record.value,
             expanded: COVERAGE_FACTOR * record.sigma?,

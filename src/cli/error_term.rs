@@ -5,7 +5,6 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use clap::error::ErrorKind;
 use turncal::calibration::{ErrorTerm, Problem};
-use turncal::imu::Term;
 use turncal::run;
 use turncal::turntable::AxisError;
 
@@ -40,32 +39,7 @@ impl ValueEnum for TermArgument {
             ErrorTerm::TableAxes(AxisError::Encoder) => {
                 "Errors of the table's encoders, once and twice a turn"
             }
-            ErrorTerm::Instrument(Term::AccelSecondOrder) => {
-                "Accelerometers: square of specific force"
-            }
-            ErrorTerm::Instrument(Term::AccelAsymmetry) => {
-                "Accelerometers: magnitude of specific force"
-            }
-            ErrorTerm::Instrument(Term::SizeEffect) => {
-                "Accelerometers: lever arms between the three"
-            }
-            ErrorTerm::Instrument(Term::TimeOffset) => {
-                "Accelerometers: delay of their samples behind the gyros'"
-            }
-            ErrorTerm::Instrument(Term::GSensitivity) => "Gyros: sensitivity to specific force",
-            ErrorTerm::Instrument(Term::GyroAsymmetry) => {
-                "Gyros: another scale factor in each sense of turn"
-            }
-            ErrorTerm::Instrument(Term::GyroSecondOrder) => "Gyros: square of angular rate",
-            ErrorTerm::Instrument(Term::GyroNonlinearity) => {
-                "Gyros: scale factor that changes with the magnitude of angular rate"
-            }
-            ErrorTerm::Instrument(Term::AccelThirdOrder) => {
-                "Accelerometers: third power of specific force"
-            }
-            ErrorTerm::Instrument(Term::AccelCrossCoupling) => {
-                "Accelerometers: products of specific force along two axes"
-            }
+            ErrorTerm::Instrument(term) => term.entry().help,
         });
         Some(match self.0 {
             ErrorTerm::GaussMarkovBias => value.alias("wandering-bias"),

@@ -179,15 +179,14 @@ impl<'a> InstrumentFields<'a> {
 /// 1σ of the parameters of the terms that `[imu.terms]` switches on.
 fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
     let mut sigma = TermVector::zeros();
-    let names = Term::ALL.map(Term::name);
-    let Some(terms) = imu.table("terms", &names)? else {
+    let Some(terms) = imu.table("terms", &Term::NAMES)? else {
         return Ok(sigma);
     };
     for term in Term::ALL {
         let meaning = "1σ of each of its parameters";
         if let Some(fields) = terms.table(term.name(), &["sigma"])? {
             let unit = term.unit().1;
-            let most = (term.largest() / unit).round();
+            let most = (term.entry().largest / unit).round();
             let given = fields.need("sigma", meaning)?.positive_to(most)?;
             for parameter in term.parameters() {
                 sigma[parameter] = given * unit;

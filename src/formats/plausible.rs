@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::error::{FileError, Place};
 use crate::calibration::result::{Calibration, TriadRecord};
-use crate::imu::{AXES, TERM_PARAMETERS, Term};
+use crate::imu::{AXES, Term};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 /// An entry of an installation matrix beyond this is of an axis across the one that it is named for.
@@ -40,9 +40,8 @@ impl Calibration {
             }
         }
         for (name, term) in &self.terms {
-            let known = |&k: &usize| Term::parameter_name(k).as_ref() == Some(name);
-            let known = (0..TERM_PARAMETERS).find(known).and_then(Term::of);
-            let largest = known.map_or(TABLE, Term::largest);
+            let known = Term::parameter_named(name).and_then(Term::of);
+            let largest = known.map_or(TABLE, |term| term.entry().largest);
             let within = |value: f64| value.abs() <= largest;
             if !within(term.value) {
                 return Err(refused(

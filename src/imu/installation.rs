@@ -51,50 +51,48 @@ impl InstallationForm {
         self == other || self != Self::ThreeAngle
     }
 
-    /// The installation matrix of these angles (pure numbers, direction cosines or radians).
-    pub fn matrix(self, angles: &SVector<f64, ANGLES>) -> Matrix3<f64> {
+    /// What an angle adds to the off-diagonal entries of `C`, which are linear in the angles.
+    fn slope(self, angle: usize) -> Matrix3<f64> {
+        let (row, column) = self.angle_names()[angle];
+        let mut slope = Matrix3::zeros();
         match self {
-            Self::General | Self::SixAngle => {
-                let mut c = Matrix3::identity();
-                for (angle, &(row, column)) in angles.iter().zip(&SIX) {
-                    c[(row, column)] = *angle;
-                }
-                if self == Self::General {
-                    for row in 0..3 {
-                        let off: f64 = (0..3)
-                            .filter(|&column| column != row)
-                            .map(|column| c[(row, column)].powi(2))
-                            .sum();
-                        // Beyond a right angle no row of unit norm exists; a filter's step that
-                        // far is caught by its cost, not here.
-                        c[(row, row)] = (1.0 - off).max(0.0).sqrt();
-                    }
-                }
-                c
-            }
+            Self::General | Self::SixAngle => slope[(row, column)] = 1.0,
             Self::ThreeAngle => {
-                let (yz, xz, xy) = (angles[0], angles[1], angles[2]);
-                Matrix3::new(1.0, -xy, xz, xy, 1.0, -yz, -xz, yz, 1.0)
+                // [e×] has +e_x at (z, y), +e_y at (x, z), +e_z at (y, x).
+                let (plus, minus) = [((2, 1), (1, 2)), ((0, 2), (2, 0)), ((1, 0), (0, 1))][angle];
+                slope[plus] = 1.0;
+                slope[minus] = -1.0;
             }
         }
+        slope
+    }
+
+    /// The installation matrix of these angles (pure numbers, direction cosines or radians).
+    pub fn matrix(self, angles: &SVector<f64, ANGLES>) -> Matrix3<f64> {
+        let mut c = Matrix3::identity();
+        for angle in 0..self.angle_names().len() {
+            c += self.slope(angle) * angles[angle];
+        }
+        if self == Self::General {
+            for row in 0..3 {
+                let off: f64 = (0..3)
+                    .filter(|&column| column != row)
+                    .map(|column| c[(row, column)].powi(2))
+                    .sum();
+                // Beyond a right angle no row of unit norm exists; a filter's step that
+                // far is caught by its cost, not here.
+                c[(row, row)] = (1.0 - off).max(0.0).sqrt();
+            }
+        }
+        c
     }
 
     /// `∂C/∂angle` for one angle of [`Self::angle_names`].
     pub fn derivative(self, angles: &SVector<f64, ANGLES>, angle: usize) -> Matrix3<f64> {
-        let (row, column) = self.angle_names()[angle];
-        let mut d = Matrix3::zeros();
-        match self {
-            Self::General => {
-                d[(row, column)] = 1.0;
-                d[(row, row)] = -angles[angle] / self.matrix(angles)[(row, row)];
-            }
-            Self::SixAngle => d[(row, column)] = 1.0,
-            Self::ThreeAngle => {
-                // [e×] has +e_x at (z, y), +e_y at (x, z), +e_z at (y, x).
-                let (plus, minus) = [((2, 1), (1, 2)), ((0, 2), (2, 0)), ((1, 0), (0, 1))][angle];
-                d[plus] = 1.0;
-                d[minus] = -1.0;
-            }
+        let mut d = self.slope(angle);
+        if self == Self::General {
+            let (row, _) = self.angle_names()[angle];
+            d[(row, row)] = -angles[angle] / self.matrix(angles)[(row, row)];
         }
         d
     }
@@ -112,17 +110,9 @@ impl InstallationForm {
         };
         let c = SMatrix::<f64, 3, 3>::from_fn(|i, j| a[(i, j)] / scale[i]);
         let mut angles = SVector::<f64, ANGLES>::zeros();
-        match self {
-            Self::General | Self::SixAngle => {
-                for (angle, &place) in angles.iter_mut().zip(&SIX) {
-                    *angle = c[place];
-                }
-            }
-            Self::ThreeAngle => {
-                angles[0] = 0.5 * (c[(2, 1)] - c[(1, 2)]);
-                angles[1] = 0.5 * (c[(0, 2)] - c[(2, 0)]);
-                angles[2] = 0.5 * (c[(1, 0)] - c[(0, 1)]);
-            }
+        for angle in 0..self.angle_names().len() {
+            let slope = self.slope(angle);
+            angles[angle] = slope.dot(&c) / slope.norm_squared();
         }
         (scale, angles)
     }

@@ -24,7 +24,9 @@ pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;
 pub use noise_keys::NoiseKeys;
 pub use signal::{GaussMarkov, MotionNoise, Noise, NoiseSource, Output, Pulses};
-pub use terms::{REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermResponse, TermVector};
+pub use terms::{
+    REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermEntry, TermResponse, TermVector,
+};
 pub use thermal::{
     HIGHEST_ORDER, RATE, THERMAL_FUNCTIONS, ThermalCoefficients, ThermalModel, ThermalRange,
     ThermalState, ThermalValues, powers,

@@ -3,7 +3,9 @@
 use nalgebra::{SVector, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeMap;
 
 use super::thermal::{AccelThermalFile, GyroThermalFile, ThermalVariation};
 use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
@@ -156,7 +158,7 @@ impl Instrument {
                     bias: accel.bias_ug.times(MICRO_G),
                 },
             },
-            term_sigma: terms.in_si(),
+            term_sigma: term_sigma(&terms),
             thermal: (gyro.temperature.is_some() || accel.temperature.is_some()).then(|| {
                 PerSensor {
                     gyro: gyro.temperature.unwrap_or_default().in_si(),
@@ -191,53 +193,38 @@ struct InstrumentFile {
     gyro: GyroFile,
     accel: AccelFile,
     #[serde(default)]
-    terms: TermsFile,
+    terms: BTreeMap<TermName, TermFile>,
 }
 
-/// Error terms, each as in a run's `[imu.terms]`.
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
-struct TermsFile {
-    accel_second_order: Option<TermFile>,
-    accel_asymmetry: Option<TermFile>,
-    size_effect: Option<TermFile>,
-    time_offset: Option<TermFile>,
-    g_sensitivity: Option<TermFile>,
-    gyro_asymmetry: Option<TermFile>,
-    gyro_second_order: Option<TermFile>,
-    gyro_nonlinearity: Option<TermFile>,
-    accel_third_order: Option<TermFile>,
-    accel_cross_coupling: Option<TermFile>,
-}
-
+/// An error term as a run's `[imu.terms]` has it.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TermFile {
     sigma: Positive,
 }
 
-impl TermsFile {
-    fn in_si(&self) -> TermVector {
-        let mut sigma = TermVector::zeros();
-        for term in Term::ALL {
-            let given = match term {
-                Term::AccelSecondOrder => self.accel_second_order,
-                Term::AccelAsymmetry => self.accel_asymmetry,
-                Term::SizeEffect => self.size_effect,
-                Term::TimeOffset => self.time_offset,
-                Term::GSensitivity => self.g_sensitivity,
-                Term::GyroAsymmetry => self.gyro_asymmetry,
-                Term::GyroSecondOrder => self.gyro_second_order,
-                Term::GyroNonlinearity => self.gyro_nonlinearity,
-                Term::AccelThirdOrder => self.accel_third_order,
-                Term::AccelCrossCoupling => self.accel_cross_coupling,
-            };
-            for parameter in term.parameters() {
-                sigma[parameter] = given.map_or(0.0, |given| given.sigma.0 * term.unit().1);
-            }
-        }
-        sigma
+/// The name of an error term.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct TermName(Term);
+
+impl<'de> Deserialize<'de> for TermName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let term = Term::ALL.into_iter().find(|term| term.name() == name);
+        term.map(Self)
+            .ok_or_else(|| D::Error::unknown_field(&name, &Term::NAMES))
     }
+}
+
+/// 1σ of the parameters of these terms in SI, zero for the others.
+fn term_sigma(terms: &BTreeMap<TermName, TermFile>) -> TermVector {
+    let mut all = TermVector::zeros();
+    for (&TermName(term), given) in terms {
+        for parameter in term.parameters() {
+            all[parameter] = given.sigma.0 * term.unit().1;
+        }
+    }
+    all
 }
 
 #[derive(Deserialize)]

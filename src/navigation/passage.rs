@@ -69,7 +69,7 @@ impl Passage {
         let of_term = |&parameter: &usize| {
             Some(TermErrors {
                 parameter,
-                sensor: Term::of(parameter)?.sensor(),
+                sensor: Term::of(parameter)?.entry().sensor,
                 input: Vector3::zeros(),
                 tilt: Vector3::zeros(),
                 errors: Rows::<STATES, 1>::zeros(),

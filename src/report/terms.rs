@@ -8,7 +8,6 @@ use crate::calibration::ErrorTerm;
 use crate::calibration::OBSERVED_BELOW;
 use crate::calibration::result::TermRecord;
 use crate::calibration::{Auxiliary, AuxiliaryKind, auxiliary_name};
-use crate::imu::Term;
 use crate::turntable::AxisError;
 use crate::units::ARCSEC;
 
@@ -20,16 +19,7 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
         ErrorTerm::TableAxes(AxisError::Tilt) => "table axes",
         ErrorTerm::TableAxes(AxisError::Wobble) => "table wobble",
         ErrorTerm::TableAxes(AxisError::Encoder) => "table encoders",
-        ErrorTerm::Instrument(Term::AccelSecondOrder) => "accel second order",
-        ErrorTerm::Instrument(Term::AccelAsymmetry) => "accel asymmetry",
-        ErrorTerm::Instrument(Term::SizeEffect) => "accel lever arm",
-        ErrorTerm::Instrument(Term::TimeOffset) => "accel time offset",
-        ErrorTerm::Instrument(Term::GSensitivity) => "gyro g-sensitivity",
-        ErrorTerm::Instrument(Term::GyroAsymmetry) => "gyro asymmetry",
-        ErrorTerm::Instrument(Term::GyroSecondOrder) => "gyro second order",
-        ErrorTerm::Instrument(Term::GyroNonlinearity) => "gyro nonlinearity",
-        ErrorTerm::Instrument(Term::AccelThirdOrder) => "accel third order",
-        ErrorTerm::Instrument(Term::AccelCrossCoupling) => "accel cross coupling",
+        ErrorTerm::Instrument(term) => term.entry().title,
     }
 }
 

@@ -1,8 +1,8 @@
 //! Where the instrument is at rest: dwells, found from the table's readings or, without a table, from the
 //! instrument itself.
 
-mod imu;
-mod table;
+pub mod imu;
+pub mod table;
 
 pub use imu::LONG_ENOUGH;
 
@@ -50,22 +50,20 @@ const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 impl Run {
     /// The dwells, in order.
     ///
-    /// Where a table's log says where it stands, the gyros have a say: a standstill of the log during
-    /// which they turn is none (two readings may miss a full turn). Two between which they do not turn
-    /// are one (a wild reading, or a knock, parted them).
+    /// The gyros check the standstills of a table's log: one during which they turn is not a dwell (two
+    /// readings may miss a full turn). Two between which they do not turn are one (a wild reading, or a knock,
+    /// parted them).
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
         if !self.recording.imu.continuous && !self.recording.segments.is_empty() {
             return self.labelled_dwells();
         }
         let standstills = match self.observed_table(aiding) {
-            Some(table) => self.standstills_of_table(table),
-            None => self.standstills_of_imu(),
+            Some(table) => table::standstills(self, table),
+            None => imu::standstills(self),
         };
         let mut dwells: Vec<Dwell> = Vec::new();
-        for dwell in standstills {
-            if self.turns(dwell.samples.clone(), &dwell) {
-                continue;
-            }
+        let at_rest = |dwell: &Dwell| !self.turns(dwell.samples.clone(), dwell);
+        for dwell in standstills.into_iter().filter(at_rest) {
             match dwells.last_mut() {
                 Some(last) if self.same_position(last, &dwell) => last.extend(&dwell),
                 _ => dwells.push(dwell),
@@ -79,10 +77,10 @@ impl Run {
         dwells
     }
 
-    /// In a recording of sections laid end to end those labelled as positions, for of what lies between
-    /// sections nothing is known; of a section whose label says nothing, wherever it stands.
+    /// Dwells of a recording of sections laid end to end: sections labelled as positions, because between
+    /// sections nothing is known; in a section whose label is neither position nor turn, its standstills.
     fn labelled_dwells(&self) -> Vec<Dwell> {
-        let standstills = self.standstills_of_imu();
+        let standstills = imu::standstills(self);
         let within = |segment: &Segment| {
             // A row at the edge of a section may be of the one beside it.
             let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
@@ -99,16 +97,13 @@ impl Run {
             }
         };
         let inside = self.recording.segments.iter().flat_map(within);
-        let dwells = inside.map(|samples| Dwell {
-            samples,
-            position: None,
-        });
-        dwells.filter(|dwell| !dwell.samples.is_empty()).collect()
+        let known = inside.filter(|samples| !samples.is_empty());
+        known.map(Dwell::of).collect()
     }
 
     /// The longest of these standstills within some samples, where it turns in the others by more than a
     /// position that is set by hand may be off.
-    pub(in crate::run) fn standing_in(
+    pub(super) fn standing_in(
         &self,
         samples: &Range<usize>,
         standstills: &[Dwell],
@@ -126,17 +121,11 @@ impl Run {
             let random_walk = self.instrument.noise.gyro.random_walk;
             self.segment_sigma + STILL_SIGMAS * random_walk * (count as f64 * imu.period).sqrt()
         };
-        let turns = |beside: &mut dyn Iterator<Item = Vector3<f64>>| {
-            let mut angle = Vector3::zeros();
-            beside.enumerate().any(|(count, increment)| {
-                angle += increment - zero;
-                angle.norm() > limit(count + 1)
-            })
-        };
         let (before, after) = (samples.start..longest.start, longest.end..samples.end);
-        let mut before = imu.gyro.part(before).into_owned().into_iter().rev();
-        let beside = turns(&mut before) || turns(&mut imu.gyro.within(after));
-        beside.then_some(longest)
+        let before = imu.gyro.part(before).into_owned().into_iter().rev();
+        let turns =
+            turn_beyond(before, &zero, limit) || turn_beyond(imu.gyro.within(after), &zero, limit);
+        turns.then_some(longest)
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {
@@ -161,12 +150,21 @@ impl Run {
         let limit = STILL_ANGLE
             + STILL_SIGMAS * self.instrument.noise.gyro.random_walk * duration.sqrt()
             + STILL_RATE * duration;
-        let mut angle = Vector3::zeros();
-        gyro.within(samples).any(|increment| {
-            angle += increment - zero;
-            angle.norm() > limit
-        })
+        turn_beyond(gyro.within(samples), &zero, |_| limit)
     }
+}
+
+/// Whether the sum of the first increments, each with this zero, is ever beyond the limit for their number.
+fn turn_beyond(
+    increments: impl Iterator<Item = Vector3<f64>>,
+    zero: &Vector3<f64>,
+    limit: impl Fn(usize) -> f64,
+) -> bool {
+    let mut angle = Vector3::zeros();
+    (1..).zip(increments).any(|(count, increment)| {
+        angle += increment - zero;
+        angle.norm() > limit(count)
+    })
 }
 
 /// Mean output of a triad over a dwell.
@@ -180,10 +178,10 @@ pub struct MeanOutput {
 }
 
 impl Dwell {
-    /// A section as a dwell, whether it is static or not.
-    pub fn of_segment(segment: &Segment) -> Self {
+    /// Of these samples, without a table.
+    pub fn of(samples: Range<usize>) -> Self {
         Self {
-            samples: segment.samples.clone(),
+            samples,
             position: None,
         }
     }
@@ -254,18 +252,12 @@ impl Dwell {
     fn extend(&mut self, later: &Self) {
         self.samples.end = later.samples.end;
         if let (Some(position), Some(later)) = (&mut self.position, &later.position) {
-            position.extend(later);
+            let (own, added) = (position.readings.len(), later.readings.len());
+            let turn = log(&(later.attitude * position.attitude.transpose()));
+            let share = added as f64 / (own + added) as f64;
+            position.attitude = exp(turn * share) * position.attitude;
+            position.readings.end = later.readings.end;
         }
-    }
-}
-
-impl Position {
-    fn extend(&mut self, later: &Self) {
-        let share =
-            later.readings.len() as f64 / (self.readings.len() + later.readings.len()) as f64;
-        let turn = log(&(later.attitude * self.attitude.transpose()));
-        self.attitude = exp(turn * share) * self.attitude;
-        self.readings.end = later.readings.end;
     }
 }
 

@@ -34,7 +34,7 @@ impl Kinematics {
 
 /// The joints that move during one stretch of a path, and what is fixed around them.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chain {
+pub struct Chain {
     /// What lies before the first joint; `C_b_n` where nothing moves.
     base: Matrix3<f64>,
     joints: Vec<Joint>,
@@ -52,7 +52,7 @@ struct Joint {
 
 impl Chain {
     /// A body that stands.
-    pub(super) fn still(attitude: Matrix3<f64>) -> Self {
+    pub fn still(attitude: Matrix3<f64>) -> Self {
         Self {
             base: attitude,
             joints: Vec::new(),
@@ -60,25 +60,15 @@ impl Chain {
     }
 
     /// A body that turns about an axis of its own.
-    pub(super) fn about_body_axis(
-        attitude: Matrix3<f64>,
-        axis: Vector3<f64>,
-        profile: Profile,
-    ) -> Self {
+    pub fn about_body_axis(attitude: Matrix3<f64>, axis: Vector3<f64>, profile: Profile) -> Self {
         Self {
             base: attitude,
-            joints: vec![Joint {
-                axis,
-                from: 0.0,
-                profile,
-                harmonics: [Vector3::zeros(); PHASES],
-                behind: Matrix3::identity(),
-            }],
+            joints: vec![Joint::new(axis, 0.0, profile, [Vector3::zeros(); PHASES])],
         }
     }
 
     /// A table whose axes turn from these angles along these profiles; without profiles it stands.
-    pub(super) fn of_table(
+    pub fn of_table(
         table: &Table,
         imperfection: &Imperfection,
         angles: &[f64],
@@ -91,20 +81,13 @@ impl Chain {
             .zip(angles)
             .zip(imperfection.tilt.iter().zip(&imperfection.harmonics));
         for (i, ((axis, &from), (tilt, &harmonics))) in parts.enumerate() {
-            let tilt = exp(*tilt);
+            chain.fix(&exp(*tilt));
             match profiles.get(i).filter(|profile| profile.duration() > 0.0) {
                 Some(&profile) => {
-                    chain.fix(&tilt);
-                    chain.joints.push(Joint {
-                        axis: axis.direction,
-                        from,
-                        profile,
-                        harmonics,
-                        behind: Matrix3::identity(),
-                    });
+                    let joint = Joint::new(axis.direction, from, profile, harmonics);
+                    chain.joints.push(joint);
                 }
                 None => {
-                    chain.fix(&tilt);
                     for (harmonic, value) in harmonics.iter().zip(phases(from)) {
                         chain.fix(&exp(harmonic * value));
                     }
@@ -123,12 +106,12 @@ impl Chain {
         }
     }
 
-    pub(super) fn stands(&self) -> bool {
+    pub fn stands(&self) -> bool {
         self.joints.is_empty()
     }
 
     /// How long the slowest joint takes, s.
-    pub(super) fn duration(&self) -> f64 {
+    pub fn duration(&self) -> f64 {
         self.joints
             .iter()
             .map(|joint| joint.profile.duration())
@@ -136,7 +119,7 @@ impl Chain {
     }
 
     /// Times in s since the start at which derivatives of the rate jump, in order.
-    pub(super) fn breaks(&self) -> Vec<f64> {
+    pub fn breaks(&self) -> Vec<f64> {
         let mut breaks: Vec<f64> = self
             .joints
             .iter()
@@ -148,7 +131,7 @@ impl Chain {
     }
 
     /// The state so many seconds after the start.
-    pub(super) fn at(&self, time: f64) -> Kinematics {
+    pub fn at(&self, time: f64) -> Kinematics {
         let mut state = Kinematics {
             attitude: self.base,
             rate: Vector3::zeros(),
@@ -168,6 +151,21 @@ impl Chain {
 }
 
 impl Joint {
+    fn new(
+        axis: Vector3<f64>,
+        from: f64,
+        profile: Profile,
+        harmonics: [Vector3<f64>; PHASES],
+    ) -> Self {
+        Self {
+            axis,
+            from,
+            profile,
+            harmonics,
+            behind: Matrix3::identity(),
+        }
+    }
+
     /// Goes on through its harmonics.
     fn stray(&self, state: &mut Kinematics, angle: f64, turned: &Turned) {
         // Cosine and sine of the angle, then of twice the angle, with their derivatives.

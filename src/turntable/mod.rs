@@ -6,7 +6,6 @@
 //! [`Imperfection`]; what it reads wrongly
 //! (position error and reading noise) is left to whoever makes the readings.
 
-mod accuracy;
 mod chain;
 mod geometry;
 mod motion;
@@ -14,7 +13,6 @@ mod path;
 mod profile;
 mod table;
 
-pub use accuracy::TableAccuracy;
 pub use chain::Kinematics;
 pub use geometry::{
     AXIS_ERRORS, AxisAngles, AxisError, AxisResponse, PHASES, TABLE_GEOMETRY, TableGeometry,
@@ -23,7 +21,7 @@ pub use geometry::{
 pub use motion::Motion;
 pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
 pub use profile::{Profile, Turned};
-pub use table::{Axis, Imperfection, Table, TableErrors};
+pub use table::{Axis, Imperfection, Table, TableAccuracy, TableErrors};
 
 /// Why a table cannot be driven along a path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -113,17 +113,14 @@ impl Motion {
         &self.stretches[begun.saturating_sub(1)]
     }
 
-    /// The start of a path. It is kept even if it takes no time: there is always an attitude.
+    /// Begins at rest. That is kept even if it takes no time: there is always an attitude.
     fn standing(duration: f64, chain: Chain) -> Self {
-        Self {
-            stretches: vec![Stretch {
-                start: 0.0,
-                end: duration,
-                position: 0,
-                chain,
-            }],
+        let mut motion = Self {
+            stretches: Vec::new(),
             breaks: Vec::new(),
-        }
+        };
+        motion.push(duration, 0, chain);
+        motion
     }
 
     fn stand(&mut self, duration: f64, chain: Chain) {

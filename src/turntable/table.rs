@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{AxisError, PHASES};
+use super::{AxisError, PHASES, TableGeometry};
 
 /// Which of [`super::phases`] is the sine of the angle.
 const SINE: usize = 1;
@@ -30,6 +30,18 @@ pub struct Table {
     pub mount: Matrix3<f64>,
     /// How large its errors are.
     pub errors: TableErrors,
+}
+
+/// 1σ of what a table's log is wrong by.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TableAccuracy {
+    /// Per axis of the position error, constant while the table is at rest and new at every position,
+    /// rad.
+    pub position_sigma: f64,
+    /// Per axis of the white error of each reading, rad.
+    pub reading_sigma: f64,
+    /// Of what it does not read.
+    pub geometry: TableGeometry,
 }
 
 /// 1σ of a table's errors, all in rad.
@@ -90,10 +102,9 @@ pub struct Imperfection {
 impl Imperfection {
     /// A perfect table.
     pub fn none(table: &Table) -> Self {
-        let still = vec![Vector3::zeros(); table.axes.len()];
         Self {
             base: Vector3::zeros(),
-            tilt: still,
+            tilt: vec![Vector3::zeros(); table.axes.len()],
             harmonics: vec![[Vector3::zeros(); PHASES]; table.axes.len()],
         }
     }
@@ -148,7 +159,7 @@ impl Imperfection {
     }
 
     /// Whether any axis is tilted, wobbles, or has an encoder that reads wrongly.
-    pub(super) fn moves_axes(&self) -> bool {
+    pub fn moves_axes(&self) -> bool {
         let any = |vectors: &[Vector3<f64>]| vectors.iter().any(|v| *v != Vector3::zeros());
         any(&self.tilt) || self.harmonics.iter().any(|harmonics| any(harmonics))
     }

@@ -61,7 +61,7 @@ impl Budget {
                 .parts
                 .iter()
                 .map(|part| BudgetPartRecord {
-                    source: part.source.name().to_owned(),
+                    source: part.source.name(),
                     u: estimated
                         .iter()
                         .map(|&i| part.covariance[(i, i)].max(0.0).sqrt() * factor(i).abs())

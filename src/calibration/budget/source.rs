@@ -1,12 +1,9 @@
 //! Where the uncertainty of an estimate comes from.
 
-use serde::{Deserialize, Serialize};
-
 use crate::imu::{Sensor, Term};
 
 /// A source of uncertainty.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BudgetSource {
     /// Angle random walk.
     GyroNoise,
@@ -57,26 +54,8 @@ pub enum BudgetSource {
     Temperature,
     /// By how much the instrument differs between recordings.
     Recording,
-    /// What was known of second order of the accelerometers, which is estimated.
-    AccelSecondOrder,
-    /// Of their asymmetry.
-    AccelAsymmetry,
-    /// Of their size effect.
-    SizeEffect,
-    /// Of the time between gyros and accelerometers.
-    TimeOffset,
-    /// Of the g-sensitivity of the gyros.
-    GSensitivity,
-    /// Of the asymmetry of the gyros.
-    GyroAsymmetry,
-    /// Of their second order.
-    GyroSecondOrder,
-    /// Of their nonlinearity.
-    GyroNonlinearity,
-    /// Of third order of the accelerometers.
-    AccelThirdOrder,
-    /// Of their cross coupling.
-    AccelCrossCoupling,
+    /// What was known of the parameters of an error term, which is estimated.
+    Term(Term),
     /// Second order of the installation form in angles that are hardly known.
     Curvature,
     /// By how much dwells scatter more than all noise says.
@@ -123,8 +102,8 @@ impl BudgetSource {
     }
 
     /// What an engineer calls it.
-    pub fn name(self) -> &'static str {
-        match self {
+    pub fn name(self) -> String {
+        let name = match self {
             Self::GyroNoise => "gyro white noise",
             Self::AccelNoise => "accel white noise",
             Self::GyroMoves => "gyro noise of moves",
@@ -149,37 +128,13 @@ impl BudgetSource {
             Self::Prior => "prior",
             Self::Temperature => "prior of temperature coefficients",
             Self::Recording => "differences between recordings",
-            Self::AccelSecondOrder => "prior of accel-second-order",
-            Self::AccelAsymmetry => "prior of accel-asymmetry",
-            Self::SizeEffect => "prior of size-effect",
-            Self::TimeOffset => "prior of time-offset",
-            Self::GSensitivity => "prior of g-sensitivity",
-            Self::GyroAsymmetry => "prior of gyro-asymmetry",
-            Self::GyroSecondOrder => "prior of gyro-second-order",
-            Self::GyroNonlinearity => "prior of gyro-nonlinearity",
-            Self::AccelThirdOrder => "prior of accel-third-order",
-            Self::AccelCrossCoupling => "prior of accel-cross-coupling",
+            Self::Term(term) => return format!("prior of {}", term.name()),
             Self::Curvature => "second order of unknown angles",
             Self::DwellScatter => "scatter of dwells",
             Self::Rounding => "rounding of rates",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",
             Self::UnseenVariation => "biases that may vary unseen",
-        }
-    }
-
-    /// What was known of a term's parameters.
-    pub fn of_term(term: Term) -> Self {
-        match term {
-            Term::AccelSecondOrder => Self::AccelSecondOrder,
-            Term::AccelAsymmetry => Self::AccelAsymmetry,
-            Term::SizeEffect => Self::SizeEffect,
-            Term::TimeOffset => Self::TimeOffset,
-            Term::GSensitivity => Self::GSensitivity,
-            Term::GyroAsymmetry => Self::GyroAsymmetry,
-            Term::GyroSecondOrder => Self::GyroSecondOrder,
-            Term::GyroNonlinearity => Self::GyroNonlinearity,
-            Term::AccelThirdOrder => Self::AccelThirdOrder,
-            Term::AccelCrossCoupling => Self::AccelCrossCoupling,
-        }
+        };
+        name.to_owned()
     }
 }

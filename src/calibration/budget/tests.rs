@@ -74,7 +74,9 @@ const CHANGES: [(BudgetSource, Change); 11] = [
         m.geometry.base.x *= f;
         m.geometry.base.y *= f;
     }),
-    (BudgetSource::AccelSecondOrder, |m, f| m.term_sigma *= f),
+    (BudgetSource::Term(Term::AccelSecondOrder), |m, f| {
+        m.term_sigma *= f
+    }),
 ];
 
 /// Where the gains are those of the least covariance it does not change to first order when they do: what a

@@ -8,7 +8,7 @@ use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::imu::{PerSensor, Sensor};
-use crate::navigation::{Block, BlockMatrix};
+use crate::navigation::{Block, ErrorMatrix};
 
 impl Filter {
     /// Carries mean and covariance over a block.
@@ -80,7 +80,7 @@ impl Filter {
     }
 
     /// Covariance that a block adds to the navigation errors.
-    pub fn noise_of(&self, block: &Block) -> BlockMatrix {
+    pub fn noise_of(&self, block: &Block) -> ErrorMatrix {
         let mut noise = block.noise.covariance(&self.noise);
         // Of interpolated samples alone, which no density scales.
         if let Some((BudgetSource::Interpolated, factor)) = self.varied {

@@ -119,8 +119,7 @@ impl Correction {
             if name.starts_with("table.") {
                 continue;
             }
-            let known =
-                (0..TERM_PARAMETERS).find(|&k| Term::parameter_name(k).as_ref() == Some(name));
+            let known = Term::parameter_named(name);
             let known = known.ok_or_else(|| CorrectionError::UnknownTerm(name.clone()))?;
             terms[known] = term.value;
         }

@@ -129,8 +129,8 @@ impl<'a> Source<'a> {
             let (name, value) = (Term::parameter_name(k)?, self.correction.terms[k]);
             Some(format!(
                 "{name} = {value:e} {}, adds {}",
-                si_unit(term),
-                term.adds()
+                term.entry().si_unit,
+                term.entry().adds
             ))
         };
         self.correction.terms().filter_map(line).collect()
@@ -158,20 +158,6 @@ impl<'a> Source<'a> {
         vectors
             .map(|v| format!("{} -> {}", numbers(&v.raw), numbers(&v.calibrated)))
             .collect()
-    }
-}
-
-/// The SI unit of a term's parameters.
-pub(super) fn si_unit(term: Term) -> &'static str {
-    match term {
-        Term::AccelSecondOrder => "s^2/m",
-        Term::AccelAsymmetry => "1",
-        Term::SizeEffect => "m",
-        Term::TimeOffset => "s",
-        Term::GSensitivity => "(rad/s)/(m/s^2)",
-        Term::GyroAsymmetry | Term::GyroSecondOrder | Term::GyroNonlinearity => "1",
-        Term::AccelThirdOrder => "s^4/m^2",
-        Term::AccelCrossCoupling => "s^2/m",
     }
 }
 

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::Exported;
-use super::source::{Document, Source, si_unit};
+use super::source::{Document, Source};
 use crate::calibration::result::TriadRecord;
-use crate::imu::{AXES, Sensor, TERM_PARAMETERS, Term};
+use crate::imu::{AXES, Sensor, Term};
 
 pub(super) fn write(source: &Source) -> Exported {
     let covariance = "covariance of the parameters; it is in calibration.json".to_owned();
@@ -18,11 +18,9 @@ pub(super) fn write(source: &Source) -> Exported {
         triad(&mut file, source, sensor);
     }
     for (name, term) in &source.record.terms {
-        let of_term = (0..TERM_PARAMETERS)
-            .find(|&k| Term::parameter_name(k).as_ref() == Some(name))
-            .and_then(Term::of);
+        let of_term = Term::parameter_named(name).and_then(Term::of);
         // The others are the table's, all of them angles.
-        let unit = of_term.map_or("rad", si_unit);
+        let unit = of_term.map_or("rad", |term| term.entry().si_unit);
         row(&mut file, name, term.value, term.sigma, unit);
     }
     for sensor in Sensor::ALL {

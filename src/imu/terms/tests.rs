@@ -1,6 +1,9 @@
 //! Claims of the error terms.
 
+use nalgebra::Vector3;
+
 use super::*;
+use crate::imu::Sensor;
 
 /// With nothing special about it.
 fn any() -> Sensed {
@@ -15,7 +18,7 @@ fn any() -> Sensed {
 #[test]
 fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
     let sensed = any();
-    let mut names: Vec<String> = (0..TERM_PARAMETERS)
+    let mut names: Vec<&str> = (0..TERM_PARAMETERS)
         .map_while(Term::parameter_name)
         .collect();
     names.sort();
@@ -24,7 +27,7 @@ fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
     assert_eq!(Term::parameter_name(TERM_PARAMETERS), None);
     let q = TermVector::zeros();
     for parameter in 0..TERM_PARAMETERS {
-        let sensor = Term::of(parameter).unwrap().sensor();
+        let sensor = Term::of(parameter).unwrap().entry().sensor;
         for of in Sensor::ALL {
             let responds = sensed.response(of, &q).column(parameter).norm() > 0.0;
             assert_eq!(responds, of == sensor, "{parameter}");

@@ -38,7 +38,7 @@ pub(super) fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let parts = shown(budget, estimate);
     let rows = parts.iter().map(|part| {
         let freedom = part.degrees_of_freedom;
-        row(part.source.name(), root(part), &finite(freedom))
+        row(&part.source.name(), root(part), &finite(freedom))
     });
     let combined = budget.covariance().diagonal().map(f64::sqrt);
     let factors = Group::all().map(|group| {
@@ -124,7 +124,7 @@ pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
         for (n, part) in own.iter().enumerate() {
             let of = |i: usize| share(part, estimate, i);
             let color = Color::Nth(n);
-            panel = panel.with(stack(&of, color, part.source.name()));
+            panel = panel.with(stack(&of, color, &part.source.name()));
         }
         let others = |i: usize| {
             let of_own: f64 = own.iter().map(|part| share(part, estimate, i)).sum();

@@ -91,7 +91,7 @@ fn of_terms(certificate: &Certificate) -> String {
         let mut all = certificate.terms.iter();
         all.any(|of| of.quantity == Quantity::Term(*term))
     };
-    let words = |term: Term| format!("{} adds {}", term.name(), term.adds());
+    let words = |term: Term| format!("{} adds {}", term.name(), term.entry().adds);
     let all: Vec<String> = Term::ALL.into_iter().filter(has).map(words).collect();
     format!(
         "Error terms, of which t of the model is the sum: {}; f specific force, w angular rate, q the parameter.",

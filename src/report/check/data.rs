@@ -162,7 +162,7 @@ fn section(check: &LabelCheck) -> Value {
         "label": check.segment.label,
         "start_s": check.segment.start,
         "end_s": check.segment.end,
-        "agrees": check.agrees(),
+        "agrees": check.disagreement.is_none(),
     });
     put(&mut data, "off_deg", off.map(degrees));
     put(&mut data, "moving_s", moving);

@@ -217,7 +217,7 @@ fn dwells(places: &[usize]) -> String {
 
 /// What a label and the record disagree in.
 pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
-    let said = check.disagreement()?;
+    let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);
     Some(format!(
         "Section `{}` at {at} s {said}.",

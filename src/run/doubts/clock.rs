@@ -7,7 +7,8 @@ use nalgebra::Vector3;
 use crate::earth::ROTATION_RATE;
 use crate::recording::{TableLog, nanoseconds};
 use crate::run::Run;
-use crate::statistics::{SIGMA_OF_MEDIAN, median};
+use crate::run::dwells::table::standstills;
+use crate::statistics::{SIGMA_OF_MEDIAN, median, median_of_axes};
 use crate::units::{DEGREE, PPM};
 
 /// A move that differs by more than this part of it is another one …
@@ -59,7 +60,7 @@ struct Way {
 }
 
 impl Way {
-    /// Of steps with their times in the middle, durations in s and angles in rad, but for those at rest: they
+    /// Of steps with their times in the middle, durations in s and angles in rad, except those at rest: they
     /// turn by less than `noise` and by less than rate `zero` makes.
     fn of(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> Self {
         let mut way = Self::default();
@@ -75,79 +76,83 @@ impl Way {
     }
 }
 
-/// Moves that the gyros make by another angle than the table, or at another time.
+/// Moves that the gyros make by another angle than the table, or at another time; else a scale that all of them
+/// contradict.
 ///
-/// Rows that one log has lost, clocks that run apart and a log of another run all show there, however the
+/// Rows that one log has lost, clocks that drift apart and a log of another run all show there, however the
 /// samples are stamped.
-pub(super) fn clock(run: &Run, table: &TableLog) -> Option<String> {
+pub fn clock(run: &Run) -> Option<String> {
+    let table = run.recording.table.as_ref()?;
     let moves = moves(run, table);
-    let (another, same): (Vec<Move>, Vec<Move>) = moves.iter().copied().partition(Move::is_another);
-    if let Some(first) = another.first() {
+    let mut others = moves.iter().filter(|m| m.is_another());
+    if let Some(first) = others.next() {
         return Some(format!(
-            "In {} of {} moves the gyros do not turn as far as the table, or further: the first is at {:.1} s, \
-             {:.1}° by the gyros and {:.1}° by the table. Either rows are lost, repeated, clipped or wrapped there, \
-             or both logs are not of one run or clock, or gyro_unit, scale or the unit of the table's angles is \
-             another.",
-            another.len(),
+            "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: {:.1}° \
+             by the gyros, {:.1}° by the table. Rows are lost, repeated, clipped or wrapped there, or the logs are \
+             not of one run or clock. Otherwise check gyro_unit, scale and the unit of the table's angles.",
+            1 + others.count(),
             moves.len(),
             first.table.middle,
             first.gyros.angle / DEGREE,
             first.table.angle / DEGREE
         ));
     }
-    let (first, last) = (same.first()?, same.last()?);
-    let late: Vec<f64> = same.iter().map(Move::late).collect();
-    let (low, high) = late
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &late| {
-            (low.min(late), high.max(late))
-        });
-    let interval = same.iter().map(|m| m.interval).fold(0.0, f64::max);
+    let interval = moves.iter().map(|m| m.interval).fold(0.0, f64::max);
     let resolved = interval + run.recording.imu.period;
-    if low.abs().max(high.abs()) <= resolved {
-        return scale(run, &same);
+    match moves.iter().any(|m| m.late().abs() > resolved) {
+        true => other_times(&moves, resolved, run.recording.imu.period),
+        false => scale(run, &moves),
     }
+}
+
+/// What moves at other times have in common: an offset, a jump, or a drift of the clocks.
+fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
+    let (first, last) = (moves.first()?, moves.last()?);
     let by = |late: f64| match late > 0.0 {
         true => format!("{late:.2} s later"),
         false => format!("{:.2} s earlier", -late),
     };
+    let low = moves.iter().map(Move::late).fold(f64::INFINITY, f64::min);
+    let high = moves
+        .iter()
+        .map(Move::late)
+        .fold(f64::NEG_INFINITY, f64::max);
     if high - low <= resolved {
         return Some(format!(
-            "The gyros turn {} than the table in all {} moves: bring both logs to one clock.",
-            by(0.5 * (low + high)),
-            same.len()
+            "The gyros turn {} than the table in all {} moves. Bring both logs to one clock.",
+            by(low.midpoint(high)),
+            moves.len()
         ));
     }
-    let steps = late.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let (place, step) = steps
-        .enumerate()
-        .max_by(|one, other| one.1.total_cmp(&other.1))?;
-    if step > 0.5 * (high - low) {
-        let (before, after) = (&same[place], &same[place + 1]);
-        let change = after.late() - before.late();
+    let change = |pair: &[Move]| pair[1].late() - pair[0].late();
+    let jump = moves
+        .windows(2)
+        .max_by(|one, other| change(one).abs().total_cmp(&change(other).abs()))?;
+    if change(jump).abs() > 0.5 * (high - low) {
         return Some(format!(
-            "Against the table the gyros turn {} from the move at {:.1} s to that at {:.1} s: {} about {:.0} rows \
-             in between, or the table's log jumps there.",
-            by(change),
-            before.table.middle,
-            after.table.middle,
-            match change < 0.0 {
-                true => "the IMU's log has lost",
-                false => "the IMU's log repeats",
+            "Between the moves at {:.1} s and {:.1} s the gyros begin to turn {} against the table: {} about {:.0} \
+             rows there, or the table log jumps. Correct the log that is wrong.",
+            jump[0].table.middle,
+            jump[1].table.middle,
+            by(change(jump)),
+            match change(jump) < 0.0 {
+                true => "the IMU log has lost",
+                false => "the IMU log repeats",
             },
-            change.abs() / run.recording.imu.period
+            change(jump).abs() / period
         ));
     }
     let apart = (last.late() - first.late()) / (last.table.middle - first.table.middle);
+    let at = |of: &Move| nanoseconds((of.table.middle * 10.0).round() / 10.0);
     Some(format!(
-        "The IMU's clock and the table's run apart by {:.0} ppm: the gyros turn {} than the table in the move at \
-         {} s, {} in that at {} s. Rows are lost or repeated all along, or sample_period_s or the stamps of one log \
-         are wrong; scale factors follow them.",
+        "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} \
+         s, {} in that at {} s. Scale factors are wrong by as much. Check for rows that are lost or repeated all \
+         along, sample_period_s and the stamps of both logs.",
         apart / PPM,
         by(first.late()),
-        nanoseconds((first.table.middle * 10.0).round() / 10.0),
+        at(first),
         by(last.late()),
-        nanoseconds((last.table.middle * 10.0).round() / 10.0)
+        at(last)
     ))
 }
 
@@ -165,9 +170,8 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     let off = gyros / table - 1.0;
     (off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
         format!(
-            "Over all {} moves the gyros turn {:.0} ppm {} than the table, where scale_sigma_ppm of \
-             [imu.prior.gyro] states {:.0} ppm: its scale or scale_sigma_ppm, or gyro_unit, does not fit the \
-             instrument.",
+            "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of \
+             [imu.prior.gyro] states {:.0} ppm. Check its scale and scale_sigma_ppm, and gyro_unit.",
             moves.len(),
             off.abs() / PPM,
             if off > 0.0 { "further" } else { "less far" },
@@ -185,10 +189,7 @@ fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
     let means: Vec<Vector3<f64>> = known
         .map(|s| imu.gyro.sum(s.clone()) / (s.len() as f64 * imu.period))
         .collect();
-    let bias = Vector3::from_fn(|axis, _| {
-        let mut of_axis: Vec<f64> = means.iter().map(|mean| mean[axis]).collect();
-        median(&mut of_axis).unwrap_or(prior.bias[axis])
-    });
+    let bias = median_of_axes(&means).unwrap_or(prior.bias);
     let mut off: Vec<f64> = means.iter().map(|mean| (mean - bias).norm()).collect();
     let sigma = median(&mut off).map_or(f64::INFINITY, |off| SIGMA_OF_MEDIAN * off);
     (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
@@ -199,8 +200,7 @@ fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
 /// the scale factors of their axes differ.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
-    let stands: Vec<Range<usize>> = run
-        .standstills_of_table(table)
+    let stands: Vec<Range<usize>> = standstills(run, table)
         .into_iter()
         .map(|standstill| standstill.samples)
         .collect();
@@ -290,7 +290,7 @@ mod tests {
     fn said(spoil: impl Fn(&mut Run)) -> Option<String> {
         let mut run = Scenario::load("mems").unwrap().simulate(1, 0).unwrap().run;
         spoil(&mut run);
-        clock(&run, run.recording.table.as_ref().unwrap())
+        clock(&run)
     }
 
     fn lose(run: &mut Run, lost: impl Fn(usize) -> bool) {
@@ -311,7 +311,7 @@ mod tests {
         let scenario = Scenario::load("demo-six-position").unwrap();
         for seed in [1, 4, 10] {
             let run = scenario.simulate(seed, 0).unwrap().run;
-            assert_eq!(clock(&run, run.recording.table.as_ref().unwrap()), None);
+            assert_eq!(clock(&run), None);
         }
     }
 

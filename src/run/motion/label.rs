@@ -6,12 +6,12 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::rest::{Rest, mean};
+use super::rest::Rest;
 use super::turn::{Turn, zero};
 use crate::imu::Sensor;
 use crate::recording::{LabelledMotion, Segment};
-use crate::run::Dwell;
-use crate::run::Run;
+use crate::run::dwells::imu::standstills;
+use crate::run::{Dwell, Run};
 use crate::units::DEGREE;
 
 /// A label's axis further than this from the plumb line is another one, rad.
@@ -36,10 +36,14 @@ pub struct LabelCheck {
     pub segment: Segment,
     /// What the record says of it.
     pub verdict: Verdict,
+    /// What label and record disagree in, after `section … `.
+    pub disagreement: Option<String>,
+    /// The samples in which the record does what the label says, if there are any.
+    pub as_labelled: Option<Range<usize>>,
 }
 
 /// What the record says of a section.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Verdict {
     /// The label is no position and no turn.
     Unknown,
@@ -49,9 +53,6 @@ pub enum Verdict {
         off: f64,
         /// Time for which it moves, s.
         moving: f64,
-        /// The samples of it in which it stands, where it turns in the others by more than a position
-        /// that is set by hand may be off.
-        turns_beside: Option<Range<usize>>,
     },
     /// It is a turn.
     Turn {
@@ -59,14 +60,6 @@ pub enum Verdict {
         angle: f64,
         /// Angle between the axis found and the label's, rad.
         off: f64,
-        /// Whether it begins or ends while it turns.
-        cut: bool,
-        /// Found up to the rests around it, rad.
-        to_rests: f64,
-        /// Its samples up to there.
-        whole: Range<usize>,
-        /// A turn whose angle differs from the label's by more than this part of it is another one.
-        tolerance: f64,
     },
 }
 
@@ -100,161 +93,110 @@ impl fmt::Display for ContradictedLabel {
     }
 }
 
-impl LabelCheck {
-    /// Whether label and record agree.
-    pub fn agrees(&self) -> bool {
-        match (&self.verdict, self.segment.motion) {
-            (
-                Verdict::Position {
-                    off,
-                    moving,
-                    turns_beside,
-                },
-                _,
-            ) => {
-                let duration = self.segment.end - self.segment.start;
-                *off < OTHER_AXIS && *moving <= MOVING * duration && turns_beside.is_none()
-            }
-            (
-                Verdict::Turn {
-                    angle,
-                    cut,
-                    tolerance,
-                    ..
-                },
-                Some(LabelledMotion::Turns { angle: said, .. }),
-            ) => (angle / said - 1.0).abs() < *tolerance && !cut,
-            _ => false,
-        }
-    }
-
-    /// The samples in which the record does what the label says, if there are any.
-    pub fn as_labelled(&self) -> Option<Range<usize>> {
-        let all = self.segment.samples.clone();
-        match (&self.verdict, self.segment.motion) {
-            (
-                Verdict::Position {
-                    off, turns_beside, ..
-                },
-                _,
-            ) => (*off < OTHER_AXIS).then(|| turns_beside.clone().unwrap_or(all)),
-            (
-                Verdict::Turn {
-                    cut,
-                    angle,
-                    to_rests,
-                    whole,
-                    tolerance,
-                    ..
-                },
-                Some(LabelledMotion::Turns { angle: said, .. }),
-            ) => {
-                let as_said = |angle: f64| (angle / said - 1.0).abs() < *tolerance;
-                match cut {
-                    false => as_said(*angle).then_some(all),
-                    true => (as_said(*to_rests) && *whole != all).then(|| whole.clone()),
-                }
-            }
-            _ => None,
-        }
-    }
-
-    /// What label and record disagree in, after `section … `.
-    pub fn disagreement(&self) -> Option<String> {
-        if self.agrees() {
-            return None;
-        }
-        Some(match (&self.verdict, self.segment.motion) {
-            (Verdict::Position { off, .. }, _) if *off >= OTHER_AXIS => format!(
-                "is {:.0}° off the plumb line: another axis is up; correct the label or body_axes",
-                off / DEGREE
-            ),
-            (Verdict::Position { moving, .. }, _) => {
-                format!("moves for {moving:.1} s of its time: draw its borders closer")
-            }
-            (Verdict::Turn { cut: true, .. }, _) => {
-                "begins or ends within the turn: draw its borders wider, to where it is stationary"
-                    .to_owned()
-            }
-            (Verdict::Turn { angle, .. }, Some(LabelledMotion::Turns { angle: said, .. })) => {
-                format!(
-                    "turns by {:+.0}° about its axis, not {:+.0}°: correct axis, sign or angle of the \
-                     label, or the gyros' scale",
-                    angle / DEGREE,
-                    said / DEGREE
-                )
-            }
-            (Verdict::Turn { .. }, _) => "is no turn".to_owned(),
-            (Verdict::Unknown, _) => {
-                "is no position (x_up … z_down) and no turn (rot_x+360): it has no effect"
-                    .to_owned()
-            }
-        })
-    }
-}
-
 /// Every labelled section against what the record does at these rests.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
-    let standstills = run.standstills_of_imu();
-    let check = |segment: &Segment| LabelCheck {
-        segment: segment.clone(),
-        verdict: verdict(run, rests, &standstills, segment),
+    let standstills = standstills(run);
+    let check = |segment: &Segment| match segment.motion {
+        Some(LabelledMotion::Stands { up }) => position(run, rests, &standstills, segment, &up),
+        Some(LabelledMotion::Turns { axis, angle }) => turn(run, rests, segment, &axis, angle),
+        None => LabelCheck {
+            segment: segment.clone(),
+            verdict: Verdict::Unknown,
+            disagreement: Some(
+                "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect"
+                    .to_owned(),
+            ),
+            as_labelled: None,
+        },
     };
     run.recording.segments.iter().map(check).collect()
 }
 
-fn verdict(run: &Run, rests: &[Rest], standstills: &[Dwell], segment: &Segment) -> Verdict {
-    let samples = segment.samples.clone();
-    match segment.motion {
-        None => Verdict::Unknown,
-        Some(LabelledMotion::Stands { up }) => {
-            let standing = run.standing_in(&samples, standstills);
-            let section = Dwell {
-                samples: standing.clone().unwrap_or_else(|| samples.clone()),
-                position: None,
-            };
-            let force = mean(run, &section, Sensor::Accel) - run.instrument.prior.accel.bias;
-            Verdict::Position {
-                off: force.angle(&up),
-                moving: moving(run, rests, &samples),
-                turns_beside: standing,
-            }
-        }
-        Some(LabelledMotion::Turns { axis, .. }) => {
-            let zero = zero(run, rests, samples.start);
-            let turn = Turn::of(run, samples.clone(), &zero);
-            let length = ((END / run.recording.imu.period).round() as usize)
-                .max(1)
-                .min(samples.len());
-            let rate = |samples: Range<usize>| {
-                angle(run, samples, &zero).norm() / length as f64 / run.recording.imu.period
-            };
-            let ends = [
-                samples.start..samples.start + length,
-                samples.end - length..samples.end,
-            ];
-            let at_ends = ends.into_iter().any(|end| rate(end) > TURNING);
-            // Beyond sections laid end to end lies something else.
-            let whole = if run.recording.imu.continuous {
-                to_rests(rests, &samples)
-            } else {
-                samples.clone()
-            };
-            let within = angle(run, samples, &zero).dot(&axis);
-            let to_rests = angle(run, whole.clone(), &zero).dot(&axis);
-            let lost = to_rests - within;
-            let found = turn.axis * turn.angle.signum();
-            let off = found.angle(&axis);
-            Verdict::Turn {
-                angle: within,
-                off: off.min(std::f64::consts::PI - off),
-                cut: at_ends && (!run.recording.imu.continuous || lost.abs() > LOST),
-                to_rests,
-                whole,
-                tolerance: OTHER_ANGLE
-                    .max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.max()),
-            }
-        }
+/// A section that is labelled as a position.
+fn position(
+    run: &Run,
+    rests: &[Rest],
+    standstills: &[Dwell],
+    segment: &Segment,
+    up: &Vector3<f64>,
+) -> LabelCheck {
+    // Samples of it in which it stands, where it turns in the others.
+    let standing = run.standing_in(&segment.samples, standstills);
+    let samples = standing.clone().unwrap_or_else(|| segment.samples.clone());
+    let section = Dwell::of(samples.clone());
+    let force = section.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias;
+    let (off, moving) = (force.angle(up), moving(run, rests, &segment.samples));
+    let is_still = moving <= MOVING * (segment.end - segment.start) && standing.is_none();
+    LabelCheck {
+        segment: segment.clone(),
+        verdict: Verdict::Position { off, moving },
+        disagreement: match off < OTHER_AXIS {
+            true if is_still => None,
+            true => Some(format!("is not still for {moving:.1} s: shorten it")),
+            false => Some(format!(
+                "has another axis up, {:.0}° off the label's: correct the label or body_axes",
+                off / DEGREE
+            )),
+        },
+        as_labelled: (off < OTHER_AXIS).then_some(samples),
+    }
+}
+
+/// A section that is labelled as a turn by an angle.
+fn turn(
+    run: &Run,
+    rests: &[Rest],
+    segment: &Segment,
+    axis: &Vector3<f64>,
+    labelled: f64,
+) -> LabelCheck {
+    let (imu, samples) = (&run.recording.imu, segment.samples.clone());
+    let zero = zero(run, rests, samples.start);
+    let length = ((END / imu.period).round() as usize)
+        .max(1)
+        .min(samples.len());
+    let ends = [
+        samples.start..samples.start + length,
+        samples.end - length..samples.end,
+    ];
+    let turns =
+        |end: Range<usize>| angle(run, end, &zero).norm() / length as f64 / imu.period > TURNING;
+    // Beyond sections laid end to end lies something else.
+    let whole = match imu.continuous {
+        true => to_rests(rests, &samples),
+        false => samples.clone(),
+    };
+    let within = angle(run, samples.clone(), &zero).dot(axis);
+    let to_rests = angle(run, whole.clone(), &zero).dot(axis);
+    let is_cut =
+        ends.into_iter().any(turns) && (!imu.continuous || (to_rests - within).abs() > LOST);
+    let tolerance = OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.max());
+    let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance;
+    let found = Turn::of(run, samples.clone(), &zero);
+    let off = (found.axis * found.angle.signum()).angle(axis);
+    LabelCheck {
+        segment: segment.clone(),
+        verdict: Verdict::Turn {
+            angle: within,
+            off: off.min(std::f64::consts::PI - off),
+        },
+        disagreement: match is_cut {
+            true => Some(
+                "starts or ends during the turn: extend it until the sensor is still at both ends"
+                    .to_owned(),
+            ),
+            false if as_said(within) => None,
+            false => Some(format!(
+                "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, \
+                 or the gyros' scale",
+                within / DEGREE,
+                labelled / DEGREE
+            )),
+        },
+        as_labelled: match is_cut {
+            true => (as_said(to_rests) && whole != samples).then_some(whole),
+            false => as_said(within).then_some(samples),
+        },
     }
 }
 

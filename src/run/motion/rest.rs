@@ -32,7 +32,7 @@ pub struct Up {
 }
 
 impl Up {
-    pub(super) fn of(force: &Vector3<f64>) -> Self {
+    fn of(force: &Vector3<f64>) -> Self {
         let axis = force.iamax();
         let cosine = (force[axis].abs() / force.norm()).clamp(0.0, 1.0);
         Self {
@@ -50,7 +50,7 @@ impl Up {
 
 impl Rest {
     fn of(run: &Run, dwell: Dwell) -> Self {
-        let force = mean(run, &dwell, Sensor::Accel) - run.instrument.prior.accel.bias;
+        let force = dwell.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias;
         Self {
             up: Up::of(&force),
             force,
@@ -60,11 +60,7 @@ impl Rest {
 
     /// Begin and end, s.
     pub fn times(&self, run: &Run) -> [f64; 2] {
-        let samples = &self.dwell.samples;
-        [
-            run.recording.imu.time(samples.start),
-            run.recording.imu.time(samples.end),
-        ]
+        self.dwell.times(run)
     }
 
     /// Angle between gravity as the accelerometers see it and as the table holds the instrument, rad.
@@ -77,10 +73,6 @@ impl Rest {
     pub fn duration(&self, run: &Run) -> f64 {
         self.dwell.samples.len() as f64 * run.recording.imu.period
     }
-}
-
-pub(super) fn mean(run: &Run, dwell: &Dwell, sensor: Sensor) -> Vector3<f64> {
-    dwell.mean(sensor, run).output
 }
 
 /// Where it stands, in order.

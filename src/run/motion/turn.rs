@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::rest::{Rest, mean};
+use super::rest::Rest;
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
 use crate::recording::LabelledMotion;
@@ -100,14 +100,14 @@ impl Turn {
 }
 
 /// Gyros at rest near a sample, rad/s.
-pub(super) fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
+pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
     let apart = |rest: &&Rest| {
         let Range { start, end } = rest.dwell.samples;
         start.saturating_sub(sample).max(sample.saturating_sub(end))
     };
     let nearest = rests.iter().min_by_key(apart);
     nearest.map_or(run.instrument.prior.gyro.bias, |rest| {
-        mean(run, &rest.dwell, Sensor::Gyro)
+        rest.dwell.mean(Sensor::Gyro, run).output
     })
 }
 

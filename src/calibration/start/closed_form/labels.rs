@@ -5,8 +5,6 @@
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
 //! g-sensitivity.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, Vector3};
 
 use super::both_triads::both_triads;
@@ -87,10 +85,10 @@ fn used_sections(run: &Run, rests: &[Rest]) -> Used {
             found.lost.push(format!("`{}`", segment.label));
             continue;
         }
-        let used = check.as_labelled();
+        let used = check.as_labelled;
         // Borders that are drawn a little wide do no harm.
         let as_stated = used.as_ref() == Some(&segment.samples);
-        if let Some(said) = check.disagreement().filter(|_| !as_stated) {
+        if let Some(said) = check.disagreement.filter(|_| !as_stated) {
             found.contradicted.push(ContradictedLabel {
                 label: segment.label.clone(),
                 start: segment.start,
@@ -101,7 +99,7 @@ fn used_sections(run: &Run, rests: &[Rest]) -> Used {
         let Some(samples) = used else {
             continue;
         };
-        let of_gyro = dwell(&samples).mean(Sensor::Gyro, run);
+        let of_gyro = Dwell::of(samples.clone()).mean(Sensor::Gyro, run);
         found.sections.push(Section {
             samples,
             motion,
@@ -110,13 +108,6 @@ fn used_sections(run: &Run, rests: &[Rest]) -> Used {
         });
     }
     found
-}
-
-fn dwell(samples: &Range<usize>) -> Dwell {
-    Dwell {
-        samples: samples.clone(),
-        position: None,
-    }
 }
 
 fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Observed {
@@ -142,7 +133,9 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Observed {
         }
     });
     let positions: Vec<Position> = positions.collect();
-    let times = sections.iter().map(|s| dwell(&s.samples).times(run));
+    let times = sections
+        .iter()
+        .map(|s| Dwell::of(s.samples.clone()).times(run));
     let errors = [
         shortened(&positions, sigma),
         earth.errors,
@@ -161,7 +154,7 @@ fn of_accelerometers(run: &Run, sections: &[Section]) -> Observed {
         let LabelledMotion::Stands { up } = section.motion else {
             continue;
         };
-        let stands = dwell(&section.samples);
+        let stands = Dwell::of(section.samples.clone());
         let of_accel = stands.mean(Sensor::Accel, run);
         let white = Vector3::repeat(of_accel.variance);
         let force = up * run.site.gravity;

@@ -243,7 +243,7 @@ fn labelled(run: &Run, dwells: &[&Dwell]) -> Vec<Labelled> {
     let segments = run.recording.segments.iter();
     let of = segments.filter(|segment| whole(&segment.samples));
     let labelled = of.filter_map(|segment| {
-        let section = Dwell::of_segment(segment);
+        let section = Dwell::of(segment.samples.clone());
         match segment.motion? {
             LabelledMotion::Stands { up } => {
                 let force = section.mean(Sensor::Accel, run);

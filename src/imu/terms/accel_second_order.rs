@@ -1,0 +1,22 @@
+//! Output of an accelerometer with the square of specific force along its axis.
+
+use super::entry::{Effect, TermEntry, per_axis};
+use crate::imu::Sensor;
+use crate::units::{MICRO_G, STANDARD_GRAVITY};
+
+pub const ENTRY: TermEntry = TermEntry {
+    name: "accel-second-order",
+    title: "accel second order",
+    help: "Accelerometers: square of specific force",
+    adds: "q f^2 along its axis to f",
+    sensor: Sensor::Accel,
+    unit: ("µg/g²", MICRO_G / (STANDARD_GRAVITY * STANDARD_GRAVITY)),
+    si_unit: "s^2/m",
+    d_si_unit: "\\second\\tothe{2}\\metre\\tothe{-1}",
+    usual_sigma: 100.0,
+    largest: 1.0 / STANDARD_GRAVITY,
+    parameters: per_axis!("accel.second_order"),
+    effect: Effect::Linear(|sensed, columns| {
+        columns.set_diagonal(&sensed.force.map(|f| f.powi(2)))
+    }),
+};

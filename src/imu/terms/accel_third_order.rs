@@ -1,0 +1,25 @@
+//! Output of an accelerometer with the third power of specific force along its axis.
+
+use super::entry::{Effect, TermEntry, per_axis};
+use crate::imu::Sensor;
+use crate::units::{MICRO_G, STANDARD_GRAVITY};
+
+pub const ENTRY: TermEntry = TermEntry {
+    name: "accel-third-order",
+    title: "accel third order",
+    help: "Accelerometers: third power of specific force",
+    adds: "q f^3 along its axis to f",
+    sensor: Sensor::Accel,
+    unit: (
+        "µg/g³",
+        MICRO_G / (STANDARD_GRAVITY * STANDARD_GRAVITY * STANDARD_GRAVITY),
+    ),
+    si_unit: "s^4/m^2",
+    d_si_unit: "\\second\\tothe{4}\\metre\\tothe{-2}",
+    usual_sigma: 100.0,
+    largest: 1.0 / (STANDARD_GRAVITY * STANDARD_GRAVITY),
+    parameters: per_axis!("accel.third_order"),
+    effect: Effect::Linear(|sensed, columns| {
+        columns.set_diagonal(&sensed.force.map(|f| f.powi(3)))
+    }),
+};

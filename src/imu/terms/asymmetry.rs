@@ -1,0 +1,31 @@
+//! Another scale factor for one sign of the input than for the other, of either triad.
+
+use super::entry::{Effect, TermEntry, per_axis};
+use crate::imu::Sensor;
+use crate::units::PPM;
+
+pub const ACCEL: TermEntry = TermEntry {
+    name: "accel-asymmetry",
+    title: "accel asymmetry",
+    help: "Accelerometers: magnitude of specific force",
+    adds: "q |f| along its axis to f",
+    sensor: Sensor::Accel,
+    unit: ("ppm", PPM),
+    si_unit: "1",
+    d_si_unit: "\\one",
+    usual_sigma: 100.0,
+    largest: 1.0,
+    parameters: per_axis!("accel.asymmetry"),
+    effect: Effect::Linear(|sensed, columns| columns.set_diagonal(&sensed.force.abs())),
+};
+
+pub const GYRO: TermEntry = TermEntry {
+    name: "gyro-asymmetry",
+    title: "gyro asymmetry",
+    help: "Gyros: another scale factor in each sense of turn",
+    adds: "q |w| along its axis to w",
+    sensor: Sensor::Gyro,
+    parameters: per_axis!("gyro.asymmetry"),
+    effect: Effect::Linear(|sensed, columns| columns.set_diagonal(&sensed.rate.abs())),
+    ..ACCEL
+};

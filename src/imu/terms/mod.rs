@@ -1,0 +1,139 @@
+//! Error terms of an instrument, in addition to `K`, `E` and `D`: each changes what a triad takes for
+//! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
+//!
+//! A term is a [`TermEntry`] in a file of its own and a line of the registry below. Options, files,
+//! simulation, estimation, budget, report and exports read the entry.
+//!
+//! Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
+//! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
+//! scale factor); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect, time offset).
+
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+mod entry;
+mod sensed;
+
+mod accel_cross_coupling;
+mod accel_second_order;
+mod accel_third_order;
+mod asymmetry;
+mod g_sensitivity;
+mod gyro_nonlinearity;
+mod gyro_second_order;
+mod size_effect;
+mod time_offset;
+
+pub use entry::{REFERENCE_RATE, Sensed, TermEntry};
+
+/// Declares [`Term`] with one line per term, in the order of the parameters.
+macro_rules! registry {
+    ($($(#[$doc:meta])* $term:ident: $entry:path,)*) => {
+        /// An error term.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum Term {
+            $($(#[$doc])* $term,)*
+        }
+
+        impl Term {
+            /// Every term, in the order of the parameters.
+            pub const ALL: [Self; [$(stringify!($term)),*].len()] = [$(Self::$term),*];
+
+            /// Their names, in the same order.
+            pub const NAMES: [&'static str; Self::ALL.len()] = [$($entry.name),*];
+
+            /// How it is called, and what it does.
+            pub const fn entry(self) -> &'static TermEntry {
+                match self {
+                    $(Self::$term => &$entry,)*
+                }
+            }
+        }
+    };
+}
+
+// The order is that of the states, and of records that were written before: a new term goes last.
+registry! {
+    /// Accelerometers add `q_i f_i²`; q in s²/m.
+    AccelSecondOrder: accel_second_order::ENTRY,
+    /// Accelerometers add `q_i |f_i|`: another scale factor down than up.
+    AccelAsymmetry: asymmetry::ACCEL,
+    /// Accelerometers x and y stand away from z by lever arms in m along body axes.
+    SizeEffect: size_effect::ENTRY,
+    /// Accelerometer samples are those of a time q later than the gyros', in s.
+    TimeOffset: time_offset::ENTRY,
+    /// Gyros add `Q f`, Q row by row, in rad/s per m/s².
+    GSensitivity: g_sensitivity::ENTRY,
+    /// Gyros add `q_i |ω_i|`: another scale factor in one sense of turn than in the other.
+    GyroAsymmetry: asymmetry::GYRO,
+    /// Gyros add `q_i ω_i² / ω_r`, which is even in the rate; ω_r is [`REFERENCE_RATE`].
+    GyroSecondOrder: gyro_second_order::ENTRY,
+    /// Gyros add `q_i |ω_i| ω_i / ω_r + c_i ω_i³ / ω_r²`, which are odd in the rate. Three q, then three c.
+    GyroNonlinearity: gyro_nonlinearity::ENTRY,
+    /// Accelerometers add `q_i f_i³`; q in s⁴/m².
+    AccelThirdOrder: accel_third_order::ENTRY,
+    /// Accelerometers add `q_i1 f_x f_y + q_i2 f_x f_z + q_i3 f_y f_z`; q in s²/m.
+    AccelCrossCoupling: accel_cross_coupling::ENTRY,
+}
+
+/// Index of the first parameter of each term, and the number of all.
+const FIRST: [usize; Term::ALL.len() + 1] = {
+    let mut first = [0; Term::ALL.len() + 1];
+    let mut k = 0;
+    while k < Term::ALL.len() {
+        first[k + 1] = first[k] + Term::ALL[k].entry().parameters.len();
+        k += 1;
+    }
+    first
+};
+
+/// Number of parameters of all terms.
+pub const TERM_PARAMETERS: usize = FIRST[Term::ALL.len()];
+/// The parameters of all terms, in the order of [`Term::ALL`]; zero where a term is off.
+pub type TermVector = SVector<f64, TERM_PARAMETERS>;
+/// What each parameter adds to the input of a triad.
+pub type TermResponse = SMatrix<f64, 3, TERM_PARAMETERS>;
+
+impl Term {
+    /// The name that files and commands use.
+    pub fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// The unit of its parameters in files and reports: its name, and its value in SI.
+    pub fn unit(self) -> (&'static str, f64) {
+        self.entry().unit
+    }
+
+    /// 1σ of each of its parameters where nothing better is known, in SI: ten times what precise
+    /// instruments have.
+    pub fn usual_sigma(self) -> f64 {
+        self.entry().usual_sigma * self.unit().1
+    }
+
+    /// Indices of its parameters.
+    pub const fn parameters(self) -> std::ops::Range<usize> {
+        FIRST[self as usize]..FIRST[self as usize + 1]
+    }
+
+    /// The term of a parameter.
+    pub fn of(parameter: usize) -> Option<Self> {
+        let has = |term: &Self| term.parameters().contains(&parameter);
+        Self::ALL.into_iter().find(has)
+    }
+
+    /// The name of a parameter in files; `None` beyond the last.
+    pub fn parameter_name(parameter: usize) -> Option<&'static str> {
+        let term = Self::of(parameter)?;
+        let names = term.entry().parameters;
+        names.get(parameter - term.parameters().start).copied()
+    }
+
+    /// The parameter of a name in files.
+    pub fn parameter_named(name: &str) -> Option<usize> {
+        (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k) == Some(name))
+    }
+}
+
+#[cfg(test)]
+mod tests;

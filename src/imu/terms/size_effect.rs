@@ -1,0 +1,39 @@
+//! Accelerometers that stand apart: x and y stand away from z by lever arms r_x and r_y and sense row i of
+//! `([ω̇×] + [ω×]²) r_i` besides. One lever arm common to all three cannot be told from rest.
+
+use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use crate::imu::Sensor;
+use crate::units::STANDARD_GRAVITY;
+
+pub const ENTRY: TermEntry = TermEntry {
+    name: "size-effect",
+    title: "accel lever arm",
+    help: "Accelerometers: lever arms between the three",
+    adds: "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
+    sensor: Sensor::Accel,
+    unit: ("mm", 1e-3),
+    si_unit: "m",
+    d_si_unit: "\\metre",
+    usual_sigma: 100.0,
+    largest: STANDARD_GRAVITY / (REFERENCE_RATE * REFERENCE_RATE),
+    // Accelerometer, then component of its lever arm.
+    parameters: &[
+        "accel.lever_arm.xx",
+        "accel.lever_arm.xy",
+        "accel.lever_arm.xz",
+        "accel.lever_arm.yx",
+        "accel.lever_arm.yy",
+        "accel.lever_arm.yz",
+    ],
+    effect: Effect::Linear(response),
+};
+
+fn response(sensed: &Sensed, columns: &mut Columns) {
+    let rate = sensed.rate.cross_matrix();
+    let turning = sensed.angular_acceleration.cross_matrix() + rate * rate;
+    for axis in 0..2 {
+        for component in 0..3 {
+            columns[(axis, 3 * axis + component)] = turning[(axis, component)];
+        }
+    }
+}

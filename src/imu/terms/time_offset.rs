@@ -1,0 +1,33 @@
+//! Accelerometer samples are those of a time q later than the gyros', in s: where the body stays at its
+//! place and turns by θ in that time, they are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
+
+use nalgebra::Vector3;
+
+use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use crate::attitude::exp;
+use crate::imu::Sensor;
+
+pub const ENTRY: TermEntry = TermEntry {
+    name: "time-offset",
+    title: "accel time offset",
+    help: "Accelerometers: delay of their samples behind the gyros'",
+    adds: "-q w x f to f, accelerometers sampled later",
+    sensor: Sensor::Accel,
+    unit: ("ms", 1e-3),
+    si_unit: "s",
+    d_si_unit: "\\second",
+    usual_sigma: 10.0,
+    largest: 1.0 / REFERENCE_RATE,
+    parameters: &["accel.time_offset"],
+    effect: Effect::Nonlinear { added, response },
+};
+
+fn added(sensed: &Sensed, q: &[f64]) -> Vector3<f64> {
+    let turn = sensed.rate_over_earth * q[0] + sensed.angular_acceleration * (0.5 * q[0] * q[0]);
+    exp(-turn) * sensed.force - sensed.force
+}
+
+fn response(sensed: &Sensed, q: &[f64], columns: &mut Columns) {
+    let rate = sensed.rate_over_earth + sensed.angular_acceleration * q[0];
+    columns.set_column(0, &-rate.cross(&sensed.force));
+}
