@@ -1,9 +1,9 @@
 //! Both triads from positions, and what their residuals show of prior, base and positions.
 
-use nalgebra::Vector3;
+use nalgebra::SMatrix;
 
-use super::positions::{Fit, Observed};
-use crate::calibration::checks::drift::drift;
+use super::judged::Judged;
+use super::positions::{BASE, Fit, Observed};
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::prior_distance::{far_from_prior, widened};
 use crate::calibration::checks::residuals::Residuals;
@@ -31,148 +31,122 @@ pub fn both_triads(
     if !findings.is_empty() {
         prior = widened(&prior, &of_positions).unwrap_or(prior);
     }
-    let base = base_of_both(observed, &prior)?;
-    let mut one_triad = |sensor| one_triad(observed.get(sensor), &prior, base, &mut findings);
+    let stated = PerSensor {
+        gyro: Stated::new(&observed.gyro, &prior)?,
+        accel: Stated::new(&observed.accel, &prior)?,
+    };
+    let bases = Sensor::ALL
+        .into_iter()
+        .filter_map(|sensor| stated.get(sensor).base);
+    let base = bases.reduce(f64::max);
     let fits = PerSensor {
-        gyro: one_triad(Sensor::Gyro)?,
-        accel: one_triad(Sensor::Accel)?,
+        gyro: stated.gyro.calibrated(&prior, base, &mut findings)?,
+        accel: stated.accel.calibrated(&prior, base, &mut findings)?,
     };
     let mut covariance = ParameterMatrix::zeros();
-    // Both triads stand on one table, where there is one.
-    let of_one_table = observed.gyro.known.iter().any(|known| known.base.is_some());
-    let columns = fits
-        .gyro
-        .by_errors
-        .ncols()
-        .max(fits.accel.by_errors.ncols());
-    let by_errors = |sensor| {
-        fits.get(sensor)
-            .by_errors
-            .clone()
-            .resize_horizontally(columns, 0.0)
-    };
+    let of_all = [&fits.gyro, &fits.accel].map(|fit| fit.by_errors.ncols());
+    let shared = of_all[0].min(of_all[1]);
+    let by_errors = |sensor| fits.get(sensor).by_errors.columns(0, shared);
     for (one, other) in [(Sensor::Gyro, Sensor::Accel), (Sensor::Accel, Sensor::Gyro)] {
-        let first = parameter(one, 0);
-        let mut of_triad = covariance.fixed_view_mut::<PER_TRIAD, PER_TRIAD>(first, first);
-        of_triad.copy_from(&fits.get(one).covariance);
-        if of_one_table {
-            let place = (first, parameter(other, 0));
-            let mut across = covariance.view_mut(place, (PER_TRIAD, PER_TRIAD));
-            across.copy_from(&(by_errors(one) * by_errors(other).transpose()));
+        let (first, second) = (parameter(one, 0), parameter(other, 0));
+        set(&mut covariance, (first, first), &fits.get(one).covariance);
+        // Both triads stand on one table, where there is one.
+        if observed.gyro.base_sigma.is_some() {
+            let across = by_errors(one) * by_errors(other).transpose();
+            let across = SMatrix::from_fn(|i, j| across[(i, j)]);
+            set(&mut covariance, (first, second), &across);
         }
     }
     let triads = PerSensor::from_fn(|sensor| fits.get(sensor).triad);
     Ok((Estimate { triads, covariance }, findings))
 }
 
-/// One triad on a base whose level and north are as stated, or known to this σ only, rad.
-fn one_triad(
-    stated: &Observed,
-    prior: &Model,
+fn set(
+    covariance: &mut ParameterMatrix,
+    place: (usize, usize),
+    part: &SMatrix<f64, PER_TRIAD, PER_TRIAD>,
+) {
+    let mut of_triad = covariance.fixed_view_mut::<PER_TRIAD, PER_TRIAD>(place.0, place.1);
+    of_triad.copy_from(part);
+}
+
+/// One triad by its positions as stated.
+struct Stated<'a> {
+    observed: &'a Observed,
+    fit: Fit,
+    judged: Option<Judged>,
+    /// 1σ of the table's base, rad, if that explains why residuals ring.
     base: Option<f64>,
-    findings: &mut Vec<Finding>,
-) -> Result<Fit, CalibrationError> {
-    let on_base = Observed {
-        base_sigma: base.map_or(stated.base_sigma, Vector3::repeat),
-        ..stated.clone()
-    };
-    let fit = stated.fitted(prior)?;
-    let on_base_fitted = |fit| match base {
-        Some(_) => on_base.fitted(prior),
-        None => Ok(fit),
-    };
-    let Some(residuals) = stated.residuals(&fit.triad) else {
-        return on_base_fitted(fit);
-    };
-    let all: Vec<usize> = (0..stated.known.len()).collect();
-    let of_each: Vec<Vec<usize>> = all.iter().map(|k| (3 * k..3 * k + 3).collect()).collect();
-    let worst = residuals.worst(&of_each);
-    findings.extend(changing_in_time(
-        &residuals,
-        stated,
-        &fit.triad,
-        worst.without,
-    ));
-    if residuals.growth().is_none() {
-        return on_base_fitted(fit);
+}
+
+impl<'a> Stated<'a> {
+    fn new(observed: &'a Observed, prior: &Model) -> Result<Self, CalibrationError> {
+        let fit = observed.fitted(prior)?;
+        // Among the entries of `A` and `D`.
+        let places = [
+            (ParameterKind::Scale, [0, 5, 10]),
+            (ParameterKind::Bias, [3, 7, 11]),
+        ];
+        let judged = Judged::new(&observed.about(&fit.triad), &[observed.sensor], places);
+        let rings = judged
+            .as_ref()
+            .filter(|judged| judged.residuals.growth().is_some());
+        Ok(Self {
+            base: rings.and_then(|judged| base_off(&judged.residuals, observed, &fit.triad)),
+            observed,
+            fit,
+            judged,
+        })
     }
-    // Where one position explains it, the others are as good as stated. Nor are they where the base explains it: they
-    // may agree with each other on what this one alone tells.
-    let base = base_off(&residuals, stated, &fit.triad).and(base);
-    let places = match residuals.would_hold(worst.without, 3) {
-        true => &worst.groups,
-        false => &all,
-    };
-    let wider = match base {
-        Some(_) => on_base,
-        None => on_base.widened(unexplained(&on_base, &fit.triad, places), places),
-    };
-    let wider = wider.fitted(prior)?;
-    let variances = [&fit, &wider].map(|fit| fit.covariance.diagonal());
-    findings.push(Finding::ResidualsLarge {
-        of: stated.sensor.name(),
-        chi_square: residuals.chi_square(),
-        degrees: residuals.degrees(),
-        limit: residuals.limit(),
-        growth: largest_growth(variances[0].as_slice(), variances[1].as_slice()),
-        worst: worst
-            .groups
-            .iter()
-            .map(|&k| stated.known[k].times)
-            .collect(),
-        without: worst.without,
-        base,
-    });
-    Ok(wider)
-}
 
-/// A drift of biases or scale factors that residuals of positions follow.
-fn changing_in_time(
-    residuals: &Residuals,
-    observed: &Observed,
-    triad: &Triad,
-    without_worst: f64,
-) -> Option<Finding> {
-    let equations = observed.of_sensitivity(&triad.sensitivity(), &triad.bias);
-    let of = |kind, of_axes| equations.changing(observed.sensor, kind, of_axes);
-    let changing = [
-        of(ParameterKind::Scale, [0, 5, 10]),
-        of(ParameterKind::Bias, [3, 7, 11]),
-    ];
-    let times = observed
-        .known
-        .iter()
-        .flat_map(|of| [0.5 * (of.times[0] + of.times[1]); 3]);
-    drift(
-        residuals,
-        &changing,
-        &times.collect::<Vec<_>>(),
-        without_worst,
-    )
-}
-
-/// 1σ of the base's level and north, rad, on which both triads stand, if it explains why residuals of one ring.
-fn base_of_both(
-    observed: &PerSensor<Observed>,
-    prior: &Model,
-) -> Result<Option<f64>, CalibrationError> {
-    let mut base: Option<f64> = None;
-    for sensor in Sensor::ALL {
-        let stated = observed.get(sensor);
-        let triad = stated.fitted(prior)?.triad;
-        let residuals = stated
-            .residuals(&triad)
-            .filter(|left| left.growth().is_some());
-        let off = residuals.and_then(|left| base_off(&left, stated, &triad));
-        base = base.into_iter().chain(off).reduce(f64::max);
+    /// On a base whose level and north are as stated, or known to this σ only, rad; wider where residuals ring.
+    fn calibrated(
+        self,
+        prior: &Model,
+        base: Option<f64>,
+        findings: &mut Vec<Finding>,
+    ) -> Result<Fit, CalibrationError> {
+        let observed = self.observed;
+        let on_base = base.map(|sigma| observed.on_base(sigma));
+        findings.extend(self.judged.as_ref().and_then(Judged::drift));
+        let rings = self
+            .judged
+            .as_ref()
+            .filter(|judged| judged.residuals.growth().is_some());
+        let Some(judged) = rings else {
+            return on_base.map_or(Ok(self.fit), |on_base| on_base.fitted(prior));
+        };
+        let Judged {
+            residuals, worst, ..
+        } = judged;
+        // Where one position explains it, the others are as good as stated. Nor are they where the base explains it: they
+        // may agree with each other on what this one alone tells.
+        let all: Vec<usize> = (0..observed.known.len()).collect();
+        let places = match residuals.would_hold(worst.without, 3) {
+            true => &worst.groups,
+            false => &all,
+        };
+        let known = on_base.as_ref().unwrap_or(observed);
+        let base = self.base.and(base);
+        let wider = match base {
+            Some(_) => known.fitted(prior)?,
+            None => {
+                let variance = unexplained(known, &self.fit.triad, places);
+                known.widened(variance, places).fitted(prior)?
+            }
+        };
+        let variances = [&self.fit, &wider].map(|fit| fit.covariance.diagonal());
+        let growth = largest_growth(variances[0].as_slice(), variances[1].as_slice());
+        findings.push(judged.large(observed.sensor.name(), growth, base));
+        Ok(wider)
     }
-    Ok(base)
 }
 
-/// The same of one triad.
+/// 1σ of the base's level and north, rad, if it explains why residuals of a triad ring.
 fn base_off(residuals: &Residuals, observed: &Observed, triad: &Triad) -> Option<f64> {
-    let of_base = observed.by_base(triad)?;
-    let explained = residuals.explained_by(&of_base);
+    observed.base_sigma?;
+    // By a turn of 1 rad.
+    let explained = residuals.explained_by(&observed.on_base(1.0).about(triad).by_unit(BASE));
     let left = residuals.chi_square() - explained.fall;
     let squares: f64 = explained.coefficients.iter().map(|c| c * c).sum();
     (explained.degrees > 0 && residuals.would_hold(left, explained.degrees))
@@ -242,10 +216,7 @@ fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
         if let Some(fit) = fit.filter(|fit| senses(fit) && !rings(fit)) {
             *estimate.triads.get_mut(sensor) = fit.triad;
             let first = parameter(sensor, 0);
-            let mut of_triad = estimate
-                .covariance
-                .fixed_view_mut::<PER_TRIAD, PER_TRIAD>(first, first);
-            of_triad.copy_from(&fit.covariance);
+            set(&mut estimate.covariance, (first, first), &fit.covariance);
         }
     }
     estimate

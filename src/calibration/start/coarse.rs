@@ -7,12 +7,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::earth_rate::{add_rates, gyro_bias_at_rest, gyrocompass};
 use super::equations::{Equations, gauss_newton};
-use super::gravity::{AtRest, Chain, add_magnitude, spans, up};
+use super::gravity::{AtRest, Chain, add_magnitude, events, up};
+use super::judged::Judged;
 use super::table;
 use crate::attitude::{exp, level};
-use crate::calibration::checks::drift::drift;
 use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::residuals::Residuals;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation, singular};
@@ -148,9 +147,8 @@ pub fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
     let (turned, by_hand) = calibrated_as_held(problem, &dwells)?;
     let prior = from_vector(problem.model.form, &problem.model.prior_mean);
     let singular = || singular(&prior);
-    let residuals = turned.equations.residuals().ok_or_else(singular)?;
-    let growth = residuals.growth();
-    let ringing = ringing(&turned.equations, &residuals, &dwells);
+    let judged = judged(&turned).ok_or_else(singular)?;
+    let growth = judged.residuals.growth();
     // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
     let turned = match growth {
         None => turned,
@@ -165,76 +163,25 @@ pub fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
     };
     let variance = growth.unwrap_or(1.0).powi(2);
     let Turned { at, equations, .. } = turned;
-    let distance = equations.covariance_of_distance();
+    let gain = equations.gain().ok_or_else(singular)?;
+    let large = growth.map(|growth| judged.large("both triads", growth, None));
     Ok(ByGravity {
         estimate: Estimate {
             triads: at.triads,
-            covariance: equations.covariance().ok_or_else(singular)? * variance,
+            covariance: equations.whole(&equations.covariance(&gain)) * variance,
         },
-        distance: distance.ok_or_else(singular)? * variance,
+        distance: equations.whole(&equations.covariance_of_distance(&gain)) * variance,
         by_hand,
-        ringing,
+        ringing: large.into_iter().chain(judged.drift()).collect(),
     })
 }
 
-/// Residuals beyond chance, and a drift that they follow.
-fn ringing(equations: &Equations, residuals: &Residuals, dwells: &[Vec<AtRest>]) -> Vec<Finding> {
-    let (groups, times) = dwells_and_moves(dwells);
-    let worst = residuals.worst(&groups);
-    let mut of_equation = vec![0.0; equations.count()];
-    for (group, [begin, end]) in groups.iter().zip(&times) {
-        for &equation in group {
-            of_equation[equation] = 0.5 * (begin + end);
-        }
-    }
-    let kinds = [
+fn judged(turned: &Turned) -> Option<Judged> {
+    let places = [
         (ParameterKind::Scale, [0, 1, 2]),
         (ParameterKind::Bias, [9, 10, 11]),
     ];
-    let changing = Sensor::ALL
-        .map(|sensor| kinds.map(|(kind, of_axes)| equations.changing(sensor, kind, of_axes)));
-    let drift = drift(
-        residuals,
-        changing.as_flattened(),
-        &of_equation,
-        worst.without,
-    );
-    let large = residuals.growth().map(|growth| Finding::ResidualsLarge {
-        of: "both triads",
-        chi_square: residuals.chi_square(),
-        degrees: residuals.degrees(),
-        limit: residuals.limit(),
-        growth,
-        worst: worst.groups.iter().map(|&k| times[k]).collect(),
-        without: worst.without,
-        base: None,
-    });
-    large.into_iter().chain(drift).collect()
-}
-
-/// The equations of each dwell and of each move, in the order in which [`Turned`] adds them, with begin and end of each
-/// in s.
-fn dwells_and_moves(dwells: &[Vec<AtRest>]) -> (Vec<Vec<usize>>, Vec<[f64; 2]>) {
-    let (mut groups, mut times) = (Vec::new(), Vec::new());
-    // First the magnitude of gravity in every dwell.
-    let mut next = dwells.iter().flatten().count();
-    for dwells in dwells {
-        for pair in dwells.windows(2) {
-            groups.push((next..next + 2).collect());
-            times.push([pair[0].times[1], pair[1].times[0]]);
-            next += 2;
-        }
-        for dwell in dwells {
-            groups.push(
-                std::iter::once(dwell.number)
-                    .chain(next..next + 3)
-                    .collect(),
-            );
-            times.push(dwell.times);
-            next += 3;
-        }
-    }
-    (groups, times)
+    Judged::new(&turned.equations, &Sensor::ALL, places)
 }
 
 /// Both triads and attitudes as gravity and the rates at rest show them.
@@ -320,7 +267,7 @@ fn turned(
             heading,
         )?;
     }
-    equations.spans = spans(problem, dwells);
+    equations.events = events(problem, dwells);
     Ok(Turned {
         at: at.clone(),
         heading_sigma: headings.iter().map(|heading| heading.sigma).collect(),
@@ -338,8 +285,7 @@ fn calibrated_as_held(
         return Ok((stated, None));
     }
     // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
-    let residuals = stated.equations.residuals();
-    let tell = residuals.is_none_or(|residuals| residuals.growth().is_some());
+    let tell = judged(&stated).is_none_or(|judged| judged.residuals.growth().is_some());
     if tell || problem.options.noise == NoisePolicy::Stated {
         return Ok((stated, None));
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
-use super::equations::{Common, Equations, Partials, Rows};
+use super::equations::{Common, Equations, Rows, of};
 use super::gravity::{AtRest, Chain, ROUNDING, input_errors, of_noise};
 use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
@@ -10,18 +10,8 @@ use crate::calibration::linearisation::singular;
 use crate::calibration::model::Model;
 use crate::calibration::noise::{BY_HAND, Source};
 use crate::calibration::problem::Stretch;
-use crate::earth::{ROTATION_RATE, Site};
+use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
-
-/// Mean rate at rest in a dwell.
-struct Rest {
-    /// Attitude up to a heading common to all of a stretch, body to level.
-    attitude: Matrix3<f64>,
-    /// Corrected rate along body axes, rad/s.
-    rate: Vector3<f64>,
-    /// Variance of the rate per axis.
-    variance: f64,
-}
 
 /// The heading common to all attitudes of a stretch.
 #[derive(Debug, Clone, Copy)]
@@ -67,7 +57,7 @@ pub fn gyro_bias_at_rest(dwells: &[Vec<AtRest>]) -> Vector3<f64> {
 }
 
 /// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest
-/// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other.
+/// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other. An error where a rate is no number.
 pub fn gyrocompass(
     model: &Model,
     stretches: &[Stretch],
@@ -77,53 +67,50 @@ pub fn gyrocompass(
 ) -> Result<Gyrocompass, CalibrationError> {
     let triad = &triads.gyro;
     let correction = triad.correction().ok_or_else(|| singular(triads))?;
-    let turning = model.turning_at_rest.powi(2);
-    let rests = chains.iter().zip(dwells).map(|(chain, dwells)| {
-        let rest = |(attitude, dwell): (&Matrix3<f64>, &AtRest)| Rest {
-            attitude: *attitude,
-            rate: correction * (dwell.mean.gyro.output - triad.bias),
-            variance: dwell.mean.gyro.variance + turning / dwell.duration(),
-        };
-        chain.attitudes.iter().zip(dwells).map(rest).collect()
-    });
-    let sites = stretches.iter().map(|stretch| stretch.run.site);
-    compass(&sites.zip(rests).collect::<Vec<_>>()).ok_or_else(|| singular(triads))
-}
-
-/// `None` where a rate is no number.
-fn compass(stretches: &[(Site, Vec<Rest>)]) -> Option<Gyrocompass> {
     // Unknown: b, and for each stretch Earth rate along its two level axes. Before any rate is observed
     // none exceeds Earth rate by much: b is the remainder of a bias taken from these very rates.
     let n = 3 + 2 * stretches.len();
+    let first = |stretch: usize| 3 + 2 * stretch;
     let mut information = DMatrix::<f64>::identity(n, n) / ROTATION_RATE.powi(2);
     let mut vector = DVector::<f64>::zeros(n);
-    for (number, (site, rests)) in stretches.iter().enumerate() {
-        let first = 3 + 2 * number;
-        let up = Vector3::z() * site.earth_rate_n().z;
-        for rest in rests {
+    for (stretch, (of_stretch, dwells)) in stretches.iter().zip(dwells).enumerate() {
+        let up = Vector3::z() * of_stretch.run.site.earth_rate_n().z;
+        for (attitude, dwell) in chains[stretch].attitudes.iter().zip(dwells) {
+            let rate = correction * (dwell.mean.gyro.output - triad.bias);
             let mut rows = DMatrix::zeros(3, n);
-            rows.fixed_columns_mut::<3>(0).copy_from(&rest.attitude);
-            rows[(0, first)] = 1.0;
-            rows[(1, first + 1)] = 1.0;
+            rows.fixed_columns_mut::<3>(0).copy_from(attitude);
+            rows[(0, first(stretch))] = 1.0;
+            rows[(1, first(stretch) + 1)] = 1.0;
             // Tilts of a milliradian turn that much of Earth rate.
-            let weight = 1.0 / (rest.variance + (1e-3 * ROTATION_RATE).powi(2));
-            vector += rows.tr_mul(&(rest.attitude * rest.rate - up)) * weight;
+            let by_tilt = (1e-3 * ROTATION_RATE).powi(2);
+            let turning = model.turning_at_rest.powi(2) / dwell.duration();
+            let weight = 1.0 / (dwell.mean.gyro.variance + turning + by_tilt);
+            vector += rows.tr_mul(&(attitude * rate - up)) * weight;
             information += rows.tr_mul(&rows) * weight;
         }
     }
-    let covariance = information.cholesky()?.inverse();
+    let covariance = information
+        .cholesky()
+        .ok_or_else(|| singular(triads))?
+        .inverse();
     let found = &covariance * vector;
-    let heading = |(stretch, (site, _)): (usize, &(Site, Vec<Rest>))| {
-        let first = 3 + 2 * stretch;
-        let angle = found[first + 1].atan2(found[first]) - std::f64::consts::FRAC_PI_2;
+    let heading = |(stretch, of_stretch): (usize, &Stretch)| {
+        let first = first(stretch);
+        let (east, north) = (found[first], found[first + 1]);
+        // Where nothing but rounding is found, as of a single dwell, the heading stays as it is.
+        let angle = match east.hypot(north) > ROUNDING * ROTATION_RATE {
+            true => north.atan2(east) - std::f64::consts::FRAC_PI_2,
+            false => 0.0,
+        };
         let level = covariance.fixed_view::<2, 2>(first, first).into_owned();
+        let level = level.symmetric_eigenvalues().max().sqrt();
         Heading {
             stretch,
             turn: exp(Vector3::z() * -angle),
-            sigma: level.symmetric_eigenvalues().max().sqrt() / site.earth_rate_n().y.abs(),
+            sigma: level / of_stretch.run.site.earth_rate_n().y.abs(),
         }
     };
-    Some(Gyrocompass {
+    Ok(Gyrocompass {
         headings: stretches.iter().enumerate().map(heading).collect(),
         bias: found.fixed_rows::<3>(0).into_owned(),
     })
@@ -150,22 +137,19 @@ pub fn add_rates(
         let partials = input_errors(triad, &correction, &rate);
         let by_turning = 1.0 / dwell.duration();
         let own = model.turning_at_rest.powi(2) * by_turning + ROUNDING.powi(2);
+        let residual = rate - attitude.tr_mul(&earth_rate);
         equations.add(&Rows {
-            partials: PerSensor {
-                gyro: partials,
-                accel: Partials::zeros(),
-            },
-            residual: rate - attitude.tr_mul(&earth_rate),
+            event: dwell.event(),
             weighted: Vector3::repeat(dwell.mean.gyro.variance + own + of_heading),
-            own: Vector3::repeat(own),
             common: vec![
-                (dwell.noise(Sensor::Gyro), of_noise(&partials)),
+                of_noise(Sensor::Gyro, dwell.event(), &partials),
                 heading.error(&attitude.tr_mul(&turned)),
             ],
             by_hand: BY_HAND.map(|source| match source {
                 Source::Turning => by_turning,
                 _ => 0.0,
             }),
+            ..Rows::new(of(Sensor::Gyro, &partials), residual, own)
         });
     }
     Ok(())

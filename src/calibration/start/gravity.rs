@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix1, Matrix3, SMatrix, Vector1, Vector2, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector1, Vector2, Vector3};
 
 use super::earth_rate::Heading;
-use super::equations::{Common, Equations, Partials, Rows, Span, of_parameters};
+use super::equations::{Common, Equations, Event, OfTriad, Rows, of, of_parameters};
 use crate::attitude::{exp, skew, tilt};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
@@ -61,58 +61,54 @@ impl AtRest {
         self.times[1] - self.times[0]
     }
 
-    /// The mean noise of a triad in it.
-    pub fn noise(&self, sensor: Sensor) -> Common {
-        match sensor {
-            Sensor::Accel => Common::Noise(3 * self.number),
-            Sensor::Gyro => Common::Noise(3 * self.number + 1),
-        }
-    }
-
-    /// The mean noise of the gyros over the move before it.
-    fn noise_before(&self) -> Common {
-        Common::Noise(3 * self.number + 2)
+    /// The number of the event: of each dwell that follows that of the move before it.
+    pub fn event(&self) -> usize {
+        2 * self.number + 1
     }
 }
 
-/// The spans of time with mean noise: of each dwell those of the accelerometers, of the gyros, and of the gyros over the
-/// move before it. There it is that of the bias alone: each equation has the random walk for itself.
-pub fn spans(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Span> {
-    let mut spans = Vec::new();
+/// Each dwell, and the move before it. The noise of that is that of the bias alone: each row has the random walk for
+/// itself.
+pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
+    let mut events = Vec::new();
     for (stretch, dwells) in problem.stretches().iter().zip(dwells) {
-        let span = |sensor: Sensor, times: [f64; 2], variance: Option<f64>| {
-            let noise = Noise {
-                random_walk: 0.0,
-                ..*stretch.run.instrument.noise.get(sensor)
-            };
-            Span {
-                sensor,
-                recording: stretch.recording,
-                times,
-                variance: variance.unwrap_or_else(|| noise.covariance_of_means(times, times)),
-                noise,
-            }
+        let noise = PerSensor::from_fn(|sensor| Noise {
+            random_walk: 0.0,
+            ..*stretch.run.instrument.noise.get(sensor)
+        });
+        let event = |times: [f64; 2], variance: &dyn Fn(Sensor) -> f64| Event {
+            recording: stretch.recording,
+            times,
+            variance: PerSensor::from_fn(variance),
+            noise,
         };
         let mut before = dwells.first().map_or(0.0, |first| first.times[0]);
         for dwell in dwells {
-            let variance = |sensor| Some(dwell.mean.get(sensor).variance);
-            spans.push(span(Sensor::Accel, dwell.times, variance(Sensor::Accel)));
-            spans.push(span(Sensor::Gyro, dwell.times, variance(Sensor::Gyro)));
-            spans.push(span(Sensor::Gyro, [before, dwell.times[0]], None));
+            let times = [before, dwell.times[0]];
+            let of_move = |sensor| noise.get(sensor).covariance_of_means(times, times);
+            events.push(event(times, &of_move));
+            events.push(event(dwell.times, &|sensor| {
+                dwell.mean.get(sensor).variance
+            }));
             before = dwell.times[1];
         }
     }
-    spans
+    events
 }
 
 /// Error of a triad's computed input, estimated − true, by the error of each of its parameters.
-pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f64>) -> Partials<3> {
+pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f64>) -> OfTriad<3> {
     correction * of_parameters(triad, input)
 }
 
-/// How some rows follow the mean noise of a triad: as they do its biases.
-pub fn of_noise<const N: usize>(partials: &Partials<N>) -> SMatrix<f64, N, 3> {
-    partials.fixed_columns::<3>(BIAS).into_owned()
+/// How some rows follow the mean noise of a triad over an event: as they do its biases.
+pub fn of_noise<const N: usize>(
+    sensor: Sensor,
+    event: usize,
+    partials: &OfTriad<N>,
+) -> (Common, SMatrix<f64, N, 3>) {
+    let of_biases = partials.fixed_columns::<3>(BIAS).into_owned();
+    (Common::Noise(sensor, event), of_biases)
 }
 
 /// The mean specific force in a dwell.
@@ -122,7 +118,7 @@ struct Force {
     /// Up along body axes.
     up: Vector3<f64>,
     /// The force's error by the error of each accelerometer parameter.
-    error: Partials<3>,
+    error: OfTriad<3>,
 }
 
 impl Force {
@@ -160,16 +156,12 @@ pub fn add_magnitude(
         for dwell in dwells {
             let Force { size, up, error } = Force::of(triads, dwell)?;
             let partials = up.transpose() * error;
+            let residual = Vector1::new(size - stretch.run.site.gravity);
             equations.add(&Rows {
-                residual: Vector1::new(size - stretch.run.site.gravity),
+                event: dwell.event(),
                 weighted: Vector1::new(dwell.mean.accel.variance + ROUNDING.powi(2)),
-                own: Matrix1::new(ROUNDING.powi(2)),
-                common: vec![(dwell.noise(Sensor::Accel), of_noise(&partials))],
-                partials: PerSensor {
-                    gyro: Partials::zeros(),
-                    accel: partials,
-                },
-                by_hand: Default::default(),
+                common: vec![of_noise(Sensor::Accel, dwell.event(), &partials)],
+                ..Rows::new(of(Sensor::Accel, &partials), residual, ROUNDING.powi(2))
             });
         }
     }
@@ -189,11 +181,11 @@ struct Move {
     /// The tilt that the gyros are wrong by after it, `C_computed = (I − [φ×]) C_true`, …
     tilt: Vector3<f64>,
     /// … by the error of each gyro parameter, …
-    of_gyro: Partials<3>,
+    of_gyro: OfTriad<3>,
     /// … and by that of each accelerometer parameter, which make Up before …
-    of_before: Partials<3>,
+    of_before: OfTriad<3>,
     /// … and after it.
-    of_after: Partials<3>,
+    of_after: OfTriad<3>,
     /// Variance of each of its two components by noise and interpolation of the gyros, …
     walk: f64,
     /// … by each of [`BY_HAND`] where that is one, …
@@ -239,28 +231,31 @@ impl Chain {
         let earth_rate = stretch.run.site.earth_rate_n();
         // Earth rate by a heading that is wrong by an angle of one.
         let turned = Vector3::z().cross(&earth_rate);
-        for (of, pair) in self.moves.iter().zip(dwells.windows(2)) {
-            let level =
-                |partials: &Partials<3>| (heading.turn * partials).fixed_rows::<2>(0).into_owned();
-            let [of_gyro, of_before, of_after] =
-                [&of.of_gyro, &of.of_before, &of.of_after].map(level);
+        for (turn, pair) in self.moves.iter().zip(dwells.windows(2)) {
+            let level = |of: &OfTriad<3>| (heading.turn * of).fixed_rows::<2>(0).into_owned();
+            let of_gyro = level(&turn.of_gyro);
+            let [of_before, of_after] = [&turn.of_before, &turn.of_after].map(level);
+            let [before, after] = [&pair[0], &pair[1]].map(AtRest::event);
+            let event = after - 1;
             // As much of Earth rate as the heading may be wrong by, all of it at most.
-            let of_heading = (ROTATION_RATE * heading.known() * of.duration).powi(2);
+            let of_heading = (ROTATION_RATE * heading.known() * turn.duration).powi(2);
+            let of_accel = of(Sensor::Accel, &(of_before + of_after));
+            let residual = (heading.turn * turn.tilt).xy();
             equations.add(&Rows {
-                residual: (heading.turn * of.tilt).xy(),
-                weighted: Vector2::repeat(of.variance + of_heading + ROUNDING.powi(2)),
-                own: Vector2::repeat(of.walk + ROUNDING.powi(2)),
+                event,
+                weighted: Vector2::repeat(turn.variance + of_heading + ROUNDING.powi(2)),
                 common: vec![
-                    (pair[0].noise(Sensor::Accel), of_noise(&of_before)),
-                    (pair[1].noise(Sensor::Accel), of_noise(&of_after)),
-                    (pair[1].noise_before(), of_noise(&of_gyro)),
-                    heading.error(&(turned * -of.duration).xy()),
+                    of_noise(Sensor::Accel, before, &of_before),
+                    of_noise(Sensor::Accel, after, &of_after),
+                    of_noise(Sensor::Gyro, event, &of_gyro),
+                    heading.error(&(turned * -turn.duration).xy()),
                 ],
-                partials: PerSensor {
-                    gyro: of_gyro,
-                    accel: of_before + of_after,
-                },
-                by_hand: of.by_hand,
+                by_hand: turn.by_hand,
+                ..Rows::new(
+                    of(Sensor::Gyro, &of_gyro) + of_accel,
+                    residual,
+                    turn.walk + ROUNDING.powi(2),
+                )
             });
         }
     }

@@ -97,7 +97,7 @@ pub fn observed(run: &Run, rests: &[Rest], sections: &[Section]) -> PerSensor<Ob
     PerSensor::from_fn(|sensor| Observed {
         sensor,
         noise: *run.instrument.noise.get(sensor),
-        base_sigma: Vector3::zeros(),
+        base_sigma: None,
         known: match sensor {
             Sensor::Gyro => of_gyros(run, rests, sections),
             Sensor::Accel => of_accelerometers(run, sections),
@@ -158,7 +158,6 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
             Known {
                 position,
                 times: section.times,
-                base: None,
                 errors,
             }
         });
@@ -179,7 +178,6 @@ fn of_accelerometers(run: &Run, sections: &[Section]) -> Vec<Known> {
         let position = force_by_hand(sigma, force, output, Vector3::repeat(variance));
         Known {
             times: section.times,
-            base: None,
             errors: by_tilts(&position, sigma, number).to_vec(),
             position,
         }
@@ -382,13 +380,12 @@ mod tests {
             let known = positions.iter().enumerate().map(|(k, position)| Known {
                 position: *position,
                 times: [k as f64, k as f64 + 1.0],
-                base: None,
                 errors: errors(k, position, tilt),
             });
             let observed = Observed {
                 sensor: Sensor::Accel,
                 noise: Noise::default(),
-                base_sigma: Vector3::zeros(),
+                base_sigma: None,
                 known: known.collect(),
             };
             let Fit {

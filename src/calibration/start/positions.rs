@@ -1,11 +1,9 @@
 //! One triad from its mean outputs under known inputs, by generalised least squares.
 
-use std::ops::AddAssign;
-
-use nalgebra::{DMatrix, Matrix3, Matrix4, SMatrix, Vector3, Vector4};
+use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
 use super::equations::{
-    Common, Equations, Partials, Rows, Span, gauss_newton, of, of_parameters, of_sensitivity,
+    Common, Equations, Event, Gain, OfTriad, Rows, gauss_newton, of, of_parameters, of_sensitivity,
 };
 use crate::calibration::checks::residuals::Residuals;
 use crate::calibration::error::CalibrationError;
@@ -21,6 +19,8 @@ const SMALLEST_EIGENVALUE: f64 = 1e-4;
 const SMALL: f64 = 1e-6;
 /// σ over the largest input of an output for which no noise is stated.
 const NOISELESS: f64 = 1e-9;
+/// Number of the error of a table's base: of 1 rad about East, North and Up.
+pub const BASE: usize = 0;
 
 /// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,9 +41,7 @@ pub struct Known {
     pub position: Position,
     /// Begin and end, s.
     pub times: [f64; 2],
-    /// How its input changes with a turn of the table's base by 1 rad about East, North and Up.
-    pub base: Option<Matrix3<f64>>,
-    /// How it changes with other errors of unit covariance, by number from one on.
+    /// How the input changes with errors of unit covariance, by number, and with that of the [`BASE`].
     pub errors: Vec<(usize, Matrix3<f64>)>,
 }
 
@@ -52,8 +50,8 @@ pub struct Known {
 pub struct Observed {
     pub sensor: Sensor,
     pub noise: Noise,
-    /// 1σ of the turn of the table's base, rad.
-    pub base_sigma: Vector3<f64>,
+    /// 1σ of the table's base, rad; `None` without a table.
+    pub base_sigma: Option<Vector3<f64>>,
     pub known: Vec<Known>,
 }
 
@@ -61,7 +59,7 @@ pub struct Observed {
 pub struct Fit {
     pub triad: Triad,
     pub covariance: SMatrix<f64, PER_TRIAD, PER_TRIAD>,
-    /// How it follows the errors of unit covariance, the table's base first, three columns each.
+    /// How it follows the errors that its inputs have in common, three columns each.
     pub by_errors: DMatrix<f64>,
 }
 
@@ -77,13 +75,18 @@ impl Observed {
         wider
     }
 
-    fn positions(&self) -> impl Iterator<Item = &Position> {
-        self.known.iter().map(|known| &known.position)
+    /// The same on a table's base that is known to this σ, rad.
+    pub fn on_base(&self, sigma: f64) -> Self {
+        Self {
+            base_sigma: self.base_sigma.map(|_| Vector3::repeat(sigma)),
+            ..self.clone()
+        }
     }
 
     /// Largest input.
     fn size(&self) -> f64 {
-        self.positions().map(|p| p.input.norm()).fold(0.0, f64::max)
+        let inputs = self.known.iter().map(|known| known.position.input.norm());
+        inputs.fold(0.0, f64::max)
     }
 
     /// Adds the equations of the outputs about a sensitivity and a bias.
@@ -91,42 +94,48 @@ impl Observed {
         &self,
         mut equations: Equations,
         (a, bias): (&Matrix3<f64>, &Vector3<f64>),
-        partials: impl Fn(&Vector3<f64>) -> Partials<3>,
+        partials: impl Fn(&Vector3<f64>) -> OfTriad<3>,
     ) -> Equations {
         let least = (NOISELESS * self.size()).powi(2);
-        equations.correlated = self.positions().all(|p| p.weighted == p.variance);
-        for (number, known) in self.known.iter().enumerate() {
-            let Position {
-                input,
-                output,
-                variance,
-                weighted,
-            } = known.position;
-            equations.spans.push(Span {
-                sensor: self.sensor,
+        let base_sigma = self.base_sigma.unwrap_or_default();
+        for (
+            event,
+            Known {
+                position,
+                times,
+                errors,
+            },
+        ) in self.known.iter().enumerate()
+        {
+            equations.events.push(Event {
                 recording: 0,
-                times: known.times,
-                variance: 0.0,
-                noise: self.noise,
+                times: *times,
+                variance: PerSensor::default(),
+                noise: PerSensor::from_fn(|_| self.noise),
             });
-            let base = known
-                .base
-                .map(|base| base * Matrix3::from_diagonal(&self.base_sigma));
-            let errors = base
-                .into_iter()
-                .map(|base| (0, base))
-                .chain(known.errors.iter().copied());
-            let errors = errors.map(|(number, of_input)| (Common::Unit(number), a * of_input));
-            let own = (Common::Noise(number), Matrix3::identity());
+            let mut common = vec![(Common::Noise(self.sensor, event), Matrix3::identity())];
+            for &(number, of_input) in errors {
+                let sigma = match number {
+                    BASE => base_sigma,
+                    _ => Vector3::repeat(1.0),
+                };
+                let of_output = a * of_input * Matrix3::from_diagonal(&sigma);
+                common.push((Common::Unit(number), of_output));
+            }
             equations.add(&Rows {
-                partials: of(self.sensor, partials(&input)),
-                residual: output - a * input - bias,
-                weighted: weighted.map(|v| v.max(least)),
-                own: variance.map(|v| v.max(least)),
-                common: std::iter::once(own).chain(errors).collect(),
-                by_hand: Default::default(),
+                event,
+                weighted: position.weighted.map(|v| v.max(least)),
+                own: position.variance.map(|v| v.max(least)),
+                common,
+                ..Rows::new(
+                    of(self.sensor, &partials(&position.input)),
+                    position.output - a * position.input - bias,
+                    0.0,
+                )
             });
         }
+        let mut positions = self.known.iter().map(|known| &known.position);
+        equations.correlated = positions.all(|p| p.weighted == p.variance);
         equations
     }
 
@@ -136,9 +145,8 @@ impl Observed {
         let mut of_triad = sigma.fixed_rows_mut::<PER_TRIAD>(parameter(self.sensor, 0));
         of_triad.fill(f64::INFINITY);
         let equations = Equations::new(&ParameterVector::zeros(), &sigma);
-        self.add(equations, (a, bias), |input| {
-            of_sensitivity(input.push(1.0))
-        })
+        let partials = |input: &Vector3<f64>| of_sensitivity(input.push(1.0));
+        self.add(equations, (a, bias), partials)
     }
 
     /// Equations of the parameters of a triad and their prior.
@@ -149,29 +157,24 @@ impl Observed {
         self.add(equations, at, |input| of_parameters(triad, input))
     }
 
-    /// What positions leave of any triad, their inputs' errors taken through this one.
-    pub fn residuals(&self, triad: &Triad) -> Option<Residuals> {
+    /// Equations of `A` and `D` about a triad.
+    pub fn about(&self, triad: &Triad) -> Equations {
         self.of_sensitivity(&triad.sensitivity(), &triad.bias)
-            .residuals()
     }
 
-    /// How all outputs of a triad, over the σ by which each is weighted, follow a turn of the table's base by 1 rad; `None`
-    /// without a table.
-    pub fn by_base(&self, triad: &Triad) -> Option<DMatrix<f64>> {
-        self.known.first()?.base?;
-        let on_base = Self {
-            base_sigma: Vector3::repeat(1.0),
-            ..self.clone()
-        };
-        let equations = on_base.of_sensitivity(&triad.sensitivity(), &triad.bias);
-        Some(equations.by_unit(0))
+    /// What positions leave of any triad, their inputs' errors taken through this one.
+    pub fn residuals(&self, triad: &Triad) -> Option<Residuals> {
+        let equations = self.about(triad);
+        let (design, residual) = equations.scaled();
+        Residuals::new(&design, &residual, &equations.errors())
     }
 
     /// One triad from positions; with what is known beforehand where they do not know every parameter better.
     pub fn fitted(&self, model: &Model) -> Result<Fit, CalibrationError> {
-        let sigma = |k: usize| model.prior_sigma[parameter(self.sensor, k)];
+        let first = parameter(self.sensor, 0);
+        let sigma = model.prior_sigma.fixed_rows::<PER_TRIAD>(first);
         let better = |fit: &Fit| {
-            (0..PER_TRIAD).all(|k| sigma(k) == 0.0 || fit.covariance[(k, k)].sqrt() < sigma(k))
+            (0..PER_TRIAD).all(|k| sigma[k] == 0.0 || fit.covariance[(k, k)].sqrt() < sigma[k])
         };
         if let Some(fit) = self.determined(model.form).filter(better) {
             return Ok(fit);
@@ -182,74 +185,69 @@ impl Observed {
         let triads = gauss_newton(prior, &smallest, equations)?;
         let equations = self.of_parameters(model, &triads);
         let sensor = self.sensor;
-        let singular = CalibrationError::Singular { sensor };
-        self.fit(
-            *triads.get(sensor),
-            &equations,
-            &DMatrix::identity(PER_TRIAD, PER_TRIAD),
-        )
-        .ok_or(singular)
+        let gain = equations
+            .gain()
+            .ok_or(CalibrationError::Singular { sensor })?;
+        let unknown = equations.unknown.iter().map(|index| index - first);
+        let mut by_unknowns = DMatrix::zeros(PER_TRIAD, equations.unknown.len());
+        unknown
+            .enumerate()
+            .for_each(|(column, row)| by_unknowns[(row, column)] = 1.0);
+        Ok(self.fit(*triads.get(sensor), &equations, &gain, &by_unknowns))
     }
 
     /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the form's split. `None`
     /// if fewer than four positions, or positions that leave a row undetermined.
     pub fn determined(&self, form: InstallationForm) -> Option<Fit> {
-        let size = self.size();
-        if self.known.len() < 4 || size <= 0.0 || self.in_a_plane(size) {
+        let (mut a, mut bias) = (Matrix3::identity(), Vector3::zeros());
+        let mut equations = self.of_sensitivity(&a, &bias);
+        if self.known.len() < 4 || self.size() <= 0.0 || in_a_plane(&equations) {
             return None;
         }
-        let (mut a, mut bias) = (Matrix3::identity(), Vector3::zeros());
         // The errors of the inputs reach the outputs through the triad itself.
+        let mut gain = None;
         for _ in 0..2 {
-            let step = self.of_sensitivity(&a, &bias).step().ok()?;
-            let step = step.fixed_rows::<PER_TRIAD>(parameter(self.sensor, 0));
-            for axis in 0..3 {
-                a.row_mut(axis)
-                    .add_assign(step.fixed_rows::<3>(4 * axis).transpose());
-                bias[axis] += step[4 * axis + 3];
-            }
+            let by_rows = equations.gain()?;
+            let step = equations.found(&by_rows);
+            a += Matrix3::from_fn(|i, j| step[4 * i + j]);
+            bias += Vector3::from_fn(|i, _| step[4 * i + 3]);
+            equations = self.of_sensitivity(&a, &bias);
+            gain = Some(by_rows);
         }
         let triad = Triad::from_sensitivity(form, &a, bias);
         triad.correction()?;
-        self.fit(
-            triad,
-            &self.of_sensitivity(&a, &bias),
-            &split(form, &a, &bias),
-        )
+        Some(self.fit(triad, &equations, &gain?, &split(form, &a, &bias)))
     }
 
-    /// A triad whose parameters follow the unknowns of some equations so.
-    fn fit(&self, triad: Triad, equations: &Equations, by_unknowns: &DMatrix<f64>) -> Option<Fit> {
-        let first = parameter(self.sensor, 0);
-        let covariance = equations.covariance()?;
-        let covariance = covariance.fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
-        let covariance = by_unknowns * covariance * by_unknowns.transpose();
-        Some(Fit {
+    /// A triad whose parameters follow the unknowns of equations so, and these the residuals by a gain.
+    fn fit(
+        &self,
+        triad: Triad,
+        equations: &Equations,
+        gain: &Gain,
+        by_unknowns: &DMatrix<f64>,
+    ) -> Fit {
+        let covariance = by_unknowns * equations.covariance(gain) * by_unknowns.transpose();
+        let numbers = self.known.iter().flat_map(|known| &known.errors);
+        let count = numbers.map(|(number, _)| number + 1).max().unwrap_or(0);
+        Fit {
             triad,
             covariance: SMatrix::from_fn(|i, j| covariance[(i, j)]),
-            by_errors: by_unknowns * equations.by_units()?.rows(first, PER_TRIAD),
-        })
+            by_errors: by_unknowns * equations.by_units(gain, count),
+        }
     }
+}
 
-    /// Whether positions leave a row undetermined: in a plane they leave an eigenvalue of nothing but rounding
-    /// and table error, whatever the weights.
-    fn in_a_plane(&self, size: f64) -> bool {
-        (0..3).any(|axis| {
-            let mut information = Matrix4::zeros();
-            for position in self.positions() {
-                let row: Vector4<f64> = (position.input / size).push(1.0);
-                let variance = position.weighted[axis].max((NOISELESS * size).powi(2));
-                information += row * row.transpose() / variance;
-            }
-            let diagonal = information.diagonal();
-            if diagonal.min() <= 0.0 {
-                return true;
-            }
-            let weight = Matrix4::from_diagonal(&diagonal.map(|v: f64| v.sqrt().recip()));
-            let correlations = weight * information * weight;
-            correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE
-        })
-    }
+/// Whether positions leave a row undetermined: in a plane they leave an eigenvalue of nothing but rounding
+/// and table error, whatever the weights.
+fn in_a_plane(equations: &Equations) -> bool {
+    let (mut design, _) = equations.scaled();
+    let norms: Vec<f64> = design
+        .column_iter_mut()
+        .map(|mut column| column.normalize_mut())
+        .collect();
+    let correlations = design.tr_mul(&design);
+    norms.contains(&0.0) || correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE
 }
 
 /// One triad from positions that have nothing in common: least squares for `A = K C` and `D` row by row, then the
@@ -262,14 +260,13 @@ pub fn six_position_triad(
     let known = positions.iter().enumerate().map(|(k, &position)| Known {
         position,
         times: [k as f64, k as f64 + 1.0],
-        base: None,
         errors: Vec::new(),
     });
     let observed = Observed {
         // Of either triad alike.
         sensor: Sensor::Gyro,
         noise: Noise::default(),
-        base_sigma: Vector3::zeros(),
+        base_sigma: None,
         known: known.collect(),
     };
     let fit = observed.determined(form)?;

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::equations::{Equations, Rows};
+use super::equations::{Equations, Partials, Rows, of};
 use super::gravity::ROUNDING;
-use super::positions::{Known, Observed, Position};
+use super::positions::{BASE, Known, Observed, Position};
 use crate::attitude::{log, skew};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
@@ -39,7 +39,7 @@ pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<
         let MeanOutput { output, variance } = dwell.mean(sensor, run);
         let variance = Vector3::repeat(variance);
         let of_input = position.attitude.tr_mul(&skew(sensed));
-        let mut errors = Vec::new();
+        let mut errors = vec![(BASE, of_input)];
         let angles = run.recording.table.as_ref().map(|table| &table.axes);
         if let Some(angles) = angles.and_then(|of| of.get(position.readings.start)) {
             let response = axis_response(angles);
@@ -62,14 +62,13 @@ pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<
                 weighted: variance,
             },
             times: dwell.times(run),
-            base: Some(of_input),
             errors,
         })
     });
     Some(Observed {
         sensor,
         noise: *run.instrument.noise.get(sensor),
-        base_sigma: Vector3::from_fn(|k, _| model.geometry.base[k]),
+        base_sigma: Some(Vector3::from_fn(|k, _| model.geometry.base[k])),
         known: known.collect::<Option<_>>()?,
     })
 }
@@ -150,17 +149,14 @@ fn add(
     residual: Vector3<f64>,
     variance: f64,
 ) {
-    let rows = |sensor| {
-        block
+    let mut partials = Partials::zeros();
+    for sensor in Sensor::ALL {
+        let rows = block
             .parameters
             .get(sensor)
-            .fixed_view::<3, PER_TRIAD>(first, 0)
-            .into_owned()
-    };
+            .fixed_view::<3, PER_TRIAD>(first, 0);
+        partials += of(sensor, &rows.into_owned());
+    }
     let variance = variance + ROUNDING.powi(2);
-    equations.add(&Rows::independent(
-        PerSensor::from_fn(rows),
-        residual,
-        variance,
-    ));
+    equations.add(&Rows::new(partials, residual, variance));
 }

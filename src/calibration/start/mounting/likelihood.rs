@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector1, Vector3};
 use super::motion::{Motion, Move, Sensed, Turned};
 use crate::attitude::{log, skew};
 use crate::calibration::parameters::{ParameterVector, parameter};
-use crate::calibration::start::equations::{Equations, Partials, Rows, of, of_sensitivity};
+use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
 /// Prior and noise may each be stated too small by these factors, all equally likely: then neither a careless prior nor
@@ -110,8 +110,8 @@ fn add_sensed(
         return;
     };
     let input = order.inverse().apply(known);
-    let partials = of(sensor, of_sensitivity(input.push(zero)));
-    equations.add(&Rows::independent(
+    let partials = of(sensor, &of_sensitivity(input.push(zero)));
+    equations.add(&Rows::new(
         partials,
         of_triad.found - input,
         of_triad.variance,
@@ -127,8 +127,8 @@ fn add_turn(equations: &mut Equations, turn: &Move, order: &AxisOrder) {
     // An improper order and its opposite turn a rotation alike.
     let known = order.matrix().transpose() * known * order.matrix();
     let off = log(&(turned.rotation * known.transpose()));
-    let partials = of(Sensor::Gyro, turned.partials);
-    equations.add(&Rows::independent(partials, off, turn.variance));
+    let partials = of(Sensor::Gyro, &turned.partials);
+    equations.add(&Rows::new(partials, off, turn.variance));
 }
 
 /// Up before a move against up after it, carried back by the gyros.
@@ -148,16 +148,11 @@ fn add_carried(
     let across = |up: &Vector3<f64>| {
         (Matrix3::identity() - up * up.transpose()) * of_sensitivity(up.push(1.0))
     };
-    let partials = PerSensor {
-        gyro: -skew(carried) * turned.partials,
-        accel: turned.rotation * matrix * across(&up_after) - matrix * across(&up_before),
-    };
+    let of_forces = turned.rotation * matrix * across(&up_after) - matrix * across(&up_before);
+    let of_turn = -skew(carried) * turned.partials;
+    let partials = of(Sensor::Gyro, &of_turn) + of(Sensor::Accel, &of_forces);
     let variance = variance + before.variance + after.variance;
-    equations.add(&Rows::independent(
-        partials,
-        carried - matrix * up_before,
-        variance,
-    ));
+    equations.add(&Rows::new(partials, carried - matrix * up_before, variance));
 }
 
 /// The rate about up at rest. Up is tilted by what the prior allows the accelerometers, and by as much of the level part
@@ -173,17 +168,14 @@ fn add_earth_rate(
         return;
     };
     let up = order.apply(&up) * sign;
-    let mut gyro = Partials::zeros();
+    let mut partials = OfTriad::<1>::zeros();
     for axis in 0..3 {
-        gyro[4 * axis + 3] = up[axis];
+        partials[4 * axis + 3] = up[axis];
     }
-    let partials = PerSensor {
-        gyro,
-        accel: Partials::zeros(),
-    };
+    let partials = of(Sensor::Gyro, &partials);
     let residual = Vector1::new(up.dot(&rest.gyro.found) - upward);
     let variance = rest.gyro.variance + tilt.powi(2) * (1.0 - upward.powi(2));
-    equations.add(&Rows::independent(partials, residual, variance));
+    equations.add(&Rows::new(partials, residual, variance));
 }
 
 /// Logarithm of the likelihood of the residuals, the unknowns being integrated out.
@@ -240,15 +232,10 @@ mod tests {
             let mut equations = Equations::new(&ParameterVector::zeros(), &prior);
             for k in 0..10 {
                 let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                let partials = PerSensor {
-                    gyro: Partials::ith(0, sign),
-                    accel: Partials::zeros(),
-                };
-                equations.add(&Rows::independent(
-                    partials,
-                    Vector1::new(sign * error),
-                    1e-8,
-                ));
+                let mut partials = OfTriad::<1>::zeros();
+                partials[0] = sign;
+                let partials = of(Sensor::Gyro, &partials);
+                equations.add(&Rows::new(partials, Vector1::new(sign * error), 1e-8));
             }
             log_likelihood(&equations)
         };

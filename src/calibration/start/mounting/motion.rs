@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{exp, matrix};
 use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::start::equations::Partials;
+use crate::calibration::start::equations::OfTriad;
 use crate::calibration::start::table::sensed;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
@@ -49,7 +49,7 @@ pub struct Turned {
     /// `C` from the axes after it to those before.
     pub rotation: Matrix3<f64>,
     /// How the gyros' sensitivity turns the whole about the axes before, rad; their zero is that at rest.
-    pub partials: Partials<3>,
+    pub partials: OfTriad<3>,
 }
 
 /// All that is known of the motion of one recording.
@@ -197,7 +197,7 @@ impl Legs<'_> {
                 }
                 rotation *= exp(angle);
             }
-            let mut partials = Partials::zeros();
+            let mut partials = OfTriad::zeros();
             for (axis, component) in (0..3).flat_map(|axis| (0..3).map(move |of| (axis, of))) {
                 partials.set_column(4 * axis + component, &turns[component].column(axis));
             }

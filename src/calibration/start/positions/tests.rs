@@ -1,6 +1,5 @@
 use super::*;
 use approx::assert_relative_eq;
-use nalgebra::Vector3;
 
 fn triad(form: InstallationForm) -> Triad {
     let mut v = TriadVector::zeros();
