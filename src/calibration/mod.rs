@@ -82,8 +82,7 @@ pub use several::day_to_day::{DayToDay, Difference};
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
-pub use start::closed_form::{
-    ClosedForm, Position, Reference, six_position, six_position_of, six_position_triad,
-};
+pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
 pub use start::mounting::Mounting;
+pub use start::positions::{Position, six_position_triad};

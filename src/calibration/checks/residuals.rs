@@ -159,12 +159,22 @@ mod tests {
     use super::*;
     use nalgebra::{Matrix3, Vector3};
 
-    use crate::calibration::start::closed_form::{by_position, linear_design};
+    use crate::calibration::start::equations::of_sensitivity;
 
     fn six() -> Vec<Vector3<f64>> {
         (0..6)
             .map(|k| Vector3::ith(k / 2, if k % 2 == 0 { 9.8 } else { -9.8 }))
             .collect()
+    }
+
+    /// Of a triad's sensitivity and bias, three rows an input.
+    fn design(inputs: &[Vector3<f64>]) -> DMatrix<f64> {
+        let mut design = DMatrix::zeros(3 * inputs.len(), 12);
+        for (k, input) in inputs.iter().enumerate() {
+            let mut rows = design.fixed_rows_mut::<3>(3 * k);
+            rows.copy_from(&of_sensitivity(input.push(1.0)));
+        }
+        design
     }
 
     #[test]
@@ -174,7 +184,7 @@ mod tests {
         let errors =
             DVector::from_iterator(18, inputs.iter().flat_map(|u| <[f64; 3]>::from(a * u)));
         let covariance = DMatrix::identity(18, 18) * 1e-8;
-        let residuals = Residuals::new(&linear_design(&inputs, 9.8), &errors, &covariance).unwrap();
+        let residuals = Residuals::new(&design(&inputs), &errors, &covariance).unwrap();
         assert_eq!(residuals.degrees(), 6);
         assert!(residuals.chi_square() < 1e-6);
         assert_eq!(residuals.growth(), None);
@@ -187,10 +197,12 @@ mod tests {
         errors[3 * 2 + 2] = 0.1;
         let covariance = DMatrix::identity(18, 18) * 1e-6;
         let of = |inputs: &[Vector3<f64>], errors: &DVector<f64>, covariance: &DMatrix<f64>| {
-            let design = linear_design(inputs, 9.8);
-            let residuals = Residuals::new(&design, errors, covariance).unwrap();
+            let residuals = Residuals::new(&design(inputs), errors, covariance).unwrap();
             assert!(residuals.growth().is_some());
-            residuals.worst(&by_position(inputs.len()))
+            let of_each: Vec<_> = (0..inputs.len())
+                .map(|k| (3 * k..3 * k + 3).collect())
+                .collect();
+            residuals.worst(&of_each)
         };
         let worst = of(&inputs, &errors, &covariance);
         assert_eq!(worst.groups, [2, 3]);

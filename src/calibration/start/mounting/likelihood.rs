@@ -1,99 +1,224 @@
-//! How likely residuals are when errors of two triads within their prior and white noise make them.
+//! How likely a record's motion makes each order of a triad's axes.
+//!
+//! All is written along the axes of the columns as they stand: an order turns what is known, not what was
+//! measured. So errors of the triads mean the same under each.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, Vector1, Vector3};
 
-/// Entries of both sensitivity matrices, row by row, each triad's followed by its biases.
-pub const UNKNOWNS: usize = 24;
-/// The first unknown of the accelerometers.
-pub const OF_ACCEL: usize = 12;
-/// The first bias of a triad, from its first unknown on.
-pub const BIAS: usize = 9;
+use super::motion::{Motion, Move, Sensed, Turned};
+use crate::attitude::{log, skew};
+use crate::calibration::parameters::{ParameterVector, parameter};
+use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
+use crate::imu::{AxisOrder, PerSensor, Sensor};
 
-pub type Row = SVector<f64, UNKNOWNS>;
-
-/// What is stated of the prior and of the noise may each be too small by these factors, all alike likely:
-/// then neither a careless prior nor motion that is no white noise speaks for another mounting.
+/// Prior and noise may each be stated too small by these factors, all equally likely: then neither a careless prior nor
+/// motion that is no white noise counts for another mounting.
 const TOO_SMALL: [f64; 7] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
-/// Linear equations in the errors of both triads, about one mounting.
+/// Logarithm of the likelihood of each order, and of none of them.
 #[derive(Debug, Clone)]
-pub struct Equations {
-    prior_sigma: Row,
-    information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-    vector: Row,
-    squares: f64,
-    log_variances: f64,
-    count: f64,
-    unexplained: f64,
+pub struct Likelihoods {
+    pub of: Vec<f64>,
+    pub none: f64,
 }
 
-impl Equations {
-    pub fn new(prior_sigma: &Row) -> Self {
+impl Likelihoods {
+    /// Of the residuals of these rows, the errors of the triads being integrated out with this prior.
+    fn new(prior_sigma: &ParameterVector, rows: impl Fn(&mut Equations, &AxisOrder)) -> Self {
+        let mut none = f64::NEG_INFINITY;
+        let of = AxisOrder::all().map(|order| {
+            let mut equations = Equations::new(&ParameterVector::zeros(), prior_sigma);
+            rows(&mut equations, &order);
+            none = none.max(log_likelihood_of_none(&equations));
+            log_likelihood(&equations)
+        });
         Self {
-            prior_sigma: *prior_sigma,
-            information: SMatrix::zeros(),
-            vector: Row::zeros(),
-            squares: 0.0,
-            log_variances: 0.0,
-            count: 0.0,
-            unexplained: 0.0,
+            of: of.collect(),
+            none,
         }
     }
 
-    pub fn prior_sigma(&self, unknown: usize) -> f64 {
-        self.prior_sigma[unknown]
+    pub fn largest(&self) -> f64 {
+        self.of.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
+}
 
-    /// Adds one: a residual, relative to what is measured, with its noise's variance and its derivatives
-    /// by the unknowns.
-    pub fn add(&mut self, row: &Row, residual: f64, variance: f64) {
-        let row = row.component_mul(&self.prior_sigma);
-        self.information.ger(variance.recip(), &row, &row, 1.0);
-        self.vector += row * (residual / variance);
-        self.squares += residual.powi(2) / variance;
-        self.log_variances += variance.ln();
-        self.count += 1.0;
-        let any = 1.0 + variance;
-        self.unexplained += residual.powi(2) / any + any.ln();
-    }
-
-    /// Logarithm of the likelihood of the residuals, the errors of the triads being integrated out.
-    pub fn log_likelihood(&self) -> f64 {
-        // Samples of absurd size overflow, and say nothing.
-        if !self
-            .information
-            .iter()
-            .chain(&self.vector)
-            .all(|v| v.is_finite())
-        {
-            return f64::NEG_INFINITY;
-        }
-        let eigen = self.information.symmetric_eigen();
-        let along = eigen.eigenvectors.tr_mul(&self.vector);
-        let mut logarithms = Vec::with_capacity(TOO_SMALL.len().pow(2));
-        for noise in TOO_SMALL {
-            for prior in TOO_SMALL {
-                let ratio = (prior / noise).powi(2);
-                let (mut explained, mut determinant) = (0.0, 0.0);
-                for (value, part) in eigen.eigenvalues.iter().zip(&along) {
-                    let gain = ratio * value.max(0.0);
-                    explained += part.powi(2) * ratio / (1.0 + gain);
-                    determinant += gain.ln_1p();
-                }
-                let squares = (self.squares - explained).max(0.0) / noise.powi(2);
-                let noise = self.log_variances + 2.0 * self.count * noise.ln();
-                logarithms.push(-0.5 * (squares + noise + determinant));
+/// The table holds gravity and turns: each triad by itself against it.
+pub fn by_table(
+    motion: &Motion,
+    prior_sigma: &ParameterVector,
+    position_sigma: f64,
+) -> PerSensor<Likelihoods> {
+    PerSensor::from_fn(|sensor| {
+        Likelihoods::new(prior_sigma, |equations, order| {
+            for of in motion.moves.iter().filter(|_| sensor == Sensor::Gyro) {
+                add_turn(equations, of, order);
             }
-        }
-        let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let sum: f64 = logarithms.iter().map(|l| (l - largest).exp()).sum();
-        largest + (sum / logarithms.len() as f64).ln()
-    }
+            for rest in &motion.rests {
+                let mut sensed = rest.get(sensor).clone();
+                sensed.variance += position_sigma.powi(2);
+                add_sensed(equations, sensor, &sensed, order, 1.0);
+            }
+        })
+    })
+}
 
-    /// The same if nothing of what is measured is as it should be: residuals of its own size.
-    pub fn log_likelihood_of_none(&self) -> f64 {
-        -0.5 * self.unexplained
+/// Labels state which axis is up and about which it turns: each triad by itself against them.
+pub fn by_labels(motion: &Motion, prior_sigma: &ParameterVector) -> PerSensor<Likelihoods> {
+    PerSensor::from_fn(|sensor| {
+        Likelihoods::new(prior_sigma, |equations, order| {
+            // Angles are by gyros whose zero is that at rest.
+            let zero = f64::from(u8::from(sensor == Sensor::Accel));
+            for (_, sensed) in motion.labels.iter().filter(|(of, _)| *of == sensor) {
+                add_sensed(equations, sensor, sensed, order, zero);
+            }
+        })
+    })
+}
+
+/// Gravity's direction turns against the body as the gyros turn it, and Earth turns upward as the latitude
+/// has it: one triad against the other. By the accelerometers' order as the gyros' axes see it, with the gyros
+/// as they are and with all of them reversed.
+pub fn by_gravity(motion: &Motion, prior_sigma: &ParameterVector) -> [Likelihoods; 2] {
+    [0, 1].map(|reversed| {
+        Likelihoods::new(prior_sigma, |equations, order| {
+            for of in &motion.moves {
+                if let [before, after] = &motion.rests[of.from..of.from + 2] {
+                    let turned = (&of.turns[reversed], of.variance);
+                    add_carried(equations, turned, order, [&before.accel, &after.accel]);
+                }
+            }
+            let tilt = |k| prior_sigma[parameter(Sensor::Accel, k)];
+            let tilt = tilt(1).hypot(tilt(3));
+            for rest in &motion.rests {
+                let sign = [1.0, -1.0][reversed];
+                add_earth_rate(equations, motion.upward, rest, (order, sign), tilt);
+            }
+        })
+    })
+}
+
+/// `found = (I + δA) u + δD` with what is known as `u`.
+fn add_sensed(
+    equations: &mut Equations,
+    sensor: Sensor,
+    of_triad: &Sensed,
+    order: &AxisOrder,
+    zero: f64,
+) {
+    let Some(known) = &of_triad.known else {
+        return;
+    };
+    let input = order.inverse().apply(known);
+    let partials = of(sensor, &of_sensitivity(input.push(zero)));
+    equations.add(&Rows::new(
+        partials,
+        of_triad.found - input,
+        of_triad.variance,
+    ));
+}
+
+/// A turn by the gyros against one that is known.
+fn add_turn(equations: &mut Equations, turn: &Move, order: &AxisOrder) {
+    let Some(known) = turn.known else {
+        return;
+    };
+    let turned = &turn.turns[usize::from(!order.is_rotation())];
+    // An improper order and its opposite turn a rotation alike.
+    let known = order.matrix().transpose() * known * order.matrix();
+    let off = log(&(turned.rotation * known.transpose()));
+    let partials = of(Sensor::Gyro, &turned.partials);
+    equations.add(&Rows::new(partials, off, turn.variance));
+}
+
+/// Up before a move against up after it, carried back by the gyros.
+fn add_carried(
+    equations: &mut Equations,
+    (turned, variance): (&Turned, f64),
+    order: &AxisOrder,
+    [before, after]: [&Sensed; 2],
+) {
+    let up = |rest: &Sensed| rest.found.try_normalize(f64::MIN_POSITIVE);
+    let (Some(up_before), Some(up_after)) = (up(before), up(after)) else {
+        return;
+    };
+    let matrix = order.matrix();
+    let carried = turned.rotation * (matrix * up_after);
+    // Of the error of a force what is across it turns its direction.
+    let across = |up: &Vector3<f64>| {
+        (Matrix3::identity() - up * up.transpose()) * of_sensitivity(up.push(1.0))
+    };
+    let of_forces = turned.rotation * matrix * across(&up_after) - matrix * across(&up_before);
+    let of_turn = -skew(carried) * turned.partials;
+    let partials = of(Sensor::Gyro, &of_turn) + of(Sensor::Accel, &of_forces);
+    let variance = variance + before.variance + after.variance;
+    equations.add(&Rows::new(partials, carried - matrix * up_before, variance));
+}
+
+/// The rate about up at rest. Up is tilted by what the prior allows the accelerometers, and by as much of the level part
+/// of Earth rate the rate is off.
+fn add_earth_rate(
+    equations: &mut Equations,
+    upward: f64,
+    rest: &PerSensor<Sensed>,
+    (order, sign): (&AxisOrder, f64),
+    tilt: f64,
+) {
+    let Some(up) = rest.accel.found.try_normalize(f64::MIN_POSITIVE) else {
+        return;
+    };
+    let up = order.apply(&up) * sign;
+    let mut partials = OfTriad::<1>::zeros();
+    for axis in 0..3 {
+        partials[4 * axis + 3] = up[axis];
     }
+    let partials = of(Sensor::Gyro, &partials);
+    let residual = Vector1::new(up.dot(&rest.gyro.found) - upward);
+    let variance = rest.gyro.variance + tilt.powi(2) * (1.0 - upward.powi(2));
+    equations.add(&Rows::new(partials, residual, variance));
+}
+
+/// Logarithm of the likelihood of the residuals, the unknowns being integrated out.
+fn log_likelihood(equations: &Equations) -> f64 {
+    let (design, residual) = equations.in_sigmas();
+    let (information, vector) = (design.tr_mul(&design), design.tr_mul(&residual));
+    // Samples of absurd size overflow, and tell nothing.
+    if !information.iter().chain(&vector).all(|v| v.is_finite()) {
+        return f64::NEG_INFINITY;
+    }
+    let log_variances: f64 = equations
+        .weighted()
+        .map(|(_, variance)| variance.ln())
+        .sum();
+    let eigen = information.symmetric_eigen();
+    let along = eigen.eigenvectors.tr_mul(&vector);
+    let mut logarithms = Vec::with_capacity(TOO_SMALL.len().pow(2));
+    for noise in TOO_SMALL {
+        for prior in TOO_SMALL {
+            let ratio = (prior / noise).powi(2);
+            let (mut explained, mut determinant) = (0.0, 0.0);
+            for (value, part) in eigen.eigenvalues.iter().zip(&along) {
+                let gain = ratio * value.max(0.0);
+                explained += part.powi(2) * ratio / (1.0 + gain);
+                determinant += gain.ln_1p();
+            }
+            let squares = (residual.norm_squared() - explained).max(0.0) / noise.powi(2);
+            let noise = log_variances + 2.0 * residual.len() as f64 * noise.ln();
+            logarithms.push(-0.5 * (squares + noise + determinant));
+        }
+    }
+    let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = logarithms.iter().map(|l| (l - largest).exp()).sum();
+    largest + (sum / logarithms.len() as f64).ln()
+}
+
+/// The same if nothing of what is measured is as it should be: residuals of its own size.
+fn log_likelihood_of_none(equations: &Equations) -> f64 {
+    let deviance = equations.weighted().map(|(residual, variance)| {
+        let any = 1.0 + variance;
+        residual.powi(2) / any + any.ln()
+    });
+    -0.5 * deviance.sum::<f64>()
 }
 
 #[cfg(test)]
@@ -102,14 +227,17 @@ mod tests {
 
     #[test]
     fn an_error_beyond_the_prior_is_less_likely_and_one_within_hardly() {
-        let prior = Row::repeat(1e-3);
+        let prior = ParameterVector::repeat(1e-3);
         let of = |error: f64| {
-            let mut equations = Equations::new(&prior);
+            let mut equations = Equations::new(&ParameterVector::zeros(), &prior);
             for k in 0..10 {
                 let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                equations.add(&(Row::ith(0, sign)), sign * error, 1e-8);
+                let mut partials = OfTriad::<1>::zeros();
+                partials[0] = sign;
+                let partials = of(Sensor::Gyro, &partials);
+                equations.add(&Rows::new(partials, Vector1::new(sign * error), 1e-8));
             }
-            equations.log_likelihood()
+            log_likelihood(&equations)
         };
         assert!(of(0.0) - of(1e-3) < 1.0);
         assert!(of(0.0) - of(2.0) > 5.0);

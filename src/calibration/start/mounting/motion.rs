@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{exp, matrix};
 use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::start::equations::OfTriad;
+use crate::calibration::start::table::sensed;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{LabelledMotion, TableLog};
@@ -18,29 +20,14 @@ const FLOOR: f64 = 1e-4;
 /// sense.
 const LEG: f64 = 1.0;
 
-/// A dwell.
+/// A vector by the columns as they stand, and along body axes as it is known.
 #[derive(Debug, Clone)]
-pub struct Rest {
-    /// Specific force over gravity, without the bias of the prior.
-    pub force: Vector3<f64>,
-    /// Variance of each of its components.
-    pub force_variance: f64,
-    /// Rate over Earth rate, without the bias of the prior.
-    pub rate: Vector3<f64>,
-    /// Variance of each of its components, Gauss–Markov bias included.
-    pub rate_variance: f64,
-    /// Up, and Earth rate over its magnitude, along body axes as the table holds them.
-    pub known: Option<PerSensor<Vector3<f64>>>,
-}
-
-impl Rest {
-    /// What a triad senses, and the variance of each component.
-    pub fn sensed(&self, sensor: Sensor) -> (&Vector3<f64>, f64) {
-        match sensor {
-            Sensor::Gyro => (&self.rate, self.rate_variance),
-            Sensor::Accel => (&self.force, self.force_variance),
-        }
-    }
+pub struct Sensed {
+    /// Over gravity or Earth rate, or an angle turned in rad; without the bias of the prior.
+    pub found: Vector3<f64>,
+    pub known: Option<Vector3<f64>>,
+    /// Variance of each component.
+    pub variance: f64,
 }
 
 /// A move from one dwell to the next, or a part of it.
@@ -61,29 +48,19 @@ pub struct Move {
 pub struct Turned {
     /// `C` from the axes after it to those before.
     pub rotation: Matrix3<f64>,
-    /// For each component of the output: how its coupling into each axis (column) turns the whole about the
-    /// axes before (row), rad.
-    pub by_output: [Matrix3<f64>; 3],
-}
-
-/// A labelled section.
-#[derive(Debug, Clone)]
-pub struct Labelled {
-    pub sensor: Sensor,
-    /// Mean force over gravity, or the angle turned, by the columns as they stand.
-    pub found: Vector3<f64>,
-    /// The same along body axes as the label has it.
-    pub said: Vector3<f64>,
-    pub variance: f64,
+    /// How the gyros' sensitivity turns the whole about the axes before, rad; their zero is that at rest.
+    pub partials: OfTriad<3>,
 }
 
 /// All that is known of the motion of one recording.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    pub rests: Vec<Rest>,
+    /// Dwells: force over gravity, rate over Earth rate. What is known is known by the table.
+    pub rests: Vec<PerSensor<Sensed>>,
     /// With a table in parts from reading to reading, for a whole move may end as it began.
     pub moves: Vec<Move>,
-    pub labels: Vec<Labelled>,
+    /// Labelled sections: force over gravity, or the angle turned.
+    pub labels: Vec<(Sensor, Sensed)>,
     /// Upward part of Earth rate over the whole.
     pub upward: f64,
 }
@@ -97,15 +74,14 @@ impl Motion {
         for stretch in stretches {
             let of = &stretch.dwells;
             for pair in of.windows(2) {
-                let from = rests.len();
-                rests.push(rest(run, &pair[0]));
                 let legs = Legs {
                     run,
-                    from,
+                    from: rests.len(),
                     zero: pair[0].mean(Sensor::Gyro, run).output * run.recording.imu.period,
                     position_sigma: problem.model.position_sigma,
                 };
                 moves.extend(legs.between(stretch, &pair[0], &pair[1]));
+                rests.push(rest(run, &pair[0]));
             }
             rests.extend(of.last().map(|last| rest(run, last)));
             dwells.extend(of);
@@ -119,21 +95,29 @@ impl Motion {
     }
 }
 
-fn rest(run: &Run, dwell: &Dwell) -> Rest {
-    let prior = &run.instrument.prior;
-    let [rate, force] = Sensor::ALL.map(|sensor| dwell.mean(sensor, run));
-    let wander = run.instrument.noise.gyro.gauss_markov;
-    let wander = wander.map_or(0.0, |wander| wander.sigma);
-    Rest {
-        force: (force.output - prior.accel.bias) / run.site.gravity,
-        force_variance: force.variance / run.site.gravity.powi(2) + FLOOR.powi(2),
-        rate: (rate.output - prior.gyro.bias) / ROTATION_RATE,
-        rate_variance: (rate.variance + wander.powi(2)) / ROTATION_RATE.powi(2) + FLOOR.powi(2),
-        known: dwell.position.as_ref().map(|position| PerSensor {
-            gyro: position.attitude.tr_mul(&run.site.earth_rate_n()) / ROTATION_RATE,
-            accel: position.attitude.tr_mul(&Vector3::z()),
-        }),
+/// Gravity, or Earth rate.
+pub fn unit(run: &Run, sensor: Sensor) -> f64 {
+    match sensor {
+        Sensor::Gyro => ROTATION_RATE,
+        Sensor::Accel => run.site.gravity,
     }
+}
+
+fn rest(run: &Run, dwell: &Dwell) -> PerSensor<Sensed> {
+    PerSensor::from_fn(|sensor| {
+        let wander = run.instrument.noise.get(sensor).gauss_markov;
+        let wander = wander
+            .filter(|_| sensor == Sensor::Gyro)
+            .map_or(0.0, |of| of.sigma);
+        let unit = unit(run, sensor);
+        let mean = dwell.mean(sensor, run);
+        let position = dwell.position.as_ref();
+        Sensed {
+            found: (mean.output - run.instrument.prior.get(sensor).bias) / unit,
+            known: position.map(|of| of.attitude.tr_mul(&sensed(&run.site, sensor)) / unit),
+            variance: (mean.variance + wander.powi(2)) / unit.powi(2) + FLOOR.powi(2),
+        }
+    })
 }
 
 /// Variance of an angle by gyros whose zero is that at rest nearby: noise, and Earth rate, which turns
@@ -169,7 +153,8 @@ impl Legs<'_> {
             if edge <= begin || edge >= samples.end {
                 continue;
             }
-            way += self.way(measured..edge.max(measured));
+            let turned = self.increments(measured..edge.max(measured));
+            way += turned.map(|increment| increment.norm()).sum::<f64>();
             measured = edge;
             if way > LEG {
                 legs.push(self.leg(begin..edge, Some(held.tr_mul(&attitude))));
@@ -194,37 +179,35 @@ impl Legs<'_> {
         })
     }
 
-    /// How far it turns in all, one way and the other, rad.
-    fn way(&self, samples: Range<usize>) -> f64 {
+    /// The turn of each sample, rad.
+    fn increments(&self, samples: Range<usize>) -> impl Iterator<Item = Vector3<f64>> {
         let increments = self.run.recording.imu.gyro.within(samples);
-        increments
-            .map(|increment| (increment - self.zero).norm())
-            .sum()
+        increments.map(|increment| increment - self.zero)
     }
 
     fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>) -> Move {
-        let increments = || {
-            let of = self.run.recording.imu.gyro.within(samples.clone());
-            of.map(|increment| increment - self.zero)
-        };
         let turned = |sign: f64| {
-            let mut turned = Turned {
-                rotation: Matrix3::identity(),
-                by_output: [Matrix3::zeros(); 3],
-            };
-            for increment in increments() {
+            let mut rotation = Matrix3::identity();
+            // By the component of the output.
+            let mut turns = [Matrix3::zeros(); 3];
+            for increment in self.increments(samples.clone()) {
                 let angle = increment * sign;
-                for (of_component, component) in turned.by_output.iter_mut().zip(&angle) {
-                    *of_component += turned.rotation * *component;
+                for (turn, component) in turns.iter_mut().zip(&angle) {
+                    *turn += rotation * *component;
                 }
-                turned.rotation *= exp(angle);
+                rotation *= exp(angle);
             }
-            turned
+            let mut partials = OfTriad::zeros();
+            for (axis, component) in (0..3).flat_map(|axis| (0..3).map(move |of| (axis, of))) {
+                partials.set_column(4 * axis + component, &turns[component].column(axis));
+            }
+            Turned { rotation, partials }
         };
         // A reading is between two samples.
-        let of_edge = increments()
-            .map(|increment| increment.norm())
-            .fold(0.0, f64::max);
+        let of_edge = self
+            .increments(samples.clone())
+            .map(|increment| increment.norm());
+        let of_edge = of_edge.fold(0.0, f64::max);
         let of_table = self.position_sigma.powi(2) + of_edge.powi(2);
         Move {
             from: self.from,
@@ -235,24 +218,23 @@ impl Legs<'_> {
     }
 }
 
-fn labelled(run: &Run, dwells: &[&Dwell]) -> Vec<Labelled> {
+fn labelled(run: &Run, dwells: &[&Dwell]) -> Vec<(Sensor, Sensed)> {
     let period = run.recording.imu.period;
     let prior = &run.instrument.prior;
     let set_by_hand = run.segment_sigma.powi(2);
-    let whole = |samples: &Range<usize>| !run.recording.imu.is_lost(samples);
     let segments = run.recording.segments.iter();
-    let of = segments.filter(|segment| whole(&segment.samples));
-    let labelled = of.filter_map(|segment| {
+    let whole = segments.filter(|segment| !run.recording.imu.is_lost(&segment.samples));
+    let labelled = whole.filter_map(|segment| {
         let section = Dwell::of(segment.samples.clone());
-        match segment.motion? {
+        Some(match segment.motion? {
             LabelledMotion::Stands { up } => {
                 let force = section.mean(Sensor::Accel, run);
-                Some(Labelled {
-                    sensor: Sensor::Accel,
+                let sensed = Sensed {
                     found: (force.output - prior.accel.bias) / run.site.gravity,
-                    said: up,
+                    known: Some(up),
                     variance: force.variance / run.site.gravity.powi(2) + set_by_hand,
-                })
+                };
+                (Sensor::Accel, sensed)
             }
             LabelledMotion::Turns { axis, angle } => {
                 let samples = &segment.samples;
@@ -261,20 +243,18 @@ fn labelled(run: &Run, dwells: &[&Dwell]) -> Vec<Labelled> {
                     let before = samples.start.saturating_sub(end);
                     start.saturating_sub(samples.end).max(before)
                 };
-                let zero = match dwells.iter().min_by_key(apart) {
-                    Some(rest) => rest.mean(Sensor::Gyro, run).output,
-                    None => prior.gyro.bias,
-                };
-                let duration = samples.len() as f64 * period;
+                let nearest = dwells.iter().min_by_key(apart);
+                let zero =
+                    nearest.map_or(prior.gyro.bias, |rest| rest.mean(Sensor::Gyro, run).output);
                 let output = section.mean(Sensor::Gyro, run).output;
-                Some(Labelled {
-                    sensor: Sensor::Gyro,
-                    found: (output - zero) * duration,
-                    said: axis * angle,
+                let sensed = Sensed {
+                    found: (output - zero) * (samples.len() as f64 * period),
+                    known: Some(axis * angle),
                     variance: angle_variance(run, samples) + set_by_hand,
-                })
+                };
+                (Sensor::Gyro, sensed)
             }
-        }
+        })
     });
     labelled.collect()
 }

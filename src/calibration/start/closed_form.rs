@@ -1,0 +1,286 @@
+//! The closed form: static positions with known attitude (Zhao, Jiang, Li 2016, Eqs. 14 and 15; the
+//! second line of the printed Eq. 15 says `N_g` where the accelerometer is meant), and what takes its
+//! place without a table.
+
+use super::both_triads::both_triads;
+use super::coarse;
+use super::labels::{self, Section, Used};
+use super::positions::{Observed, Position};
+use super::table;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::prior_distance::far_by_data;
+use crate::calibration::checks::rest_scatter::scatter_at_rest;
+use crate::calibration::checks::rounding::{by_rounding, rounded};
+use crate::calibration::checks::unexplained::unexplained_residuals;
+use crate::calibration::error::CalibrationError;
+use crate::calibration::estimate::Estimate;
+use crate::calibration::model::Model;
+use crate::calibration::noise::NoiseReport;
+use crate::calibration::parameters::{OBSERVED_BELOW, parameter, parameter_name};
+use crate::calibration::problem::Problem;
+use crate::earth::Site;
+use crate::imu::{BodyFrame, PerSensor, Sensor};
+use crate::run::motion::rests;
+use crate::run::{Aiding, Dwell, Run};
+
+/// A reference vector within this cosine of a body axis makes a position of the six.
+const ALONG_AXIS: f64 = 0.9998;
+
+/// Where the inputs of a closed form are known from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reference {
+    /// Attitudes of the table's log.
+    Table,
+    /// Labels of sections: an axis up, a turn about an axis by an angle.
+    Labels,
+    /// Gravity alone: its magnitude at rest, its direction before and after each turn.
+    Gravity,
+}
+
+impl Reference {
+    /// What fixes the body axes.
+    pub fn body_frame(self) -> BodyFrame {
+        match self {
+            Self::Table | Self::Labels => BodyFrame::Table,
+            Self::Gravity => BodyFrame::Accelerometer,
+        }
+    }
+}
+
+/// A closed-form calibration of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosedForm {
+    /// The estimate; its σ follow from random walk, pulses and how well the inputs are known.
+    pub estimate: Estimate,
+    /// Where the inputs are known from.
+    pub reference: Reference,
+    /// Dwells or labelled positions used for each triad.
+    pub positions: PerSensor<usize>,
+    /// Turns used for the gyros.
+    pub turns: usize,
+    /// Total time of all dwells used, s.
+    pub standing_time: f64,
+    /// Noise that was learnt; none where it is as stated.
+    pub noise: Option<NoiseReport>,
+    /// What a calibration engineer must know before using the figures.
+    pub findings: Vec<Finding>,
+}
+
+impl ClosedForm {
+    /// Whether it may be used: noise explains what it leaves.
+    pub fn is_usable(&self) -> bool {
+        !self.findings.iter().any(Finding::is_unexplained)
+    }
+}
+
+/// Calibrates both triads of a run without a filter.
+///
+/// With a table's log, from its dwells: where they hold the paper's six positions of a triad (Earth
+/// rate or gravity along each body axis, both ways) from those, else from all. Without, from labelled
+/// sections; without those, from every dwell and turn by gravity alone. Least squares over six
+/// positions is the paper's half sums and half differences where they are exactly opposite.
+///
+/// # Errors
+/// [`CalibrationError`] if nothing is at rest. What the positions do not determine keeps its prior.
+pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let sections = &problem.run().recording.segments;
+    let reference = if problem.model.aiding == Aiding::Table {
+        Reference::Table
+    } else if sections.iter().any(|s| s.motion.is_some()) {
+        Reference::Labels
+    } else {
+        Reference::Gravity
+    };
+    six_position_by(reference, problem)
+}
+
+/// The same by what the inputs are to be known from; labels need no dwells.
+pub fn six_position_by(
+    reference: Reference,
+    problem: &Problem,
+) -> Result<ClosedForm, CalibrationError> {
+    let mut closed_form = match reference {
+        Reference::Table => {
+            let dwells: Vec<Dwell> = problem.dwells().cloned().collect();
+            six_position_of(problem, &dwells)
+        }
+        Reference::Labels => by_labels(problem),
+        Reference::Gravity => by_gravity(problem),
+    }?;
+    let ClosedForm {
+        estimate, findings, ..
+    } = &mut closed_form;
+    let notes = problem.notes().into_iter();
+    findings.splice(0..0, notes.map(|note| Finding::Recording { note }));
+    findings.extend(unexplained_residuals(findings));
+    findings.extend(scatter_at_rest(problem, &estimate.triads));
+    let rounding = by_rounding(problem, &estimate.triads);
+    estimate.covariance += rounding;
+    findings.extend(rounded(problem, &rounding, &estimate.covariance));
+    share_gravity(estimate, &problem.run().site);
+    Ok(closed_form)
+}
+
+/// The accelerometers are calibrated by gravity, so its error is in their scale factors, the same part in all three.
+fn share_gravity(estimate: &mut Estimate, site: &Site) {
+    let part = (site.gravity_sigma / site.gravity).powi(2);
+    let scale = estimate.triads.accel.scale;
+    let first = parameter(Sensor::Accel, 0);
+    let mut of_scale = estimate.covariance.fixed_view_mut::<3, 3>(first, first);
+    of_scale += scale * scale.transpose() * part;
+}
+
+/// The closed form from some dwells of the problem's first run with attitudes of a table, or parts of them.
+///
+/// # Errors
+/// As [`six_position`], and without a table.
+pub fn six_position_of(
+    problem: &Problem,
+    dwells: &[Dwell],
+) -> Result<ClosedForm, CalibrationError> {
+    let run = problem.run();
+    let mut used = vec![false; dwells.len()];
+    let mut of_six = |sensor| -> Result<Observed, CalibrationError> {
+        let all = table::positions(problem, dwells, sensor).ok_or(CalibrationError::NoTable)?;
+        let six = six_of(&all);
+        six.iter().for_each(|&k| used[k] = true);
+        let known = six.iter().map(|&k| all.known[k].clone()).collect();
+        Ok(Observed { known, ..all })
+    };
+    let observed = PerSensor {
+        gyro: of_six(Sensor::Gyro)?,
+        accel: of_six(Sensor::Accel)?,
+    };
+    if observed.gyro.known.is_empty() {
+        return Err(CalibrationError::NoDwells);
+    }
+    let (estimate, mut findings) = both_triads(&observed, problem)?;
+    findings.extend(hidden(&problem.model, &estimate, Reference::Table));
+    let used = dwells.iter().zip(used).filter(|(_, used)| *used);
+    Ok(ClosedForm {
+        noise: None,
+        findings,
+        estimate,
+        reference: Reference::Table,
+        positions: PerSensor::from_fn(|sensor| observed.get(sensor).known.len()),
+        turns: 0,
+        standing_time: used.map(|(dwell, _)| duration(run, dwell)).sum(),
+    })
+}
+
+/// s
+fn duration(run: &Run, dwell: &Dwell) -> f64 {
+    dwell.samples.len() as f64 * run.recording.imu.period
+}
+
+/// The positions whose input lies along a body axis, if all six are there, else all.
+fn six_of(observed: &Observed) -> Vec<usize> {
+    let along = |k: usize| -> Option<(usize, bool)> {
+        let Position { input, .. } = observed.known[k].position;
+        let axis = input.iamax();
+        (input[axis].abs() > ALONG_AXIS * input.norm()).then_some((axis, input[axis] > 0.0))
+    };
+    let all: Vec<usize> = (0..observed.known.len()).collect();
+    let six: Vec<usize> = all
+        .iter()
+        .copied()
+        .filter(|&k| along(k).is_some())
+        .collect();
+    let has = |axis, up| six.iter().any(|&k| along(k) == Some((axis, up)));
+    match (0..3).all(|axis| has(axis, true) && has(axis, false)) {
+        true => six,
+        false => all,
+    }
+}
+
+/// From the sections whose labels say how the instrument stands or turns.
+fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let run = problem.run();
+    let rests = rests(run);
+    let Used {
+        sections,
+        lost,
+        contradicted,
+    } = Used::of(run, &rests);
+    if sections.is_empty() {
+        return Err(match contradicted.is_empty() {
+            true => CalibrationError::NoSections {
+                labels: run.recording.labels(),
+            },
+            false => CalibrationError::LabelsContradicted { contradicted },
+        });
+    }
+    let observed = labels::observed(run, &rests, &sections);
+    let (estimate, mut findings) = both_triads(&observed, problem)?;
+    findings.extend(hidden(&problem.model, &estimate, Reference::Labels));
+    if !contradicted.is_empty() {
+        findings.push(Finding::LabelsContradicted { contradicted });
+    }
+    if !lost.is_empty() {
+        findings.push(Finding::SectionsLost { labels: lost });
+    }
+    let standing: Vec<&Section> = sections.iter().filter(|s| s.stands()).collect();
+    let samples: usize = standing.iter().map(|section| section.samples.len()).sum();
+    Ok(ClosedForm {
+        noise: None,
+        findings,
+        estimate,
+        reference: Reference::Labels,
+        positions: PerSensor::from_fn(|_| standing.len()),
+        turns: sections.len() - standing.len(),
+        standing_time: samples as f64 * run.recording.imu.period,
+    })
+}
+
+/// From every dwell and every move by gravity alone, with the prior where they are too few.
+fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let found = coarse::by_gravity(problem)?;
+    let (model, estimate) = (&problem.model, found.estimate);
+    let noise = found
+        .by_hand
+        .as_ref()
+        .map(|by_hand| by_hand.report(problem));
+    let learnt = found.by_hand.zip(noise.as_ref());
+    let learnt = learnt.map(|(by_hand, report)| by_hand.finding(report));
+    let far = far_by_data(model, &estimate, &found.distance);
+    let hidden = hidden(model, &estimate, Reference::Gravity);
+    let findings = far.into_iter().chain(hidden).chain(learnt);
+    let stretches = problem.stretches();
+    let at_rest = stretches.iter().flat_map(|stretch| {
+        stretch
+            .dwells
+            .iter()
+            .map(|dwell| duration(stretch.run, dwell))
+    });
+    let dwells = problem.dwells().count();
+    Ok(ClosedForm {
+        findings: findings.chain(found.ringing).collect(),
+        estimate,
+        reference: Reference::Gravity,
+        positions: PerSensor::from_fn(|_| dwells),
+        turns: dwells - stretches.len(),
+        standing_time: at_rest.sum(),
+        noise,
+    })
+}
+
+/// Parameters that are hardly better known than before, if there are any.
+fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Finding> {
+    let sigma = estimate.sigma();
+    let hidden = |&i: &usize| {
+        let prior = model.prior_sigma[i];
+        prior > 0.0 && sigma[i] > OBSERVED_BELOW * prior
+    };
+    let names = estimate.estimated().filter(hidden);
+    let hidden: Vec<String> = names
+        .filter_map(|index| parameter_name(estimate.form(), index))
+        .collect();
+    (!hidden.is_empty()).then_some(Finding::NotObserved {
+        by: match reference {
+            Reference::Table => "these positions",
+            Reference::Labels => "these sections",
+            Reference::Gravity => "these dwells and moves",
+        },
+        parameters: hidden,
+    })
+}

@@ -1,0 +1,318 @@
+//! The coarse start: where the filter begins, not what it knows. The filter's prior stays its own.
+
+use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::earth_rate::{add_rates, gyro_bias_at_rest, gyrocompass};
+use super::equations::{Equations, gauss_newton};
+use super::gravity::{AtRest, Chain, add_magnitude, events, up};
+use super::judged::Judged;
+use super::table;
+use crate::attitude::{exp, level};
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::error::CalibrationError;
+use crate::calibration::estimate::Estimate;
+use crate::calibration::linearisation::{AttitudePrior, Linearisation, singular};
+use crate::calibration::noise::{ByHand, NoisePolicy};
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector, from_vector, to_vector};
+use crate::calibration::problem::Problem;
+use crate::imu::{ParameterKind, Sensor, TermVector};
+
+/// More equations, of a hundred dwells, leave no noise to parameters; their covariance is factorised whole, which takes
+/// the cube of their number.
+const MOST_EQUATIONS: usize = 600;
+/// Largest number of points of linearisation at which noise is learnt.
+const NOISE_ROUNDS: usize = 6;
+/// A smaller step (1 ppm, 0.2″, and as much of rad/s or m/s²) ends an iteration.
+const SMALL: f64 = 1e-6;
+/// Attitudes, heading and gyros are found in turns, each from the others. Scale factors wrong by
+/// percents need four rounds …
+const ROUNDS_OF_GYROS: usize = 4;
+/// … before the accelerometers may move, too.
+const ROUNDS: usize = 8;
+
+/// Where the filter begins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoarseStart {
+    /// The first point of linearisation.
+    pub at: Linearisation,
+    /// What is known of the initial attitude of each stretch.
+    pub attitudes: Vec<AttitudePrior>,
+    /// Whether the noise of the gyros hides Earth rate, so that the heading may be any.
+    pub hidden: bool,
+    /// What a hand adds to the noise that is stated, where that was called for.
+    pub(in crate::calibration) by_hand: Option<ByHand>,
+}
+
+impl CoarseStart {
+    /// The same with the headings of these stretches in the other three quadrants.
+    pub(in crate::calibration) fn other_headings(&self, of: Range<usize>) -> [Self; 3] {
+        [1, 2, 3].map(|quadrant| {
+            let turn = exp(Vector3::z() * (FRAC_PI_2 * f64::from(quadrant)));
+            let mut turned = self.clone();
+            for attitude in &mut turned.at.initial_attitudes[of.clone()] {
+                *attitude = turn * *attitude;
+            }
+            for attitude in &mut turned.attitudes[of.clone()] {
+                attitude.mean = turn * attitude.mean;
+            }
+            turned
+        })
+    }
+}
+
+/// Both triads and the initial attitudes by least squares over whole dwells and moves.
+///
+/// With a table, its attitudes are known. Without, accelerometers follow from `|f| = g` over the
+/// dwells, gyros from the direction of gravity before and after each move, and gyro biases together
+/// with the heading from the rates at rest.
+///
+/// # Errors
+/// [`CalibrationError`] if there is no dwell, or data and prior do not fit each other.
+pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> {
+    let dwells = dwells(problem)?;
+    if let Some(attitudes) = attitudes_of_table(problem) {
+        let mut first = from_vector(problem.model.form, &problem.model.prior_mean);
+        first.gyro.bias = gyro_bias_at_rest(&dwells);
+        let smallest = ParameterVector::repeat(SMALL);
+        let triads = gauss_newton(first, &smallest, |triads| table::carried(problem, triads))?;
+        let means = attitudes.iter().map(|attitude| attitude.mean).collect();
+        return Ok(CoarseStart {
+            at: Linearisation::new(triads, TermVector::zeros(), means),
+            attitudes,
+            hidden: false,
+            by_hand: None,
+        });
+    }
+    let (
+        Turned {
+            at, heading_sigma, ..
+        },
+        by_hand,
+    ) = calibrated_as_held(problem, &dwells)?;
+    let gravity = problem.stretches().iter().map(|s| s.run.site.gravity);
+    let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(gravity);
+    let of_alignment = |((attitude, &sigma), gravity): ((&Matrix3<f64>, &f64), f64)| {
+        AttitudePrior::of_alignment(*attitude, sigma, &problem.model, gravity)
+    };
+    Ok(CoarseStart {
+        attitudes: attitudes.map(of_alignment).collect(),
+        at,
+        hidden: heading_sigma.into_iter().any(AttitudePrior::hides),
+        by_hand,
+    })
+}
+
+/// What is known of the initial attitude of each stretch.
+pub fn initial_attitudes(problem: &Problem) -> Result<Vec<AttitudePrior>, CalibrationError> {
+    match attitudes_of_table(problem) {
+        Some(attitudes) => dwells(problem).map(|_| attitudes),
+        None => Ok(coarse_start(problem)?.attitudes),
+    }
+}
+
+fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
+    let stretches = problem.stretches().iter();
+    stretches
+        .map(|stretch| stretch.attitude_of_table())
+        .collect()
+}
+
+/// The dwells of each stretch; an error where there is none.
+fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
+    let dwells = AtRest::all(problem);
+    match dwells.iter().flatten().count() {
+        0 => Err(CalibrationError::NoDwells),
+        _ => Ok(dwells),
+    }
+}
+
+/// Both triads by gravity alone, as a result of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ByGravity {
+    pub estimate: Estimate,
+    /// Of how far the data bring the estimate from a prior that is right.
+    pub distance: ParameterMatrix,
+    /// What a hand adds to the noise that is stated, where the data show that.
+    pub by_hand: Option<ByHand>,
+    /// Residuals beyond chance, by which the covariance was widened, and a drift that they follow.
+    pub ringing: Vec<Finding>,
+}
+
+/// The coarse start without a table, with its covariance.
+pub fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
+    let dwells = dwells(problem)?;
+    let (turned, by_hand) = calibrated_as_held(problem, &dwells)?;
+    let prior = from_vector(problem.model.form, &problem.model.prior_mean);
+    let singular = || singular(&prior);
+    let judged = judged(&turned).ok_or_else(singular)?;
+    let growth = judged.residuals.growth();
+    // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
+    let turned = match growth {
+        None => turned,
+        Some(growth) => {
+            let mut model = match &by_hand {
+                Some(by_hand) => by_hand.model(problem),
+                None => problem.model.clone(),
+            };
+            model.prior_sigma /= growth;
+            calibrated(&problem.with_model(model), &dwells)?
+        }
+    };
+    let variance = growth.unwrap_or(1.0).powi(2);
+    let Turned { at, equations, .. } = turned;
+    let gain = equations.gain().ok_or_else(singular)?;
+    let large = growth.map(|growth| judged.large("both triads", growth, None));
+    Ok(ByGravity {
+        estimate: Estimate {
+            triads: at.triads,
+            covariance: equations.whole(&equations.covariance(&gain)) * variance,
+        },
+        distance: equations.whole(&equations.covariance_of_distance(&gain)) * variance,
+        by_hand,
+        ringing: large.into_iter().chain(judged.drift()).collect(),
+    })
+}
+
+fn judged(turned: &Turned) -> Option<Judged> {
+    let places = [
+        (ParameterKind::Scale, [0, 1, 2]),
+        (ParameterKind::Bias, [9, 10, 11]),
+    ];
+    Judged::new(&turned.equations, &Sensor::ALL, places)
+}
+
+/// Both triads and attitudes as gravity and the rates at rest show them.
+struct Turned {
+    /// The triads, and the attitude at the first sample of each stretch.
+    at: Linearisation,
+    /// 1σ of each heading, rad.
+    heading_sigma: Vec<f64>,
+    /// What they are found from, made at them.
+    equations: Equations,
+}
+
+/// Both triads and attitudes by gravity and Earth rate, first the accelerometers alone by its magnitude.
+fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, CalibrationError> {
+    let model = &problem.model;
+    let prior = from_vector(model.form, &model.prior_mean);
+    let triads = gauss_newton(prior, &ParameterVector::repeat(SMALL), |triads| {
+        let mut equations = Equations::of_triads(model, triads, &[Sensor::Accel]);
+        add_magnitude(&mut equations, problem, dwells, triads)?;
+        Ok(equations)
+    })?;
+    let first = dwells
+        .iter()
+        .map(|dwells| Ok(level(&up(&triads, &dwells[0])?)));
+    let mut at = Linearisation::new(
+        triads,
+        TermVector::zeros(),
+        first.collect::<Result<_, _>>()?,
+    );
+    at.triads.gyro.bias = gyro_bias_at_rest(dwells);
+    for round in 0..ROUNDS {
+        let sensors = match round < ROUNDS_OF_GYROS {
+            true => &[Sensor::Gyro][..],
+            false => &Sensor::ALL,
+        };
+        let step = turned(problem, dwells, &mut at, sensors)?
+            .equations
+            .step()?;
+        at.triads = from_vector(model.form, &(to_vector(&at.triads) + step));
+    }
+    turned(problem, dwells, &mut at, &Sensor::ALL)
+}
+
+/// Attitudes, headings and gyro biases by these triads, and the equations there.
+///
+/// With the gyros the accelerometers are found, whose installation the magnitude of gravity alone shows badly where
+/// every dwell has an axis nearly up or down. Over a move between two dwells the gyros must carry the direction of
+/// gravity from where the accelerometers observed it before to where they observe it after; at rest they must sense
+/// Earth rate.
+fn turned(
+    problem: &Problem,
+    dwells: &[Vec<AtRest>],
+    at: &mut Linearisation,
+    sensors: &[Sensor],
+) -> Result<Turned, CalibrationError> {
+    let (model, stretches) = (&problem.model, problem.stretches());
+    let starts = at.initial_attitudes.iter().zip(stretches).zip(dwells);
+    let chains = starts
+        .map(|((first, stretch), dwells)| Chain::new(model, stretch, dwells, &at.triads, first));
+    let chains = chains.collect::<Result<Vec<_>, _>>()?;
+    let compass = gyrocompass(model, stretches, dwells, &chains, &at.triads)?;
+    let headings = &compass.headings;
+    let attitudes = chains
+        .iter()
+        .zip(headings)
+        .map(|(chain, heading)| heading.turn * chain.attitudes[0]);
+    at.initial_attitudes = attitudes.collect();
+    at.triads.gyro.bias += at.triads.gyro.sensitivity() * compass.bias;
+    let mut equations = Equations::of_triads(model, &at.triads, sensors);
+    if sensors.contains(&Sensor::Accel) {
+        add_magnitude(&mut equations, problem, dwells, &at.triads)?;
+    }
+    for (((stretch, dwells), chain), heading) in
+        stretches.iter().zip(dwells).zip(&chains).zip(headings)
+    {
+        chain.add(&mut equations, dwells, stretch, heading);
+        add_rates(
+            &mut equations,
+            model,
+            (stretch, dwells),
+            chain,
+            &at.triads,
+            heading,
+        )?;
+    }
+    equations.events = events(problem, dwells);
+    Ok(Turned {
+        at: at.clone(),
+        heading_sigma: headings.iter().map(|heading| heading.sigma).collect(),
+        equations,
+    })
+}
+
+/// The same with what a hand adds to the noise that is stated, where the data show that and residuals cannot.
+fn calibrated_as_held(
+    problem: &Problem,
+    dwells: &[Vec<AtRest>],
+) -> Result<(Turned, Option<ByHand>), CalibrationError> {
+    let stated = calibrated(problem, dwells)?;
+    if stated.equations.count() > MOST_EQUATIONS {
+        return Ok((stated, None));
+    }
+    // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
+    let tell = judged(&stated).is_none_or(|judged| judged.residuals.growth().is_some());
+    if tell || problem.options.noise == NoisePolicy::Stated {
+        return Ok((stated, None));
+    }
+    let likeliest = |turned: &Turned, used: &ByHand| {
+        let (errors, mut covariance) = turned.equations.before_data();
+        let parts = turned.equations.by_hand();
+        used.taken_from(&mut covariance, &parts);
+        ByHand::likeliest(&errors, &covariance, &parts).filter(|found| !found.is_none())
+    };
+    let with = |by_hand: &ByHand| calibrated(&problem.with_model(by_hand.model(problem)), dwells);
+    let Some(mut by_hand) = likeliest(&stated, &ByHand::default()) else {
+        return Ok((stated, None));
+    };
+    // What equations are linearised at follows noise, and noise that.
+    for _ in 0..NOISE_ROUNDS {
+        // What noise on trial leads nowhere with is not the noise of this record.
+        let Ok(turned) = with(&by_hand) else {
+            return Ok((stated, None));
+        };
+        match likeliest(&turned, &by_hand) {
+            None => return Ok((stated, None)),
+            Some(here) if here.is_like(&by_hand) => return Ok((turned, Some(here))),
+            Some(here) => by_hand = here,
+        }
+    }
+    Ok(match with(&by_hand) {
+        Ok(turned) => (turned, Some(by_hand)),
+        Err(_) => (stated, None),
+    })
+}

@@ -1,0 +1,156 @@
+//! Rows by Earth rate without a table: what the gyros sense at rest, and which way is north.
+
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+
+use super::equations::{Common, Equations, Rows, of};
+use super::gravity::{AtRest, Chain, ROUNDING, input_errors, of_noise};
+use crate::attitude::exp;
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::singular;
+use crate::calibration::model::Model;
+use crate::calibration::noise::{BY_HAND, Source};
+use crate::calibration::problem::Stretch;
+use crate::earth::ROTATION_RATE;
+use crate::imu::{PerSensor, Sensor, Triad};
+
+/// The heading common to all attitudes of a stretch.
+#[derive(Debug, Clone, Copy)]
+pub struct Heading {
+    /// Number of the stretch.
+    stretch: usize,
+    /// Turn about Up that brings the attitudes to East-North-Up, rad.
+    pub turn: Matrix3<f64>,
+    /// 1σ of its angle, rad; above one nothing is known of it.
+    pub sigma: f64,
+}
+
+impl Heading {
+    /// Its σ as it is used, rad.
+    pub fn known(&self) -> f64 {
+        self.sigma.clamp(1e-3, 1.0)
+    }
+
+    /// How some rows follow its error, by their change with an angle of one.
+    pub fn error<const N: usize>(
+        &self,
+        by_angle: &SVector<f64, N>,
+    ) -> (Common, SMatrix<f64, N, 3>) {
+        let mut error = SMatrix::<f64, N, 3>::zeros();
+        error.set_column(2, &(by_angle * self.known()));
+        (Common::Unit(self.stretch), error)
+    }
+}
+
+/// The headings of all stretches, and the error of the rates.
+pub struct Gyrocompass {
+    pub headings: Vec<Heading>,
+    /// Along body axes, rad/s.
+    pub bias: Vector3<f64>,
+}
+
+/// Bias of the gyros within Earth rate: their mean output at rest. From a prior that is off by so much that a move turns
+/// into another, no step leads back.
+pub fn gyro_bias_at_rest(dwells: &[Vec<AtRest>]) -> Vector3<f64> {
+    let dwells = || dwells.iter().flatten();
+    let outputs: Vector3<f64> = dwells().map(|dwell| dwell.mean.gyro.output).sum();
+    outputs / dwells().count() as f64
+}
+
+/// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest
+/// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other. An error where a rate is no number.
+pub fn gyrocompass(
+    model: &Model,
+    stretches: &[Stretch],
+    dwells: &[Vec<AtRest>],
+    chains: &[Chain],
+    triads: &PerSensor<Triad>,
+) -> Result<Gyrocompass, CalibrationError> {
+    let triad = &triads.gyro;
+    let correction = triad.correction().ok_or_else(|| singular(triads))?;
+    // Unknown: b, and for each stretch Earth rate along its two level axes. Before any rate is observed
+    // none exceeds Earth rate by much: b is the remainder of a bias taken from these very rates.
+    let n = 3 + 2 * stretches.len();
+    let first = |stretch: usize| 3 + 2 * stretch;
+    let mut information = DMatrix::<f64>::identity(n, n) / ROTATION_RATE.powi(2);
+    let mut vector = DVector::<f64>::zeros(n);
+    for (stretch, (of_stretch, dwells)) in stretches.iter().zip(dwells).enumerate() {
+        let up = Vector3::z() * of_stretch.run.site.earth_rate_n().z;
+        for (attitude, dwell) in chains[stretch].attitudes.iter().zip(dwells) {
+            let rate = correction * (dwell.mean.gyro.output - triad.bias);
+            let mut rows = DMatrix::zeros(3, n);
+            rows.fixed_columns_mut::<3>(0).copy_from(attitude);
+            rows[(0, first(stretch))] = 1.0;
+            rows[(1, first(stretch) + 1)] = 1.0;
+            // Tilts of a milliradian turn that much of Earth rate.
+            let by_tilt = (1e-3 * ROTATION_RATE).powi(2);
+            let turning = model.turning_at_rest.powi(2) / dwell.duration();
+            let weight = 1.0 / (dwell.mean.gyro.variance + turning + by_tilt);
+            vector += rows.tr_mul(&(attitude * rate - up)) * weight;
+            information += rows.tr_mul(&rows) * weight;
+        }
+    }
+    let covariance = information
+        .cholesky()
+        .ok_or_else(|| singular(triads))?
+        .inverse();
+    let found = &covariance * vector;
+    let heading = |(stretch, of_stretch): (usize, &Stretch)| {
+        let first = first(stretch);
+        let (east, north) = (found[first], found[first + 1]);
+        // Where nothing but rounding is found, as of a single dwell, the heading stays as it is.
+        let angle = match east.hypot(north) > ROUNDING * ROTATION_RATE {
+            true => north.atan2(east) - std::f64::consts::FRAC_PI_2,
+            false => 0.0,
+        };
+        let level = covariance.fixed_view::<2, 2>(first, first).into_owned();
+        let level = level.symmetric_eigenvalues().max().sqrt();
+        Heading {
+            stretch,
+            turn: exp(Vector3::z() * -angle),
+            sigma: level / of_stretch.run.site.earth_rate_n().y.abs(),
+        }
+    };
+    Ok(Gyrocompass {
+        headings: stretches.iter().enumerate().map(heading).collect(),
+        bias: found.fixed_rows::<3>(0).into_owned(),
+    })
+}
+
+/// Adds the rates in the dwells of a stretch, whose chain of attitudes is turned to its heading.
+pub fn add_rates(
+    equations: &mut Equations,
+    model: &Model,
+    (stretch, dwells): (&Stretch, &[AtRest]),
+    chain: &Chain,
+    triads: &PerSensor<Triad>,
+    heading: &Heading,
+) -> Result<(), CalibrationError> {
+    let triad = &triads.gyro;
+    let correction = triad.correction().ok_or_else(|| singular(triads))?;
+    let earth_rate = stretch.run.site.earth_rate_n();
+    // Earth rate by a heading that is wrong by an angle of one.
+    let turned = Vector3::z().cross(&earth_rate);
+    let of_heading = (ROTATION_RATE * heading.known()).powi(2);
+    for (attitude, dwell) in chain.attitudes.iter().zip(dwells) {
+        let attitude = heading.turn * attitude;
+        let rate = correction * (dwell.mean.gyro.output - triad.bias);
+        let partials = input_errors(triad, &correction, &rate);
+        let by_turning = 1.0 / dwell.duration();
+        let own = model.turning_at_rest.powi(2) * by_turning + ROUNDING.powi(2);
+        let residual = rate - attitude.tr_mul(&earth_rate);
+        equations.add(&Rows {
+            event: dwell.event(),
+            weighted: Vector3::repeat(dwell.mean.gyro.variance + own + of_heading),
+            common: vec![
+                of_noise(Sensor::Gyro, dwell.event(), &partials),
+                heading.error(&attitude.tr_mul(&turned)),
+            ],
+            by_hand: BY_HAND.map(|source| match source {
+                Source::Turning => by_turning,
+                _ => 0.0,
+            }),
+            ..Rows::new(of(Sensor::Gyro, &partials), residual, own)
+        });
+    }
+    Ok(())
+}

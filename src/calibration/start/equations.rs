@@ -1,0 +1,362 @@
+//! Linear equations for the errors of both triads about one point: least squares, its covariance, residuals.
+//!
+//! A row is a residual, its partials by the unknowns, and the sources of its error. The unknowns are the parameters of
+//! a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
+
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3, Vector4};
+
+use crate::calibration::error::CalibrationError;
+use crate::calibration::model::Model;
+use crate::calibration::noise::{BY_HAND, Parts};
+use crate::calibration::parameters::{
+    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter, sensor_and_parameter,
+    to_vector,
+};
+use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+
+/// Largest number of Gauss–Newton steps; scale factors wrong by percents need three.
+const STEPS: usize = 6;
+
+/// Partials of some rows by the unknowns of a triad.
+pub type OfTriad<const N: usize> = SMatrix<f64, N, PER_TRIAD>;
+/// The same by those of both.
+pub type Partials<const N: usize> = SMatrix<f64, N, PARAMETERS>;
+
+/// A span of time, with the mean noise of the triads over it.
+#[derive(Debug, Clone)]
+pub struct Event {
+    pub recording: usize,
+    /// Begin and end, s.
+    pub times: [f64; 2],
+    /// Variance of the mean per axis.
+    pub variance: PerSensor<f64>,
+    /// The noise by which it is correlated with that of other events.
+    pub noise: PerSensor<Noise>,
+}
+
+/// An error vector that several rows have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Common {
+    /// Mean noise of a triad over the event of this number.
+    Noise(Sensor, usize),
+    /// Of unit covariance, by number.
+    Unit(usize),
+}
+
+/// Rows of what is observed in one event.
+pub struct Rows<const N: usize> {
+    pub event: usize,
+    pub partials: Partials<N>,
+    pub residual: SVector<f64, N>,
+    /// Variance by which each is weighted.
+    pub weighted: SVector<f64, N>,
+    /// Variance of the part of the error that no other row has.
+    pub own: SVector<f64, N>,
+    /// How the residuals follow errors that several rows have in common.
+    pub common: Vec<(Common, SMatrix<f64, N, 3>)>,
+    /// Variance by each of [`BY_HAND`] where that is one in SI and radians.
+    pub by_hand: [f64; BY_HAND.len()],
+}
+
+impl<const N: usize> Rows<N> {
+    /// With errors of this variance that no other row has.
+    pub fn new(partials: Partials<N>, residual: SVector<f64, N>, variance: f64) -> Self {
+        Self {
+            event: 0,
+            partials,
+            residual,
+            weighted: SVector::repeat(variance),
+            own: SVector::repeat(variance),
+            common: Vec::new(),
+            by_hand: Default::default(),
+        }
+    }
+}
+
+/// One row of [`Rows`].
+struct Row {
+    event: usize,
+    partials: ParameterVector,
+    residual: f64,
+    weighted: f64,
+    own: f64,
+    common: Vec<(Common, Vector3<f64>)>,
+    by_hand: [f64; BY_HAND.len()],
+}
+
+/// Equations `residual = partials · δθ + error`, and what is known of δθ beforehand.
+pub struct Equations {
+    /// Which of the parameters of both triads are to be found.
+    pub unknown: Vec<usize>,
+    /// Their prior: mean over σ, and σ, infinite without one.
+    mean: DVector<f64>,
+    sigma: DVector<f64>,
+    rows: Vec<Row>,
+    pub events: Vec<Event>,
+    /// Whether rows are weighted by the inverse of their whole covariance, not each by its own variance.
+    pub correlated: bool,
+}
+
+/// How the estimate follows …
+pub struct Gain {
+    /// … the prior's mean over its σ, …
+    of_prior: DMatrix<f64>,
+    /// … and the scaled residuals.
+    of_rows: DMatrix<f64>,
+}
+
+impl Equations {
+    /// By mean and σ of the prior of δθ; where that σ is zero, the parameter is not to be found.
+    pub fn new(mean: &ParameterVector, sigma: &ParameterVector) -> Self {
+        let unknown: Vec<usize> = (0..PARAMETERS).filter(|&k| sigma[k] > 0.0).collect();
+        let count = unknown.len();
+        Self {
+            mean: DVector::from_fn(count, |k, _| mean[unknown[k]] / sigma[unknown[k]]),
+            sigma: DVector::from_fn(count, |k, _| sigma[unknown[k]]),
+            unknown,
+            rows: Vec::new(),
+            events: Vec::new(),
+            correlated: false,
+        }
+    }
+
+    /// Of the parameters of some triads, about these values.
+    pub fn of_triads(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
+        let of = |k| sensors.contains(&sensor_and_parameter(k).0);
+        let sigma = |k: usize, _| if of(k) { model.prior_sigma[k] } else { 0.0 };
+        let mean = model.prior_mean - to_vector(at);
+        Self::new(&mean, &ParameterVector::from_fn(sigma))
+    }
+
+    pub fn add<const N: usize>(&mut self, rows: &Rows<N>) {
+        let row = |k: usize| Row {
+            event: rows.event,
+            partials: rows.partials.row(k).transpose(),
+            residual: rows.residual[k],
+            weighted: rows.weighted[k],
+            own: rows.own[k],
+            common: Vec::from_iter(
+                rows.common
+                    .iter()
+                    .map(|(of, by)| (*of, by.row(k).transpose())),
+            ),
+            by_hand: rows.by_hand,
+        };
+        self.rows.extend((0..N).map(row));
+    }
+
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Partials by the unknowns, and residuals, each row over the σ by which it is weighted.
+    pub fn scaled(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let (rows, unknown) = (&self.rows, &self.unknown);
+        let sigma = |k: usize| rows[k].weighted.sqrt();
+        let partial = |k: usize, j: usize| rows[k].partials[unknown[j]] / sigma(k);
+        let residual = |k: usize, _| rows[k].residual / sigma(k);
+        (
+            DMatrix::from_fn(rows.len(), unknown.len(), partial),
+            DVector::from_fn(rows.len(), residual),
+        )
+    }
+
+    /// The same with the unknowns over σ of their prior.
+    pub fn in_sigmas(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let (design, residual) = self.scaled();
+        (design * DMatrix::from_diagonal(&self.sigma), residual)
+    }
+
+    /// Covariance of the errors of the scaled rows.
+    pub fn errors(&self) -> DMatrix<f64> {
+        let (rows, events) = (&self.rows, &self.events);
+        let of_noise = PerSensor::from_fn(|sensor| {
+            DMatrix::from_fn(events.len(), events.len(), |i, j| {
+                let (one, other) = (&events[i], &events[j]);
+                let noise = one.noise.get(sensor);
+                match one.recording == other.recording {
+                    true if i == j => *one.variance.get(sensor),
+                    true => noise.covariance_of_means(one.times, other.times),
+                    false => 0.0,
+                }
+            })
+        });
+        let covariance = |one: Common, other: Common| match (one, other) {
+            (Common::Noise(of, i), Common::Noise(sensor, j)) if of == sensor => {
+                of_noise.get(sensor)[(i, j)]
+            }
+            _ => f64::from(u8::from(one == other)),
+        };
+        let mut errors = DMatrix::zeros(rows.len(), rows.len());
+        for (i, one) in rows.iter().enumerate() {
+            for (j, other) in rows[..=i].iter().enumerate() {
+                let mut sum = if i == j { one.own } else { 0.0 };
+                for (of_one, by_one) in &one.common {
+                    for (of_other, by_other) in &other.common {
+                        sum += covariance(*of_one, *of_other) * by_one.dot(by_other);
+                    }
+                }
+                errors[(i, j)] = sum / (one.weighted * other.weighted).sqrt();
+                errors[(j, i)] = errors[(i, j)];
+            }
+        }
+        errors
+    }
+
+    /// Least squares of rows and prior: x = R⁻¹ Qᵀ y, not by way of the squares of its equations.
+    pub fn gain(&self) -> Option<Gain> {
+        let (design, _) = self.scaled();
+        let (count, unknown) = design.shape();
+        let factor = match self.correlated {
+            true => Some(self.errors().cholesky()?.l()),
+            false => None,
+        };
+        let mut stacked = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
+        stacked = stacked.resize_vertically(unknown + count, 0.0);
+        stacked.rows_mut(unknown, count).copy_from(&match &factor {
+            Some(factor) => factor.solve_lower_triangular(&design)?,
+            None => design,
+        });
+        let qr = stacked.qr();
+        let gain = qr.r().solve_upper_triangular(&qr.q().transpose())?;
+        let of_rows = gain.columns(unknown, count).transpose();
+        let of_rows = match &factor {
+            Some(factor) => factor.tr_solve_lower_triangular(&of_rows)?,
+            None => of_rows,
+        };
+        Some(Gain {
+            of_prior: gain.columns(0, unknown).into_owned(),
+            of_rows: of_rows.transpose(),
+        })
+    }
+
+    /// The unknowns by a gain.
+    pub fn found(&self, gain: &Gain) -> DVector<f64> {
+        &gain.of_prior * &self.mean + &gain.of_rows * self.scaled().1
+    }
+
+    /// The δθ of least squares; an error that names the triad where it is no number.
+    pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
+        let mut step = ParameterVector::zeros();
+        let Some(&first) = self.unknown.first() else {
+            return Ok(step);
+        };
+        let singular = |index: usize| CalibrationError::Singular {
+            sensor: sensor_and_parameter(index).0,
+        };
+        let found = self.found(&self.gain().ok_or_else(|| singular(first))?);
+        for (&index, &value) in self.unknown.iter().zip(&found) {
+            step[index] = value;
+        }
+        let lost = step.iter().position(|value| !value.is_finite());
+        lost.map_or(Ok(step), |index| Err(singular(index)))
+    }
+
+    /// Covariance of the unknowns by prior and errors.
+    pub fn covariance(&self, gain: &Gain) -> DMatrix<f64> {
+        let of_errors = &gain.of_rows * self.errors() * gain.of_rows.transpose();
+        &gain.of_prior * gain.of_prior.transpose() + of_errors
+    }
+
+    /// Covariance of how far the data bring the unknowns from a prior that is right.
+    pub fn covariance_of_distance(&self, gain: &Gain) -> DMatrix<f64> {
+        &gain.of_rows * self.before_data().1 * gain.of_rows.transpose()
+    }
+
+    /// A matrix of the unknowns among all parameters.
+    pub fn whole(&self, of_unknowns: &DMatrix<f64>) -> ParameterMatrix {
+        let place = |k: usize| self.unknown.iter().position(|&index| index == k);
+        ParameterMatrix::from_fn(|i, j| match (place(i), place(j)) {
+            (Some(row), Some(column)) => of_unknowns[(row, column)],
+            _ => 0.0,
+        })
+    }
+
+    /// How the estimate of the unknowns follows the first errors of unit covariance, three columns each.
+    pub fn by_units(&self, gain: &Gain, count: usize) -> DMatrix<f64> {
+        let mut by_units = DMatrix::zeros(self.unknown.len(), 3 * count);
+        for unit in 0..count {
+            let by_unit = &gain.of_rows * self.by_unit(unit);
+            by_units
+                .fixed_columns_mut::<3>(3 * unit)
+                .copy_from(&by_unit);
+        }
+        by_units
+    }
+
+    /// How the scaled rows follow an error of unit covariance.
+    pub fn by_unit(&self, unit: usize) -> DMatrix<f64> {
+        let mut by_unit = DMatrix::zeros(self.rows.len(), 3);
+        for (row, mut place) in self.rows.iter().zip(by_unit.row_iter_mut()) {
+            for (of, by) in &row.common {
+                if *of == Common::Unit(unit) {
+                    place += by.transpose() / row.weighted.sqrt();
+                }
+            }
+        }
+        by_unit
+    }
+
+    /// Residuals of the scaled rows as they are before these data, and their covariance by prior and errors.
+    pub fn before_data(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let (spread, residual) = self.in_sigmas();
+        let covariance = &spread * spread.transpose() + self.errors();
+        (residual - spread * &self.mean, covariance)
+    }
+
+    /// How much of each of [`BY_HAND`] is in each of the scaled rows.
+    pub fn by_hand(&self) -> Parts {
+        std::array::from_fn(|source| {
+            let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted;
+            DVector::from_fn(self.rows.len(), part)
+        })
+    }
+
+    /// Residual and weight of each row.
+    pub fn weighted(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.rows.iter().map(|row| (row.residual, row.weighted))
+    }
+
+    /// The rows of each event that has any, by its number.
+    pub fn by_event(&self) -> Vec<(usize, Vec<usize>)> {
+        let of = |event| (0..self.rows.len()).filter(move |&k| self.rows[k].event == event);
+        let groups = (0..self.events.len()).map(|event| (event, Vec::from_iter(of(event))));
+        groups.filter(|(_, rows)| !rows.is_empty()).collect()
+    }
+}
+
+/// The partials of one triad among those of both.
+pub fn of<const N: usize>(sensor: Sensor, partials: &OfTriad<N>) -> Partials<N> {
+    let mut whole = Partials::zeros();
+    let mut place = whole.fixed_columns_mut::<PER_TRIAD>(parameter(sensor, 0));
+    place.copy_from(partials);
+    whole
+}
+
+/// Partials of `A u + D` by `A` and `D`, row by row, for `[u; 1]`; for `[u; 0]` those of an output without its zero.
+pub fn of_sensitivity(input: Vector4<f64>) -> OfTriad<3> {
+    Matrix3::identity().kronecker(&input.transpose())
+}
+
+/// Partials of a triad's output by its parameters.
+pub fn of_parameters(triad: &Triad, input: &Vector3<f64>) -> OfTriad<3> {
+    OfTriad::from_columns(&triad.response().map(|response| response * input.push(1.0)))
+}
+
+/// Steps from a first point, each by equations made there, until no parameter changes by more than this.
+pub fn gauss_newton(
+    from: PerSensor<Triad>,
+    smallest: &ParameterVector,
+    equations: impl Fn(&PerSensor<Triad>) -> Result<Equations, CalibrationError>,
+) -> Result<PerSensor<Triad>, CalibrationError> {
+    let mut triads = from;
+    for _ in 0..STEPS {
+        let step = equations(&triads)?.step()?;
+        triads = from_vector(triads.gyro.form, &(to_vector(&triads) + step));
+        let mut parameters = step.iter().zip(smallest);
+        if parameters.all(|(step, least)| step.abs() <= *least) {
+            break;
+        }
+    }
+    Ok(triads)
+}

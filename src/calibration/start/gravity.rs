@@ -1,0 +1,312 @@
+//! Rows by gravity without a table: its magnitude in every dwell, its direction before and after every move.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, SMatrix, Vector1, Vector2, Vector3};
+
+use super::earth_rate::Heading;
+use super::equations::{Common, Equations, Event, OfTriad, Rows, of, of_parameters};
+use crate::attitude::{exp, skew, tilt};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::singular;
+use crate::calibration::model::Model;
+use crate::calibration::noise::{BY_HAND, Source};
+use crate::calibration::problem::{Problem, Stretch};
+use crate::earth::ROTATION_RATE;
+use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::navigation::{Navigator, ProcessNoise, State};
+use crate::run::{Dwell, MeanOutput};
+
+/// Least σ of a row, rad or m/s: an instrument without noise is not better than that.
+pub const ROUNDING: f64 = 1e-9;
+
+/// Columns of the biases among a triad's parameters. Its mean noise enters as they do.
+const BIAS: usize = PER_TRIAD - 3;
+
+/// A dwell by the mean outputs in it.
+#[derive(Debug, Clone)]
+pub struct AtRest {
+    /// Among the dwells of all stretches.
+    pub number: usize,
+    pub samples: Range<usize>,
+    /// Begin and end, s.
+    pub times: [f64; 2],
+    pub mean: PerSensor<MeanOutput>,
+}
+
+impl AtRest {
+    /// The dwells of each stretch.
+    pub fn all(problem: &Problem) -> Vec<Vec<Self>> {
+        let mut numbers = 0..;
+        let stretches = problem.stretches().iter();
+        let of_stretch = stretches.map(|stretch| {
+            let at_rest = |(dwell, number): (&Dwell, usize)| Self {
+                number,
+                samples: dwell.samples.clone(),
+                times: dwell.times(stretch.run),
+                mean: PerSensor::from_fn(|sensor| dwell.mean(sensor, stretch.run)),
+            };
+            stretch
+                .dwells
+                .iter()
+                .zip(&mut numbers)
+                .map(at_rest)
+                .collect()
+        });
+        of_stretch.collect()
+    }
+
+    /// s
+    pub fn duration(&self) -> f64 {
+        self.times[1] - self.times[0]
+    }
+
+    /// The number of the event: of each dwell that follows that of the move before it.
+    pub fn event(&self) -> usize {
+        2 * self.number + 1
+    }
+}
+
+/// Each dwell, and the move before it. The noise of that is that of the bias alone: each row has the random walk for
+/// itself.
+pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
+    let mut events = Vec::new();
+    for (stretch, dwells) in problem.stretches().iter().zip(dwells) {
+        let noise = PerSensor::from_fn(|sensor| Noise {
+            random_walk: 0.0,
+            ..*stretch.run.instrument.noise.get(sensor)
+        });
+        let event = |times: [f64; 2], variance: &dyn Fn(Sensor) -> f64| Event {
+            recording: stretch.recording,
+            times,
+            variance: PerSensor::from_fn(variance),
+            noise,
+        };
+        let mut before = dwells.first().map_or(0.0, |first| first.times[0]);
+        for dwell in dwells {
+            let times = [before, dwell.times[0]];
+            let of_move = |sensor| noise.get(sensor).covariance_of_means(times, times);
+            events.push(event(times, &of_move));
+            events.push(event(dwell.times, &|sensor| {
+                dwell.mean.get(sensor).variance
+            }));
+            before = dwell.times[1];
+        }
+    }
+    events
+}
+
+/// Error of a triad's computed input, estimated − true, by the error of each of its parameters.
+pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f64>) -> OfTriad<3> {
+    correction * of_parameters(triad, input)
+}
+
+/// How some rows follow the mean noise of a triad over an event: as they do its biases.
+pub fn of_noise<const N: usize>(
+    sensor: Sensor,
+    event: usize,
+    partials: &OfTriad<N>,
+) -> (Common, SMatrix<f64, N, 3>) {
+    let of_biases = partials.fixed_columns::<3>(BIAS).into_owned();
+    (Common::Noise(sensor, event), of_biases)
+}
+
+/// The mean specific force in a dwell.
+struct Force {
+    /// m/s²; not zero.
+    size: f64,
+    /// Up along body axes.
+    up: Vector3<f64>,
+    /// The force's error by the error of each accelerometer parameter.
+    error: OfTriad<3>,
+}
+
+impl Force {
+    fn of(triads: &PerSensor<Triad>, dwell: &AtRest) -> Result<Self, CalibrationError> {
+        let triad = &triads.accel;
+        let correction = triad.correction().ok_or_else(|| singular(triads))?;
+        let force = correction * (dwell.mean.accel.output - triad.bias);
+        let sensor = Sensor::Accel;
+        let size = Some(force.norm()).filter(|&size| size > 0.0);
+        let size = size.ok_or(CalibrationError::Singular { sensor })?;
+        Ok(Self {
+            size,
+            up: force / size,
+            error: input_errors(triad, &correction, &force),
+        })
+    }
+}
+
+/// Up along body axes in a dwell.
+pub fn up(triads: &PerSensor<Triad>, dwell: &AtRest) -> Result<Vector3<f64>, CalibrationError> {
+    Ok(Force::of(triads, dwell)?.up)
+}
+
+/// Adds `|f| = g` in every dwell.
+///
+/// Source: Skog and Händel 2006, "Calibration of a MEMS inertial measurement unit", XVII IMEKO World
+/// Congress, §3.
+pub fn add_magnitude(
+    equations: &mut Equations,
+    problem: &Problem,
+    dwells: &[Vec<AtRest>],
+    triads: &PerSensor<Triad>,
+) -> Result<(), CalibrationError> {
+    for (stretch, dwells) in problem.stretches().iter().zip(dwells) {
+        for dwell in dwells {
+            let Force { size, up, error } = Force::of(triads, dwell)?;
+            let partials = up.transpose() * error;
+            let residual = Vector1::new(size - stretch.run.site.gravity);
+            equations.add(&Rows {
+                event: dwell.event(),
+                weighted: Vector1::new(dwell.mean.accel.variance + ROUNDING.powi(2)),
+                common: vec![of_noise(Sensor::Accel, dwell.event(), &partials)],
+                ..Rows::new(of(Sensor::Accel, &partials), residual, ROUNDING.powi(2))
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Attitudes of the dwells of a stretch, each carried to the next by the gyros and levelled there.
+pub struct Chain {
+    pub attitudes: Vec<Matrix3<f64>>,
+    moves: Vec<Move>,
+}
+
+/// A move from one dwell to the next.
+struct Move {
+    /// s
+    duration: f64,
+    /// The tilt that the gyros are wrong by after it, `C_computed = (I − [φ×]) C_true`, …
+    tilt: Vector3<f64>,
+    /// … by the error of each gyro parameter, …
+    of_gyro: OfTriad<3>,
+    /// … and by that of each accelerometer parameter, which make Up before …
+    of_before: OfTriad<3>,
+    /// … and after it.
+    of_after: OfTriad<3>,
+    /// Variance of each of its two components by noise and interpolation of the gyros, …
+    walk: f64,
+    /// … by each of [`BY_HAND`] where that is one, …
+    by_hand: [f64; BY_HAND.len()],
+    /// … and by the first and the noise of Up.
+    variance: f64,
+}
+
+impl Chain {
+    /// From an attitude in the first dwell, which is levelled.
+    ///
+    /// Source: Tedaldi, Pretto, Menegatti 2014, "A robust and easy to implement method for IMU calibration
+    /// without external equipments", ICRA, §IV.
+    pub fn new(
+        model: &Model,
+        stretch: &Stretch,
+        dwells: &[AtRest],
+        triads: &PerSensor<Triad>,
+        first: &Matrix3<f64>,
+    ) -> Result<Self, CalibrationError> {
+        let forces = dwells.iter().map(|dwell| Force::of(triads, dwell));
+        let forces = forces.collect::<Result<Vec<_>, _>>()?;
+        let mut attitude = exp(tilt(&(first * forces[0].up))) * first;
+        let (mut attitudes, mut moves) = (vec![attitude], Vec::new());
+        for (dwells, forces) in dwells.windows(2).zip(forces.windows(2)) {
+            let of;
+            (of, attitude) = Move::new(model, stretch, triads, &attitude, dwells, forces)?;
+            attitudes.push(attitude);
+            moves.push(of);
+        }
+        Ok(Self { attitudes, moves })
+    }
+
+    /// Adds what the moves between the dwells show once the chain is turned to its heading: the gyros carry Up from
+    /// where it was before to where it is after.
+    pub fn add(
+        &self,
+        equations: &mut Equations,
+        dwells: &[AtRest],
+        stretch: &Stretch,
+        heading: &Heading,
+    ) {
+        let earth_rate = stretch.run.site.earth_rate_n();
+        // Earth rate by a heading that is wrong by an angle of one.
+        let turned = Vector3::z().cross(&earth_rate);
+        for (turn, pair) in self.moves.iter().zip(dwells.windows(2)) {
+            let level = |of: &OfTriad<3>| (heading.turn * of).fixed_rows::<2>(0).into_owned();
+            let of_gyro = level(&turn.of_gyro);
+            let [of_before, of_after] = [&turn.of_before, &turn.of_after].map(level);
+            let [before, after] = [&pair[0], &pair[1]].map(AtRest::event);
+            let event = after - 1;
+            // As much of Earth rate as the heading may be wrong by, all of it at most.
+            let of_heading = (ROTATION_RATE * heading.known() * turn.duration).powi(2);
+            let of_accel = of(Sensor::Accel, &(of_before + of_after));
+            let residual = (heading.turn * turn.tilt).xy();
+            equations.add(&Rows {
+                event,
+                weighted: Vector2::repeat(turn.variance + of_heading + ROUNDING.powi(2)),
+                common: vec![
+                    of_noise(Sensor::Accel, before, &of_before),
+                    of_noise(Sensor::Accel, after, &of_after),
+                    of_noise(Sensor::Gyro, event, &of_gyro),
+                    heading.error(&(turned * -turn.duration).xy()),
+                ],
+                by_hand: turn.by_hand,
+                ..Rows::new(
+                    of(Sensor::Gyro, &of_gyro) + of_accel,
+                    residual,
+                    turn.walk + ROUNDING.powi(2),
+                )
+            });
+        }
+    }
+}
+
+impl Move {
+    /// The move from an attitude in the first of two dwells, and the attitude after it.
+    fn new(
+        model: &Model,
+        stretch: &Stretch,
+        triads: &PerSensor<Triad>,
+        start: &Matrix3<f64>,
+        dwells: &[AtRest],
+        forces: &[Force],
+    ) -> Result<(Self, Matrix3<f64>), CalibrationError> {
+        let run = stretch.run;
+        let [before, after] = [&dwells[0], &dwells[1]];
+        let block = Navigator::new(
+            &run.recording.imu,
+            &run.site,
+            triads,
+            State::at_rest(*start),
+        )
+        .ok_or_else(|| singular(triads))?
+        .advance(before.samples.end..after.samples.start);
+        let tilt = tilt(&(block.state.attitude * forces[1].up));
+        let attitude = exp(tilt) * block.state.attitude;
+        let level = -skew(Vector3::z());
+        // East and North: alike except for what is interpolated.
+        let level_variance = |noise: &PerSensor<ProcessNoise>| {
+            let drifted = block.noise.covariance(noise);
+            0.5 * (drifted[(0, 0)] + drifted[(1, 1)])
+        };
+        let interpolated = level_variance(&PerSensor::default());
+        // Up is that of the middle of a dwell, from whose end the gyros carry it.
+        let held = (before.duration() + after.duration()) / 3.0;
+        let walk = level_variance(&model.process_noise()) + model.turning_at_rest.powi(2) * held;
+        let of_gravity = |dwell: &AtRest| dwell.mean.accel.variance / run.site.gravity.powi(2);
+        let of = Self {
+            duration: block.duration,
+            tilt,
+            of_gyro: block.parameters.gyro.fixed_rows::<3>(0).into_owned(),
+            of_before: -level * start * (forces[0].error / forces[0].size),
+            of_after: level * attitude * (forces[1].error / forces[1].size),
+            walk,
+            by_hand: BY_HAND.map(|source| match source {
+                Source::Turning => held,
+                _ => level_variance(&source.alone()) - interpolated,
+            }),
+            variance: walk + of_gravity(before) + of_gravity(after),
+        };
+        Ok((of, attitude))
+    }
+}

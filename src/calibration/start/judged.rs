@@ -1,0 +1,81 @@
+//! What residuals of equations show: events that do not fit, and parameters that change in time.
+
+use super::equations::Equations;
+use crate::calibration::checks::drift::{Changing, drift};
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::residuals::{Residuals, Worst};
+use crate::calibration::parameters::parameter;
+use crate::imu::{ParameterKind, Sensor};
+
+/// Residuals without what any values of the unknowns explain, and the events that fit the others least.
+pub struct Judged {
+    pub residuals: Residuals,
+    pub worst: Worst,
+    /// Begin and end of the worst events, s.
+    times: Vec<[f64; 2]>,
+    drift: Option<Finding>,
+}
+
+/// Where the unknowns of the three axes are among those of a triad, by kind.
+pub type Places = [(ParameterKind, [usize; 3]); 2];
+
+impl Judged {
+    /// `None` where the errors of the equations have no covariance.
+    pub fn new(equations: &Equations, sensors: &[Sensor], places: Places) -> Option<Self> {
+        let (design, residual) = equations.scaled();
+        let residuals = Residuals::new(&design, &residual, &equations.errors())?;
+        let (events, groups): (Vec<_>, Vec<_>) = equations.by_event().into_iter().unzip();
+        let times = |k: usize| equations.events[events[k]].times;
+        let worst = residuals.worst(&groups);
+        let mut middle = vec![0.0; equations.count()];
+        for (k, group) in groups.iter().enumerate() {
+            group
+                .iter()
+                .for_each(|&row| middle[row] = 0.5 * times(k).iter().sum::<f64>());
+        }
+        let changing = |(&sensor, (kind, of_axes)): (&Sensor, (ParameterKind, [usize; 3]))| {
+            let of_axis = |axis: usize| {
+                let index = parameter(sensor, of_axes[axis]);
+                let column = equations.unknown.iter().position(|&k| k == index)?;
+                Some((axis, column))
+            };
+            let (axes, columns): (Vec<_>, Vec<_>) = (0..3).filter_map(of_axis).unzip();
+            let columns = design.select_columns(&columns);
+            Changing {
+                sensor,
+                kind,
+                columns,
+                axes,
+            }
+        };
+        let all = sensors
+            .iter()
+            .flat_map(|sensor| places.map(|place| (sensor, place)));
+        let changing: Vec<Changing> = all.map(changing).collect();
+        Some(Self {
+            drift: drift(&residuals, &changing, &middle, worst.without),
+            times: worst.groups.iter().map(|&k| times(k)).collect(),
+            residuals,
+            worst,
+        })
+    }
+
+    /// A drift of biases or scale factors that the residuals follow.
+    pub fn drift(&self) -> Option<Finding> {
+        self.drift.clone()
+    }
+
+    /// That residuals are beyond chance, by which σ grow by this factor.
+    pub fn large(&self, of: &'static str, growth: f64, base: Option<f64>) -> Finding {
+        Finding::ResidualsLarge {
+            of,
+            chi_square: self.residuals.chi_square(),
+            degrees: self.residuals.degrees(),
+            limit: self.residuals.limit(),
+            growth,
+            worst: self.times.clone(),
+            without: self.worst.without,
+            base,
+        }
+    }
+}

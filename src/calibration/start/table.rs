@@ -1,0 +1,162 @@
+//! Rows by the attitudes of a table.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::equations::{Equations, Partials, Rows, of};
+use super::gravity::ROUNDING;
+use super::positions::{BASE, Known, Observed, Position};
+use crate::attitude::{log, skew};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::singular;
+use crate::calibration::problem::{Problem, Stretch};
+use crate::earth::Site;
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::navigation::{Block, Navigator, State};
+use crate::run::{Dwell, MeanOutput};
+use crate::turntable::axis_response;
+
+/// What a triad senses of a site at rest, along East, North and Up.
+pub fn sensed(site: &Site, sensor: Sensor) -> Vector3<f64> {
+    match sensor {
+        Sensor::Gyro => site.earth_rate_n(),
+        Sensor::Accel => -site.gravity_n(),
+    }
+}
+
+/// Mean outputs in some dwells of the problem's first run under the inputs that the table's attitudes make; `None`
+/// without a table.
+///
+/// An attitude that is wrong by `C_true = (I + [e×]) C_read` gives the input an error of `C_readᵀ [u_n×] e`: of the
+/// base, of the axes, of the position that the table took up, of its readings there.
+pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<Observed> {
+    let (run, model) = (problem.run(), &problem.model);
+    let axes = &model.geometry.axes;
+    let sensed = sensed(&run.site, sensor);
+    let known = dwells.iter().enumerate().map(|(number, dwell)| {
+        let position = dwell.position.as_ref()?;
+        let MeanOutput { output, variance } = dwell.mean(sensor, run);
+        let variance = Vector3::repeat(variance);
+        let of_input = position.attitude.tr_mul(&skew(sensed));
+        let mut errors = vec![(BASE, of_input)];
+        let angles = run.recording.table.as_ref().map(|table| &table.axes);
+        if let Some(angles) = angles.and_then(|of| of.get(position.readings.start)) {
+            let response = axis_response(angles);
+            for k in (0..axes.len()).filter(|&k| axes[k] > 0.0) {
+                let mut of_axis = Matrix3::zeros();
+                of_axis.set_column(0, &(of_input * response.column(k) * axes[k]));
+                errors.push((1 + k, of_axis));
+            }
+        }
+        let readings = position.readings.len() as f64;
+        let of_dwell = model
+            .position_sigma
+            .hypot(model.reading_sigma / readings.sqrt());
+        errors.push((1 + axes.len() + number, of_input * of_dwell));
+        Some(Known {
+            position: Position {
+                input: position.attitude.tr_mul(&sensed),
+                output,
+                variance,
+                weighted: variance,
+            },
+            times: dwell.times(run),
+            errors,
+        })
+    });
+    Some(Observed {
+        sensor,
+        noise: *run.instrument.noise.get(sensor),
+        base_sigma: Some(Vector3::from_fn(|k, _| model.geometry.base[k])),
+        known: known.collect::<Option<_>>()?,
+    })
+}
+
+/// Equations of both triads: over each dwell the velocity must stay zero and the attitude must stay; over each move
+/// between two dwells the gyros must turn by what the table says.
+pub fn carried(
+    problem: &Problem,
+    triads: &PerSensor<Triad>,
+) -> Result<Equations, CalibrationError> {
+    let mut equations = Equations::of_triads(&problem.model, triads, &Sensor::ALL);
+    for stretch in problem.stretches() {
+        let mut before = None;
+        for dwell in &stretch.dwells {
+            let Some(position) = &dwell.position else {
+                continue;
+            };
+            add_carried(
+                &mut equations,
+                problem,
+                stretch,
+                triads,
+                (before, dwell, position.attitude),
+            )?;
+            before = Some((dwell.samples.end, position.attitude));
+        }
+    }
+    Ok(equations)
+}
+
+/// Adds a dwell in this attitude, and the move to it from the end and the attitude of the dwell before.
+fn add_carried(
+    equations: &mut Equations,
+    problem: &Problem,
+    stretch: &Stretch,
+    triads: &PerSensor<Triad>,
+    (before, dwell, attitude): (Option<(usize, Matrix3<f64>)>, &Dwell, Matrix3<f64>),
+) -> Result<(), CalibrationError> {
+    let (run, model) = (stretch.run, &problem.model);
+    let imu = &run.recording.imu;
+    let walk = PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk.powi(2));
+    let attitude_variance = model.position_sigma.powi(2) + imu.pulse.gyro.powi(2) / 12.0;
+    let at_rest = |attitude| {
+        let state = State::at_rest(attitude);
+        Navigator::new(imu, &run.site, triads, state).ok_or_else(|| singular(triads))
+    };
+    // φ of a block's end against the dwell's attitude.
+    let off = |block: &Block| -log(&(block.state.attitude * attitude.transpose()));
+    if let Some((end, start)) = before {
+        let turn = at_rest(start)?.advance(end..dwell.samples.start);
+        let variance = 2.0 * attitude_variance + walk.gyro * turn.duration;
+        add(equations, &turn, 0, off(&turn), variance);
+    }
+    let mut navigator = at_rest(attitude)?;
+    let Range { start, end } = dwell.samples;
+    let first = stretch.steps.partition_point(|s| s.samples.start < start);
+    let steps = stretch.steps[first..].iter();
+    let of_dwell = steps.take_while(|step| step.samples.start < end);
+    for at_rest in of_dwell.filter_map(|step| step.at_rest.as_ref()) {
+        navigator.stand(&at_rest.sums);
+    }
+    let stand = navigator.standing(&navigator.state.attitude, dwell.samples.clone());
+    let variance = imu.pulse.gyro.powi(2) / 6.0 + walk.gyro * stand.duration;
+    add(equations, &stand, 0, off(&stand), variance);
+    // A tilt of the table turns gravity into velocity.
+    let variance = (run.site.gravity * stand.duration).powi(2) * attitude_variance
+        + walk.accel * stand.duration
+        + imu.pulse.accel.powi(2) / 6.0;
+    add(equations, &stand, 3, stand.state.velocity, variance);
+    Ok(())
+}
+
+/// Adds three rows of a block from `first` on.
+fn add(
+    equations: &mut Equations,
+    block: &Block,
+    first: usize,
+    residual: Vector3<f64>,
+    variance: f64,
+) {
+    let mut partials = Partials::zeros();
+    for sensor in Sensor::ALL {
+        let rows = block
+            .parameters
+            .get(sensor)
+            .fixed_view::<3, PER_TRIAD>(first, 0);
+        partials += of(sensor, &rows.into_owned());
+    }
+    let variance = variance + ROUNDING.powi(2);
+    equations.add(&Rows::new(partials, residual, variance));
+}
