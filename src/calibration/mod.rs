@@ -40,14 +40,12 @@ pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::dwell_scatter::DwellScatter;
 pub use checks::error_term_test::{ErrorTermTest, LeftOff, Role, test_error_terms};
-pub use checks::finding::{Finding, RecordingDifference};
+pub use checks::finding::Finding;
 pub use checks::form::FormTest;
-pub use checks::innovation::{
-    Consistency, Inconsistency, Innovation, Look, Nis, Observation, mean_square_interval,
-};
+pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
 pub use checks::observability::{AttitudePart, Direction, Observability, Part};
-pub use checks::prior_cause::PriorCause;
 pub use checks::quality::{Measures, Quality, Spread};
+pub use checks::recordings::RecordingDifference;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
 pub use estimate::Estimate;

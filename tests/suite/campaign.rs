@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use turncal::calibration::{
-    AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, estimate, parameter,
+    AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, RecordingDifference,
+    estimate, parameter,
 };
 use turncal::formats::Campaign;
 use turncal::imu::Sensor;
@@ -276,9 +277,10 @@ fn recordings_that_differ_by_more_than_is_stated_are_found_to() {
     fs::write(&path, without).unwrap();
     let silent = estimated(&path);
     let sigma = |outcome: &Outcome| {
-        let found = outcome.findings.iter().find_map(|finding| match finding {
-            Finding::RecordingsDiffer { differences } => Some(differences.clone()),
-            _ => None,
+        let differ = |finding: &&Finding| finding.kind == "recordings-differ";
+        let found = outcome.findings.iter().find(differ).map(|finding| {
+            let differences = finding.figures["differences"].clone();
+            serde_json::from_value::<Vec<RecordingDifference>>(differences).unwrap()
         });
         (
             outcome.estimate.sigma()[PARAMETERS / 2 - 3] / DEG_PER_H,

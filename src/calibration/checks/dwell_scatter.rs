@@ -10,14 +10,15 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
+use super::finding::{Finding, widened_by};
 use super::innovation::mean_square_interval;
+use crate::statistics::FALSE_ALARM;
 
 /// A direction of which a dwell has less than this part of all information says nothing of the dwell but
 /// rounding.
 const SHARE: f64 = 1e-3;
-/// Chance that scores of a right model are said to be too large.
-const FALSE_ALARM: f64 = 1e-3;
 
 /// Mean and covariance of the constants of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +41,21 @@ pub struct DwellScatter {
     pub halves: f64,
     /// … with its 95 % interval.
     pub halves_interval: (f64, f64),
+}
+
+impl DwellScatter {
+    /// The finding where σ were widened by so much because of it.
+    pub fn finding(&self, growth: f64) -> Finding {
+        let Self { mean, limit, .. } = self;
+        let text = format!(
+            "The dwells disagree with one another by more than σ allow (scatter statistic {mean:.2}; limit \
+             {limit:.2}). turncal widened σ {}. This usually means an unmodelled error: look at the effects of \
+             error terms, and rerun with --with and the one that explains most.",
+            widened_by(growth)
+        );
+        let figures = json!({ "mean": mean, "limit": limit, "growth": growth });
+        Finding::new("dwells-scatter", text, figures)
+    }
 }
 
 /// The scores of dwells in units in which the covariance of the estimate is the identity.
@@ -188,7 +204,7 @@ mod tests {
         let truth = estimated(&run);
         run.table.position_sigma /= 3.0;
         let outcome = estimated(&run);
-        let said = |finding: &Finding| matches!(finding, Finding::DwellsScatter { .. });
+        let said = |finding: &Finding| finding.kind == "dwells-scatter";
         assert!(outcome.findings.iter().any(said));
         // What positions tell most is again known as well as with the figure that is right.
         let sigma = |outcome: &Outcome| outcome.estimate.sigma().rows(3, 6).norm();

@@ -2,7 +2,11 @@
 //! covariance says.
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::finding::Finding;
+use crate::statistics::FALSE_ALARM;
 
 /// What was observed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -92,7 +96,7 @@ pub struct Nis {
 /// Innovations that are looked at apart: what is wrong with a model shows in a few of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Look {
+enum Look {
     /// All that were let in.
     All,
     /// The first of each dwell after a move, let in or not: it carries what that has done.
@@ -105,7 +109,7 @@ impl Look {
     const ALL: [Self; 3] = [Self::All, Self::AfterMoves, Self::OverDwells];
 
     /// In words, after what was observed.
-    pub fn words(self) -> &'static str {
+    fn words(self) -> &'static str {
         match self {
             Self::All => "",
             Self::AfterMoves => " first after each move",
@@ -156,24 +160,50 @@ fn summed(dwell: &[&Innovation]) -> Vec<f64> {
 
 /// Innovations that are not as large as their covariance says.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Inconsistency {
-    /// Of what.
-    pub observation: Observation,
-    /// Which of them.
-    pub look: Look,
+struct Inconsistency {
+    observation: Observation,
+    look: Look,
     /// Mean of their squares.
-    pub nis: f64,
+    nis: f64,
     /// How many numbers.
-    pub count: usize,
-    /// What the mean stays within, for all looks at once, in 999 runs of 1000 if σ are true.
-    pub limits: (f64, f64),
+    count: usize,
+    /// 99.9 % interval of the mean, for all looks at once, if σ are true.
+    limits: (f64, f64),
 }
 
-/// Chance that any look at a run finds a right model inconsistent.
-const FALSE_ALARM: f64 = 1e-3;
+/// Observations that the gate rejected, if there are any.
+pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
+    let observations = innovations.len();
+    let rejected = innovations.iter().filter(|i| !i.accepted).count();
+    let text = format!(
+        "{rejected} of {observations} observations were rejected as outliers. Look for bumps at their times, which \
+         the figure of innovations shows."
+    );
+    let figures = json!({ "rejected": rejected, "observations": observations });
+    (rejected > 0).then(|| Finding::new("outliers", text, figures))
+}
+
+/// Innovations that are larger or smaller than their covariance makes them, if there are any.
+pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
+    let looks = inconsistencies(innovations);
+    let one = |of: &Inconsistency| {
+        let (low, high) = of.limits;
+        let (name, which) = (of.observation.name(), of.look.words());
+        format!("{name}{which} {:.2} ({low:.2} to {high:.2})", of.nis)
+    };
+    let each: Vec<String> = looks.iter().map(one).collect();
+    let text = format!(
+        "The filter is inconsistent: NIS is outside its 99.9 % interval for {}. Where to look: only after moves – \
+         table position, scale factor or timing; during dwells – bias drift; everywhere – the white noise stated in \
+         [imu.noise].",
+        each.join("; ")
+    );
+    let figures = json!({ "looks": looks });
+    (!looks.is_empty()).then(|| Finding::new("inconsistent", text, figures))
+}
 
 /// The looks at innovations that find them larger or smaller than chance allows.
-pub fn inconsistencies(innovations: &[Innovation]) -> Vec<Inconsistency> {
+fn inconsistencies(innovations: &[Innovation]) -> Vec<Inconsistency> {
     let kinds = Observation::ALL.map(|kind| {
         let of_kind = innovations.iter().filter(|i| i.observation == kind);
         (kind, of_kind.collect::<Vec<_>>())

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
+use serde_json::json;
 
-use super::finding::Finding;
+use super::finding::{Finding, triad_name, widened_by};
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::parameters::{ParameterMatrix, parameter};
 use crate::calibration::problem::Problem;
@@ -51,16 +52,20 @@ pub fn rounded(
         let without = with - of_triad(by_rounding);
         let growth = largest_growth(without.as_slice(), with.as_slice());
         let steps = problem.runs().map(|run| steps(run, sensor).max());
-        let (unit, name) = match sensor {
+        let (value, unit) = match sensor {
             Sensor::Gyro => (DEGREE, "°/s"),
             Sensor::Accel => (1.0, "m/s²"),
         };
-        (growth >= SAID).then(|| Finding::Rounded {
-            of: sensor.name(),
-            step: steps.fold(0.0, f64::max) / unit,
-            unit: name,
-            growth,
-        })
+        let step = steps.fold(0.0, f64::max) / value;
+        let text = format!(
+            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover \
+             where within a step they are. turncal widened σ {}. Log more digits.",
+            triad_name(sensor),
+            widened_by(growth)
+        );
+        let of = sensor.name();
+        let figures = json!({ "of": of, "step": step, "unit": unit, "growth": growth });
+        (growth >= SAID).then(|| Finding::new("rounded", text, figures))
     };
     Sensor::ALL.into_iter().filter_map(of).collect()
 }

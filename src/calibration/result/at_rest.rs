@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::observability::{not_observed, temperature_not_seen};
 use crate::calibration::estimate::Estimate;
 use crate::calibration::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
 use crate::calibration::several::thermal::{Coefficient, Thermal};
@@ -170,15 +171,10 @@ impl AtRest {
         let names = |of: &mut dyn Iterator<Item = usize>| -> Vec<String> {
             of.filter_map(|index| parameter_name(form, index)).collect()
         };
-        vec![
-            Finding::NotObserved {
-                by: "an instrument that stands in one attitude",
-                parameters: names(&mut { unseen }),
-            },
-            Finding::TemperatureNotSeen {
-                parameters: names(&mut { turned }),
-            },
-        ]
+        let by = "an instrument that stands in one attitude";
+        let unseen = not_observed(by, names(&mut { unseen }));
+        let turned = temperature_not_seen(names(&mut { turned }));
+        unseen.into_iter().chain(turned).collect()
     }
 
     /// Both triads at the reference temperature and 1σ of their parameters: biases of the gyros within Earth rate, all

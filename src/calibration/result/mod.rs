@@ -22,6 +22,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::checks::dwell_scatter::DwellScatter;
+use crate::calibration::checks::finding::Finding;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
@@ -119,7 +120,7 @@ pub struct Calibration {
     pub warnings: Vec<String>,
     /// The same as values: kind, words, figures.
     #[serde(default)]
-    pub findings: Vec<FindingRecord>,
+    pub findings: Vec<Finding>,
     /// Names of parameters that were not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
@@ -323,18 +324,6 @@ pub struct DirectionRecord {
     pub words: String,
     /// Name and component of the parameters that make up most of it; squares of all sum to one.
     pub parts: BTreeMap<String, f64>,
-}
-
-/// What must be known before using the values.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FindingRecord {
-    /// What kind of finding, such as `not-observed`.
-    pub kind: String,
-    /// In words.
-    pub text: String,
-    /// Its figures by name.
-    #[serde(default)]
-    pub figures: serde_json::Value,
 }
 
 /// A raw output of both triads and what it becomes, gyro first.

@@ -8,11 +8,11 @@ use super::at_rest::AtRest;
 use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FORMAT, FORMAT_WITH_TEMPERATURE, FindingRecord, GravityRecord, MeasuresRecord, Method,
-    NisRecord, NoiseRecord, QualityRecord, SpreadRecord, TermRecord, TestVector, TriadRecord,
+    FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, MeasuresRecord, Method, NisRecord, NoiseRecord,
+    QualityRecord, SpreadRecord, TermRecord, TestVector, TriadRecord,
 };
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_name};
-use crate::calibration::budget::{Budget, BudgetSource};
+use crate::calibration::budget::Budget;
 use crate::calibration::checks::error_term_test::ErrorTermTest;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::innovation::{Consistency, Nis};
@@ -38,17 +38,6 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// Its findings with those that come of the tests of error terms and of what these add to its covariance.
-    pub(in crate::calibration) fn findings_with(&self, tests: &[ErrorTermTest]) -> Vec<Finding> {
-        let growth = self.growth_by(BudgetSource::UnseenVariation);
-        // What rounds to once as large says nothing.
-        let may_vary = (growth >= 1.05).then_some(Finding::BiasesMayVary { growth });
-        let left_off = self.growth_by(BudgetSource::ErrorTermsLeftOff);
-        let shown = ErrorTermTest::most_significant(tests, Some(left_off));
-        let findings = self.findings.iter().cloned();
-        findings.chain(may_vary).chain(shown).collect()
-    }
-
     /// This calibration of a problem, with what error terms did to it and what it leaves of gravity and
     /// turns.
     pub fn record(
@@ -91,7 +80,7 @@ impl Outcome {
                 .map(|thermal| ThermalRecord::of(thermal, &self.estimate, problem.run())),
             recordings: RecordingRecord::all(self, problem.run()),
             warnings: texts(&findings),
-            findings: findings.iter().map(FindingRecord::from).collect(),
+            findings,
             ..self
                 .estimate
                 .record(problem.run(), problem.model.aiding.body_frame())
@@ -144,7 +133,7 @@ impl ClosedForm {
                 report,
             }),
             warnings: texts(&self.findings),
-            findings: self.findings.iter().map(FindingRecord::from).collect(),
+            findings: self.findings.clone(),
             ..self
                 .estimate
                 .record(problem.run(), self.reference.body_frame())
@@ -170,7 +159,7 @@ impl AtRest {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),
             temperature: Some(ThermalRecord::of(&self.thermal(), &estimate, run)),
             warnings: texts(&findings),
-            findings: findings.iter().map(FindingRecord::from).collect(),
+            findings,
             ..estimate.record(run, BodyFrame::Accelerometer)
         }
     }
@@ -395,16 +384,4 @@ fn noise_record(outcome: &Outcome) -> NoiseRecord {
 
 fn texts(findings: &[Finding]) -> Vec<String> {
     findings.iter().map(Finding::to_string).collect()
-}
-
-impl From<&Finding> for FindingRecord {
-    fn from(finding: &Finding) -> Self {
-        // A finding is a kind and figures, which JSON always holds.
-        let value = serde_json::to_value(finding).unwrap_or_default();
-        Self {
-            kind: value["kind"].as_str().unwrap_or_default().to_owned(),
-            text: finding.to_string(),
-            figures: value["figures"].clone(),
-        }
-    }
 }

@@ -11,19 +11,21 @@ mod seen;
 mod unseen;
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
-use super::finding::Finding;
+use super::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::error_term::ErrorTerm;
 use crate::calibration::group::Group;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::calibration::problem::Problem;
+use crate::statistics::FALSE_ALARM;
 use evidence::ln_survival;
 use joint::{Explanation, Fit, Joint, once_more};
 pub use left_off::LeftOff;
 use seen::seen_and_left_off;
-pub use unseen::unseen_variation;
+pub use unseen::{biases_may_vary, unseen_variation};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,8 +71,6 @@ pub enum Role {
     Further,
 }
 
-/// Chance that a run without errors of any term shows one; each term that is tried has the same share.
-const FALSE_ALARM: f64 = 1e-3;
 /// Of two explanations, one that is less than so many times as likely is not told from the other.
 const ODDS: f64 = 20.0;
 
@@ -80,25 +80,40 @@ impl ErrorTermTest {
         self.gain > self.limit
     }
 
-    /// Of error terms that are off and that the data show, the one that is the likeliest, with those that
-    /// cannot be told from it and those that are significant beside it.
-    /// `growth` is how many times larger σ are for what leaving them off does; none where σ are without.
+    /// Of error terms that are off and that the data show, the likeliest, with those that cannot be told
+    /// from it and those that are also significant with it on. `growth` is that of σ by leaving them off;
+    /// none where σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
         let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
-        let names = |role: Role| {
+        let names = |role: Role| -> Vec<&str> {
             let of_role = tests.iter().filter(|test| test.role == role);
             of_role.map(|test| test.term.name()).collect()
         };
-        Some(Finding::ErrorTermSignificant {
-            term: likeliest.term.name(),
-            alternatives: names(Role::Alternative),
-            further: names(Role::Further),
-            gain: likeliest.gain,
-            limit: likeliest.limit,
-            nis_without: likeliest.without,
-            nis_with: likeliest.with,
-            growth,
-        })
+        let (alternatives, further) = (names(Role::Alternative), names(Role::Further));
+        let (term, gain, limit) = (likeliest.term.name(), likeliest.gain, likeliest.limit);
+        let mut text = format!(
+            "An unmodelled error is visible. The best explanation is {term} (χ² falls by {gain:.0}; limit \
+             {limit:.0}). Next: rerun with --with {term}."
+        );
+        for (names, words) in [
+            (&alternatives, "This path cannot tell it from"),
+            (&further, "Also significant with it on"),
+        ] {
+            if !names.is_empty() {
+                text += &format!(" {words}: {}.", names.join(", "));
+            }
+        }
+        if let Some(growth) = growth {
+            text += &format!(
+                " Until you do, σ are widened {} to cover it.",
+                widened_by(growth)
+            );
+        }
+        let figures = json!({
+            "term": term, "alternatives": alternatives, "further": further, "gain": gain, "limit": limit,
+            "nis_without": likeliest.without, "nis_with": likeliest.with, "growth": growth
+        });
+        Some(Finding::new("error-term-significant", text, figures))
     }
 }
 

@@ -1,9 +1,11 @@
 //! What biases do that may vary without the record showing it.
 
 use rayon::prelude::*;
+use serde_json::json;
 
 use super::joint::once_more;
 use super::{ErrorTermTest, Role};
+use crate::calibration::checks::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::error_term::ErrorTerm;
 use crate::calibration::model::usual_variation;
@@ -15,6 +17,8 @@ use crate::calibration::problem::Problem;
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
+/// A growth that rounds to once as large is not a finding.
+const SAID: f64 = 1.05;
 /// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one …
 const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 /// … and its correlation time.
@@ -58,6 +62,17 @@ pub fn unseen_variation(
     });
     let of_sensors: Vec<ParameterMatrix> = of_sensors.collect();
     Ok(Some(of_sensors.into_iter().sum()))
+}
+
+/// The finding where that widens the largest σ by so much.
+pub fn biases_may_vary(growth: f64) -> Option<Finding> {
+    let text = format!(
+        "You stated no bias instability, and this record is too short to measure it. turncal assumed a typical value, \
+         which widens σ {}. Measure it with turncal allan on a longer static record and state it in [imu.noise].",
+        widened_by(growth)
+    );
+    let figures = json!({ "growth": growth });
+    (growth >= SAID).then(|| Finding::new("biases-may-vary", text, figures))
 }
 
 /// The same of biases of one triad.

@@ -74,16 +74,9 @@ pub fn both_triads(
                 let wider = fitted(&wider, &prior, sensor)?;
                 let times = worst.groups.iter().map(|&k| stated.times[k]);
                 let variances = [&fit, &wider].map(|fit| fit.covariance.diagonal());
-                findings.push(Finding::ResidualsLarge {
-                    of: sensor.name(),
-                    chi_square: residuals.chi_square(),
-                    degrees: residuals.degrees(),
-                    limit: residuals.limit(),
-                    growth: largest_growth(variances[0].as_slice(), variances[1].as_slice()),
-                    worst: times.collect(),
-                    without: worst.without,
-                    base,
-                });
+                let growth = largest_growth(variances[0].as_slice(), variances[1].as_slice());
+                let worst = (times.collect(), worst.without);
+                findings.push(residuals.large(sensor.name(), growth, worst, base));
                 wider
             }
         };

@@ -15,7 +15,7 @@ use super::least_squares::across;
 use super::observed::{Observed, Position};
 use super::result::{ClosedForm, Reference, hidden};
 use crate::attitude::skew;
-use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::labels;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::problem::Problem;
 use crate::imu::{PerSensor, Sensor};
@@ -46,12 +46,8 @@ pub fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     };
     let (estimate, mut findings) = both_triads(&observed, problem)?;
     findings.extend(hidden(&problem.model, &estimate, Reference::Labels));
-    if !contradicted.is_empty() {
-        findings.push(Finding::LabelsContradicted { contradicted });
-    }
-    if !lost.is_empty() {
-        findings.push(Finding::SectionsLost { labels: lost });
-    }
+    findings.extend(labels::contradicted(&contradicted));
+    findings.extend(labels::lost(&lost));
     let standing: Vec<&Section> = sections.iter().filter(|s| s.stands()).collect();
     let samples: usize = standing.iter().map(|section| section.samples.len()).sum();
     Ok(ClosedForm {

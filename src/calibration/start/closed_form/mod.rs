@@ -64,7 +64,7 @@ pub fn six_position_by(
         Reference::Gravity => gravity::by_gravity(problem),
     }?;
     let notes = problem.notes().into_iter();
-    let notes = notes.map(|note| Finding::Recording { note });
+    let notes = notes.map(Finding::of_recording);
     closed_form.findings.splice(0..0, notes);
     let unexplained = unexplained_residuals(&closed_form.findings);
     closed_form.findings.extend(unexplained);

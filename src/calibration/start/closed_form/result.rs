@@ -1,6 +1,7 @@
 //! What a closed form gives.
 
 use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::observability::not_observed;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::model::Model;
 use crate::calibration::noise::NoiseReport;
@@ -65,12 +66,10 @@ pub fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Optio
     let hidden: Vec<String> = names
         .filter_map(|index| parameter_name(estimate.form(), index))
         .collect();
-    (!hidden.is_empty()).then_some(Finding::NotObserved {
-        by: match reference {
-            Reference::Table => "these positions",
-            Reference::Labels => "these sections",
-            Reference::Gravity => "these dwells and moves",
-        },
-        parameters: hidden,
-    })
+    let by = match reference {
+        Reference::Table => "these positions",
+        Reference::Labels => "these sections",
+        Reference::Gravity => "these dwells and moves",
+    };
+    not_observed(by, hidden)
 }

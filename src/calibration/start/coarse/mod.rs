@@ -180,15 +180,9 @@ pub fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
         distance: distance.ok_or_else(singular)? * scale.powi(2),
         by_hand,
         ringing: growth
-            .map(|growth| Finding::ResidualsLarge {
-                of: "both triads",
-                chi_square: residuals.chi_square(),
-                degrees: residuals.degrees(),
-                limit: residuals.limit(),
-                growth,
-                worst: worst.groups.iter().map(|&k| times[k]).collect(),
-                without: worst.without,
-                base: None,
+            .map(|growth| {
+                let times = worst.groups.iter().map(|&k| times[k]).collect();
+                residuals.large("both triads", growth, (times, worst.without), None)
             })
             .into_iter()
             .chain(drift)
