@@ -58,7 +58,7 @@ pub use options::Options;
 pub use outcome::{Outcome, Pass};
 pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
-    parameter, parameter_name, sensor_and_parameter, to_vector,
+    parameter, parameter_index, parameter_name, sensor_and_parameter, to_vector,
 };
 pub use pass::{Epoch, Own};
 pub use problem::Problem;
@@ -70,8 +70,8 @@ pub use result::nees::{Nees, nees};
 pub use result::record::truth_record;
 pub use result::scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use result::thermal_record::{
-    CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
-    ThermalRecord, ValueRecord,
+    CoefficientRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE, ThermalRecord,
+    ValueRecord,
 };
 pub use result::{Calibration, Method, triads_of};
 pub use several::alone::Alone;

@@ -28,12 +28,16 @@ pub type ThermalState = PerSensor<[ThermalValues; 3]>;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ThermalRange {
     /// The lowest, °C.
+    #[serde(rename = "lowest_degc")]
     pub lowest: f64,
     /// The highest, °C.
+    #[serde(rename = "highest_degc")]
     pub highest: f64,
     /// At which its parameters are stated, °C.
+    #[serde(rename = "reference_degc")]
     pub reference: f64,
     /// The largest magnitude of its rate, K/s.
+    #[serde(rename = "largest_rate_k_per_s")]
     pub largest_rate: f64,
 }
 

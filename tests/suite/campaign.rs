@@ -162,13 +162,7 @@ fn autopilots_take_off_the_bias_at_a_temperature() {
             fields.find(|&field| field == name);
             fields.next().unwrap().parse().unwrap()
         };
-        let reference = record
-            .temperature
-            .as_ref()
-            .unwrap()
-            .range
-            .gyro
-            .reference_degc;
+        let reference = record.temperature.as_ref().unwrap().range.gyro.reference;
         let there = record.at_temperature(reference).unwrap();
         for temperature in [2.0, 17.0, 38.0] {
             let at = record.at_temperature(temperature).unwrap();

@@ -1,4 +1,4 @@
-//! What the data say of the model, noise and record: one file a check, its words beside it.
+//! Checks of model, noise and record by the data: each file a check with its words.
 
 pub mod drift;
 pub mod dwell_scatter;

@@ -24,24 +24,22 @@ const ALIKE: f64 = 0.5;
 pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let far = far(model, estimate);
     let off = estimate.vector() - model.prior_mean;
-    let names = far
-        .iter()
-        .filter_map(|&i| parameter_name(estimate.form(), i));
-    let names: Vec<String> = names.collect();
-    let distances = far.iter().map(|&i| off[i] / model.prior_sigma[i]);
-    let distances: Vec<f64> = distances.collect();
+    let named = far.iter().filter_map(|&i| {
+        let name = parameter_name(estimate.form(), i)?;
+        Some((name, off[i] / model.prior_sigma[i]))
+    });
+    let (names, distances): (Vec<String>, Vec<f64>) = named.unzip();
     let each = names.iter().zip(&distances);
     let each: Vec<String> = each
         .map(|(name, by)| format!("{name} by {by:+.0} σ"))
         .collect();
-    let causes = causes(&far, &estimate.triads);
-    let words: Vec<&str> = causes.iter().map(|cause| cause.words.as_str()).collect();
+    let (words, causes): (Vec<String>, Vec<Value>) =
+        causes(&far, &estimate.triads).into_iter().unzip();
     let text = format!(
         "More than {CONTRADICTS} σ of [imu.prior] away from it: {}. Likely cause: {}.",
         each.join(", "),
         words.join("; ")
     );
-    let causes: Vec<&Value> = causes.iter().map(|cause| &cause.figures).collect();
     let figures = json!({
         "sigmas": CONTRADICTS, "parameters": names, "distances": distances, "causes": causes
     });
@@ -110,82 +108,60 @@ fn far(model: &Model, estimate: &Estimate) -> Vec<usize> {
     estimate.estimated().filter(far).collect()
 }
 
-/// What most likely brought parameters away from their prior.
-struct Cause {
-    words: String,
-    figures: Value,
-}
+/// What most likely brought parameters away from their prior, in words and figures.
+type Cause = (String, Value);
 
 fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
-    let is_far = |sensor: Sensor, kind: ParameterKind| {
-        let is = |&&i: &&usize| {
-            let (of, parameter) = sensor_and_parameter(i);
-            of == sensor && Triad::kind(parameter) == kind
-        };
-        far.iter().filter(is).count()
+    let count = |sensor: Sensor, kind: ParameterKind| {
+        let of = far.iter().map(|&i| sensor_and_parameter(i));
+        of.filter(|&(of, i)| of == sensor && Triad::kind(i) == kind)
+            .count()
     };
-    let mut causes = Vec::new();
-    for sensor in Sensor::ALL {
-        let of_scale = is_far(sensor, ParameterKind::Scale);
-        if of_scale > 0 {
-            causes.push(of_scales(sensor, &triads.get(sensor).scale, far, of_scale));
-        }
-    }
-    causes.extend(of_installation(
-        triads,
-        PerSensor::from_fn(|sensor| is_far(sensor, ParameterKind::Installation) > 0),
-    ));
-    let biased = Sensor::ALL.into_iter();
-    let biased = biased.filter(|&sensor| is_far(sensor, ParameterKind::Bias) > 0);
-    causes.extend(biased.map(|sensor| {
-        let sensor = sensor.name();
-        Cause {
-            words: format!(
-                "{sensor} bias or bias_sigma as stated does not fit the instrument; an offset of the register \
-                 belongs in bias"
-            ),
-            figures: json!({ "cause": "bias", "sensor": sensor }),
-        }
-    }));
-    causes
+    let scales = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let count = count(sensor, ParameterKind::Scale);
+        (count > 0).then(|| of_scales(sensor, &triads.get(sensor).scale, far, count))
+    });
+    let angles = PerSensor::from_fn(|sensor| count(sensor, ParameterKind::Installation) > 0);
+    let biases = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let (count, sensor) = (count(sensor, ParameterKind::Bias), sensor.name());
+        let words = format!(
+            "{sensor} bias or bias_sigma as stated does not fit the instrument; an offset of the register belongs in \
+             bias"
+        );
+        (count > 0).then(|| (words, json!({ "cause": "bias", "sensor": sensor })))
+    });
+    let installation = of_installation(triads, angles);
+    scales.chain(installation).chain(biases).collect()
 }
 
-/// Of scale factors of a triad, so many of which are far from their prior.
+/// Of scale factors of a triad, this count of which are far from their prior.
 fn of_scales(sensor: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> Cause {
     let is_reversed = |&axis: &usize| scale[axis] < 0.0 && far.contains(&parameter(sensor, axis));
-    let reversed = (0..3)
-        .filter(is_reversed)
-        .map(|axis| AXES[axis].to_string());
-    let reversed: Vec<String> = reversed.collect();
+    let reversed = (0..3).filter(is_reversed);
+    let reversed: Vec<String> = reversed.map(|axis| AXES[axis].to_string()).collect();
     let off = scale.add_scalar(-1.0);
-    let (sensor, other) = (
-        sensor.name(),
-        match sensor {
-            Sensor::Gyro => "sample period",
-            Sensor::Accel => "gravity",
-        },
-    );
-    let (words, figures) = if !reversed.is_empty() {
-        let axes = reversed.join(", ");
-        (
-            format!("{sensor} {axes} reversed: give the column in columns of [imu] a minus"),
-            json!({ "cause": "reversed", "sensor": sensor, "axes": reversed }),
-        )
-    } else if count == 3 && alike(&off, &Vector3::repeat(off.mean())) {
-        let off_ppm = off.mean() / PPM;
-        (
-            format!(
-                "all three {sensor} scale factors off alike, by {off_ppm:+.0} ppm: {sensor}_unit, scale or {other}"
-            ),
-            json!({ "cause": "unit", "sensor": sensor, "off_ppm": off_ppm }),
-        )
-    } else {
-        (
-            format!("{sensor} scale or scale_sigma_ppm as stated does not fit the instrument"),
-            json!({ "cause": "scale", "sensor": sensor }),
-        )
+    let other = match sensor {
+        Sensor::Gyro => "sample period",
+        Sensor::Accel => "gravity",
     };
-    Cause { words, figures }
+    let sensor = sensor.name();
+    if !reversed.is_empty() {
+        let axes = reversed.join(", ");
+        let words =
+            format!("{sensor} {axes} reversed: give the column in columns of [imu] a minus");
+        let figures = json!({ "cause": "reversed", "sensor": sensor, "axes": reversed });
+        return (words, figures);
+    }
+    if count == 3 && alike(&off, &Vector3::repeat(off.mean())) {
+        let off_ppm = off.mean() / PPM;
+        let words = format!(
+            "all three {sensor} scale factors off alike, by {off_ppm:+.0} ppm: {sensor}_unit, scale or {other}"
+        );
+        let figures = json!({ "cause": "unit", "sensor": sensor, "off_ppm": off_ppm });
+        return (words, figures);
+    }
+    let words = format!("{sensor} scale or scale_sigma_ppm as stated does not fit the instrument");
+    (words, json!({ "cause": "scale", "sensor": sensor }))
 }
 
 /// Whether a vector is near another by the measure of that.
@@ -207,34 +183,28 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
     let common = (halves(Sensor::Gyro).0 + halves(Sensor::Accel).0) * 0.5;
     if far.gyro && far.accel && alike(&halves(Sensor::Gyro).0, &common) {
         let angle_deg = common.norm() / DEGREE;
-        return vec![Cause {
-            words: format!(
-                "both triads turned alike, by {angle_deg:.3}°: the instrument's mount, the table's zero, level or \
-                 north, or the labels"
-            ),
-            figures: json!({ "cause": "mount", "angle_deg": angle_deg }),
-        }];
+        let words = format!(
+            "both triads turned alike, by {angle_deg:.3}°: the instrument's mount, the table's zero, level or north, \
+             or the labels"
+        );
+        return vec![(words, json!({ "cause": "mount", "angle_deg": angle_deg }))];
     }
     let of_triad = |sensor: Sensor| {
         let ((turn, skew), sensor) = (halves(sensor), sensor.name());
+        if skew.norm() >= ALIKE * turn.norm() {
+            let words = format!(
+                "{sensor} axes not at right angles: positions or labels that are not as stated, or an \
+                 installation_sigma_arcsec too small"
+            );
+            return (words, json!({ "cause": "skewed", "sensor": sensor }));
+        }
         let angle_deg = turn.norm() / DEGREE;
-        let (words, figures) = match skew.norm() < ALIKE * turn.norm() {
-            true => (
-                format!(
-                    "the {sensor} triad turned by {angle_deg:.3}°: its mount in the instrument, or a time offset if \
-                     it is the gyros"
-                ),
-                json!({ "cause": "turned", "sensor": sensor, "angle_deg": angle_deg }),
-            ),
-            false => (
-                format!(
-                    "{sensor} axes not at right angles: positions or labels that are not as stated, or an \
-                     installation_sigma_arcsec too small"
-                ),
-                json!({ "cause": "skewed", "sensor": sensor }),
-            ),
-        };
-        Cause { words, figures }
+        let words = format!(
+            "the {sensor} triad turned by {angle_deg:.3}°: its mount in the instrument, or a time offset if it is the \
+             gyros"
+        );
+        let figures = json!({ "cause": "turned", "sensor": sensor, "angle_deg": angle_deg });
+        (words, figures)
     };
     let triads = Sensor::ALL.into_iter();
     triads

@@ -90,18 +90,18 @@ impl Residuals {
         self.explained.nrows() - self.explained.ncols()
     }
 
-    /// What χ² stays below if model and σ are right, but for one run in two thousand.
+    /// Limit of χ² if model and σ are right, at a triad's share of the false-alarm rate.
     pub fn limit(&self) -> f64 {
         limit(self.degrees())
     }
 
-    /// Whether this χ² is within its limit where so many equations are left out.
+    /// Whether this χ² is within its limit with this many equations left out.
     pub fn would_hold(&self, chi_square: f64, left_out: usize) -> bool {
         let degrees = self.degrees().saturating_sub(left_out);
         degrees > 0 && chi_square <= limit(degrees)
     }
 
-    /// By how much all σ are to grow, the Birge ratio; none where χ² is within its limit.
+    /// By how much all σ are to grow, the Birge ratio; absent if χ² is within its limit.
     pub fn growth(&self) -> Option<f64> {
         let (chi_square, degrees) = (self.chi_square(), self.degrees());
         (chi_square > self.limit()).then(|| (chi_square / degrees as f64).sqrt())

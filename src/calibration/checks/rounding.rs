@@ -151,7 +151,7 @@ struct Mean {
     variance: Vector3<f64>,
 }
 
-/// Means of a recording's dwells; none where rows are not rounded.
+/// Means of a recording's dwells; absent if rows are not rounded.
 fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) -> Vec<Mean> {
     let steps = steps(run, sensor);
     if steps == Vector3::zeros() {

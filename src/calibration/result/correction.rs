@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
-use super::frame::triad_record;
 use crate::calibration::result::Calibration;
 use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
 use crate::recording::{Near, TEMPERATURE_SPACING};
@@ -101,10 +100,7 @@ pub enum CorrectionError {
 impl Correction {
     /// What a record says. Constants of the table (`table.…`) are no part of it.
     pub fn of_record(record: &Calibration) -> Result<Self, CorrectionError> {
-        let sensitivity = PerSensor::from_fn(|sensor| {
-            let triad = triad_record(record, sensor);
-            Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j])
-        });
+        let sensitivity = PerSensor::from_fn(|sensor| record.triad(sensor).sensitivity());
         let inverse = |sensor: Sensor| {
             let sensitivity = sensitivity.get(sensor);
             let volume = sensitivity.determinant()
@@ -129,7 +125,7 @@ impl Correction {
                 gyro: inverse(Sensor::Gyro)?,
                 accel: inverse(Sensor::Accel)?,
             },
-            bias: PerSensor::from_fn(|sensor| Vector3::from(triad_record(record, sensor).bias)),
+            bias: PerSensor::from_fn(|sensor| Vector3::from(record.triad(sensor).bias)),
             sensitivity,
             terms,
             changing: record

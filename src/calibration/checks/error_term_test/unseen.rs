@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::joint::once_more;
+use super::joint::last_pass;
 use super::{ErrorTermTest, Role};
 use crate::calibration::checks::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
@@ -25,7 +25,7 @@ const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 /// What the covariance of an estimate lacks for biases of a triad that may vary though its record does not
-/// call for it; none where the noise is the stated one, where biases of both triads vary in it, or where a table is
+/// call for it; absent if the noise is the stated one, where biases of both triads vary in it, or where a table is
 /// read, whose attitudes show how biases vary.
 ///
 /// A short record hardly tells a bias that varies slowly from one that does not, and the likelihood that
@@ -55,7 +55,7 @@ pub fn unseen_variation(
     if sensors.is_empty() {
         return Ok(None);
     }
-    let own = once_more(problem, outcome, &[])?;
+    let own = last_pass(problem, outcome, &[])?;
     let of_sensors = sensors.par_iter().map(|&sensor| {
         let stated = stated.get(sensor);
         of_one(problem, outcome, &own, sensor, stated)
@@ -99,7 +99,7 @@ fn of_one(
             correlation_time: usual.correlation_time * (time * LOG_SIGMA).exp(),
         });
         // What the filter cannot run with is not likely.
-        let Ok(with) = once_more(&problem.with_model(model), outcome, &[]) else {
+        let Ok(with) = last_pass(&problem.with_model(model), outcome, &[]) else {
             continue;
         };
         let ratio = (0.5 * (deviance(own) - deviance(&with))).exp();
