@@ -34,13 +34,8 @@ pub struct DwellScatter {
     pub mean: f64,
     /// How many scores.
     pub count: usize,
-    /// What the mean stays below in 999 runs of 1000 if σ are true.
+    /// Its limit if σ are true, at the false-alarm rate.
     pub limit: f64,
-    /// Difference of the estimate from the first half of the dwells and that from the second: squared,
-    /// over its covariance, for each of its directions; one if σ are true …
-    pub halves: f64,
-    /// … with its 95 % interval.
-    pub halves_interval: (f64, f64),
 }
 
 impl DwellScatter {
@@ -87,8 +82,7 @@ impl DwellScores {
         let mut squares = Vec::new();
         let mut robust = DMatrix::zeros(n, n);
         let mut before = whitened(prior)?;
-        let mut middle = None;
-        for (number, posterior) in after.iter().enumerate() {
+        for posterior in after {
             let now = whitened(posterior)?;
             let (gained, score) = (&now.0 - &before.0, &now.1 - &before.1);
             let eigen = gained.symmetric_eigen();
@@ -106,9 +100,6 @@ impl DwellScores {
                 corrected.axpy(along / (1.0 - share).sqrt(), &direction, 1.0);
             }
             robust.ger(1.0, &corrected, &corrected, 1.0);
-            if number + 1 == after.len() / 2 {
-                middle = Some(now.clone());
-            }
             before = now;
         }
         // What the estimate takes of the scores they do not have: as many as there are constants that
@@ -119,14 +110,11 @@ impl DwellScores {
             return None;
         }
         let (_, limit) = mean_square_interval(freedom as usize, 2.0 * FALSE_ALARM);
-        let (halves, directions) = middle.map_or((0.0, 0), |middle| halves(&middle));
         Some(Self {
             scatter: DwellScatter {
                 mean: squares.iter().sum::<f64>() / squares.len() as f64,
                 count: squares.len(),
                 limit,
-                halves: halves / directions.max(1) as f64,
-                halves_interval: mean_square_interval(directions, 0.05),
             },
             root,
             robust,
@@ -143,22 +131,6 @@ impl DwellScores {
         eigen.eigenvalues.apply(|value| *value = value.max(1.0));
         Some(&self.root * eigen.recompose() * self.root.transpose())
     }
-}
-
-/// Sum of squares of the difference between what the first half says and all, over its σ, and of how many
-/// directions. Both share the first half, so the covariance of their difference is that of the half less
-/// that of all, and the difference is a multiple of that of the two halves.
-fn halves((information, score): &(DMatrix<f64>, DVector<f64>)) -> (f64, usize) {
-    let eigen = information.clone().symmetric_eigen();
-    let directions = eigen
-        .eigenvalues
-        .iter()
-        .zip(eigen.eigenvectors.column_iter());
-    let squares = directions.filter_map(|(&share, direction)| {
-        let seen = (SHARE..1.0 - SHARE).contains(&share);
-        seen.then(|| direction.dot(score).powi(2) / (share * (1.0 - share)))
-    });
-    squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1))
 }
 
 #[cfg(test)]
