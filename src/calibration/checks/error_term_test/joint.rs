@@ -14,9 +14,6 @@ use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVecto
 use crate::calibration::pass::{Gate, Mode, PassResult, Tried, pass_trying};
 use crate::calibration::problem::Problem;
 
-/// ln of the steps in which the size of a term is tried: two in a decade.
-const PART_OF_DECADE: f64 = 0.5 * std::f64::consts::LN_10;
-
 /// How well a calibration fits, and variance of the parameters of both triads.
 pub struct Fit {
     pub cost: f64,
@@ -138,38 +135,20 @@ impl Joint {
         Some(Evidence::new(on.gain - without, &covariance, &sigma))
     }
 
-    /// What the data say of a term of any size where these others are on; absent if they show nothing of it.
-    ///
-    /// How large the term is in an instrument is not known: it is equally likely before the data in each part of a
-    /// decade, from its usual σ down to the one of which the data would show no more than they leave open.
+    /// A term of its usual size as an explanation where these others are on; absent if the data show less of it than
+    /// they leave open.
     pub fn explanation(&self, term: ErrorTerm, others: &[ErrorTerm]) -> Option<Explanation> {
         let (of, others) = (self.numbers(&[term]), self.numbers(others));
-        if of.0.is_empty() {
+        if of.0.is_empty() || scaled(&self.tried, &of).symmetric_eigenvalues().max() <= 1.0 {
             return None;
         }
-        let shown = scaled(&self.tried, &of).symmetric_eigenvalues();
-        let shown = shown.iter().copied().fold(0.0, f64::max).sqrt();
-        if shown <= 1.0 {
-            return None;
-        }
-        let sizes = (shown.ln() / PART_OF_DECADE) as usize + 1;
-        let models = (0..sizes).map(|smaller| {
-            let size = (-(smaller as f64) * PART_OF_DECADE).exp();
-            let sigma = of.1.iter().map(|sigma| sigma * size).collect();
-            let on = TermsOn::new(&self.tried, joined((of.0.clone(), sigma), others.clone()))?;
-            Some((on.ln_likelihood_ratio(), on.added()))
-        });
-        let models: Vec<(f64, ParameterMatrix)> = models.collect::<Option<_>>()?;
-        let before = TermsOn::new(&self.tried, others)?.ln_likelihood_ratio();
-        let best = models.iter().map(|model| model.0).fold(before, f64::max);
-        let weight = |model: &(f64, ParameterMatrix)| (model.0 - best).exp();
-        let sum: f64 = models.iter().map(weight).sum();
-        let added: ParameterMatrix = models.iter().map(|model| model.1 * weight(model)).sum();
-        let ln_likelihood_ratio = best + (sum / sizes as f64).ln();
+        let before = TermsOn::new(&self.tried, others.clone())?;
+        let with = TermsOn::new(&self.tried, joined(of, others))?;
+        let ln_likelihood_ratio = with.ln_likelihood_ratio();
         Some(Explanation {
             ln_likelihood_ratio,
-            of_term: ln_likelihood_ratio - before,
-            added: added / sum,
+            of_term: ln_likelihood_ratio - before.ln_likelihood_ratio(),
+            added: with.added(),
         })
     }
 
