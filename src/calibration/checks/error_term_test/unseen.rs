@@ -1,4 +1,4 @@
-//! What biases do that may vary without the record showing it.
+//! Uncertainty by biases that may vary without the record showing it.
 
 use rayon::prelude::*;
 use serde_json::json;
@@ -28,12 +28,13 @@ const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 /// call for it; absent if the noise is the stated one, where biases of both triads vary in it, or where a table is
 /// read, whose attitudes show how biases vary.
 ///
-/// A short record hardly tells a bias that varies slowly from one that does not, and the likelihood that
-/// chose the noise takes the simpler of the two. Where the data contradict the stated noise, it is no word
-/// of anybody's that biases are constant: that those of a triad vary is then as likely as not before the
-/// data, with σ and correlation time lognormal about the usual ones, as any stated figure is about its own.
-/// The mean square error of the estimate is that of all these models, each as likely as the data leave it
-/// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::test_error_terms`]).
+/// A short record hardly shows a bias that varies slowly, and the likelihood that chose the noise takes the simpler
+/// model. Where the data contradict the stated noise, nobody stated that biases are constant: that those of a triad
+/// vary then has the same probability before the data as that they do not, with σ and correlation time lognormal
+/// about the usual ones, as any stated figure is about its own. The mean square error of the estimate averages these
+/// models by their probabilities after the data (Hoeting, Madigan, Raftery, Volinsky 1999; see
+/// [`super::test_error_terms`]). The sizes count: with the usual one alone σ of an accelerometer bias of a record
+/// held by hand is half as large.
 ///
 /// # Errors
 /// [`CalibrationError`] where the problem is not the one of the outcome.
@@ -84,7 +85,6 @@ fn of_one(
     stated: &Noise,
 ) -> ParameterMatrix {
     let usual = usual_variation(stated);
-    let deviance = |result: &PassResult| result.cost + result.log_determinant;
     let density = |z: &f64| (-0.5 * z * z).exp();
     let sum_of = |nodes: &[f64]| -> f64 { nodes.iter().map(density).sum() };
     let all = sum_of(&SIGMAS) * sum_of(&TIMES);
@@ -102,7 +102,7 @@ fn of_one(
         let Ok(with) = last_pass(&problem.with_model(model), outcome, &[]) else {
             continue;
         };
-        let ratio = (0.5 * (deviance(own) - deviance(&with))).exp();
+        let ratio = (0.5 * (own.deviance() - with.deviance())).exp();
         let weight = ratio * density(sigma) * density(time) / all;
         if weight.is_finite() {
             weights += weight;
