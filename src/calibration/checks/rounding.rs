@@ -33,7 +33,7 @@ pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMat
         let first = parameter(sensor, 0);
         covariance
             .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
-            .copy_from(&of_triad(problem, sensor, triads.get(sensor)));
+            .copy_from(&of_triad(problem, sensor, triads.get(sensor)).unwrap_or_default());
     }
     covariance
 }
@@ -70,15 +70,13 @@ pub fn rounded(
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Covariance of a triad's parameters by what rounding leaves in means of dwells.
+/// Covariance of a triad's parameters by rounding errors in means of dwells; absent if rows are not rounded.
 fn of_triad(
     problem: &Problem,
     sensor: Sensor,
     triad: &Triad,
-) -> SMatrix<f64, PER_TRIAD, PER_TRIAD> {
-    let Some(correction) = triad.correction() else {
-        return SMatrix::zeros();
-    };
+) -> Option<SMatrix<f64, PER_TRIAD, PER_TRIAD>> {
+    let correction = triad.correction()?;
     let response = triad.response();
     let sigma = &problem.model.prior_sigma;
     let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
@@ -88,7 +86,7 @@ fn of_triad(
         .collect();
     let variance: f64 = means.iter().map(|mean| mean.variance.mean()).sum();
     if variance == 0.0 {
-        return SMatrix::zeros();
+        return None;
     }
     let variance = variance / means.len() as f64;
     let along_gravity = sensor == Sensor::Accel && problem.model.aiding == Aiding::Velocity;
@@ -116,15 +114,11 @@ fn of_triad(
                 .or_insert_with(TriadVector::zeros) += error;
         }
     }
-    let Some(information) = information.cholesky() else {
-        return SMatrix::zeros();
-    };
-    let mut covariance = SMatrix::zeros();
-    for error in of_steps.values() {
-        let error = information.solve(error).component_mul(&sigma);
-        covariance += error * error.transpose();
-    }
-    covariance
+    let information = information.cholesky()?;
+    let errors = of_steps
+        .values()
+        .map(|error| information.solve(error).component_mul(&sigma));
+    Some(errors.map(|error| error * error.transpose()).sum())
 }
 
 /// Steps of rates along body axes, rad/s or m/s²; zero where there are none, or where rows are integrals, which may

@@ -140,29 +140,25 @@ impl Correction {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
             let expected = run.instrument.unit.get(sensor);
-            if let Some(unit) = &record.unit
-                && unit.get(sensor) != expected
-            {
+            let unit = record.unit.as_ref().map(|unit| unit.get(sensor));
+            if let Some(unit) = unit.filter(|&unit| unit != expected) {
                 return Err(CorrectionError::Unit {
                     sensor,
-                    calibration: unit.get(sensor).clone(),
+                    calibration: unit.clone(),
                     run: expected.clone(),
                 });
             }
             let scales = correction.sensitivity.get(sensor).diagonal();
-            for (axis, (&calibration, &run)) in scales
-                .iter()
-                .zip(&run.instrument.nominal.get(sensor).0)
-                .enumerate()
-            {
-                if !(1.0 / SCALE_FACTOR..=SCALE_FACTOR).contains(&(calibration / run)) {
-                    return Err(CorrectionError::Scale {
-                        sensor,
-                        axis: AXES[axis],
-                        calibration,
-                        run,
-                    });
-                }
+            let nominal = &run.instrument.nominal.get(sensor).0;
+            let near = 1.0 / SCALE_FACTOR..=SCALE_FACTOR;
+            let other = (0..3).find(|&axis| !near.contains(&(scales[axis] / nominal[axis])));
+            if let Some(axis) = other {
+                return Err(CorrectionError::Scale {
+                    sensor,
+                    axis: AXES[axis],
+                    calibration: scales[axis],
+                    run: nominal[axis],
+                });
             }
         }
         Ok(correction)

@@ -186,11 +186,7 @@ impl ThermalRecord {
         temperatures: &PerSensor<[f64; 3]>,
         rates: &PerSensor<[f64; 3]>,
     ) -> ThermalState {
-        PerSensor::from_fn(|sensor| {
-            let range = self.range.get(sensor);
-            let (t, rate) = (temperatures.get(sensor), rates.get(sensor));
-            [0, 1, 2].map(|axis| range.values(t[axis], rate[axis]))
-        })
+        ThermalRange::state(&self.range, temperatures, rates)
     }
 }
 

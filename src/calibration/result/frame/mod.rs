@@ -58,18 +58,9 @@ impl Canonical {
             BodyFrame::Table => Matrix3::identity(),
             BodyFrame::Accelerometer => accelerometer_frame(&given.accel),
         };
-        let triads = PerSensor::from_fn(|sensor| {
+        let triad = |sensor: Sensor| {
             let mut a = given.get(sensor) * rotation.transpose();
             clear_fixed(&mut a, sensor, body_frame);
-            let bias = Vector3::from(record.triad(sensor).bias);
-            let bias = bias.component_div(&nominal.get(sensor).0);
-            (
-                a,
-                Triad::from_sensitivity(InstallationForm::General, &a, bias),
-            )
-        });
-        for sensor in Sensor::ALL {
-            let a = triads.get(sensor).0;
             let turned = (0..3).find(|&i| a[(i, i)].is_nan() || a[(i, i)] <= 0.0);
             if let Some(axis) = turned {
                 return Err(ComparisonError::Turned {
@@ -78,8 +69,14 @@ impl Canonical {
                     axis: AXES[axis],
                 });
             }
-        }
-        let triads = PerSensor::from_fn(|sensor| triads.get(sensor).1);
+            let bias = Vector3::from(record.triad(sensor).bias);
+            let bias = bias.component_div(&nominal.get(sensor).0);
+            Ok(Triad::from_sensitivity(InstallationForm::General, &a, bias))
+        };
+        let triads = PerSensor {
+            gyro: triad(Sensor::Gyro)?,
+            accel: triad(Sensor::Accel)?,
+        };
         let own = own_covariance(name, record, nominal)?;
         let covariance = own.map(|own| {
             let form = record.installation_form.unwrap_or_default();
