@@ -5,6 +5,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::beta::beta_reg;
 use statrs::statistics::{Data, OrderStatistics};
 
+/// Rate of false alarms of a whole list of checks; each check has its share of it.
+pub(crate) const FALSE_ALARM: f64 = 1e-3;
+
 /// σ of a normal distribution over the median of its absolute deviations.
 pub(crate) const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 

@@ -42,17 +42,16 @@ pub enum CalibrationError {
     },
     /// Nothing at rest.
     #[error(
-        "no dwell was found, expected: one at least, better one with each axis up and each down; the \
-         instrument must stand for {LONG_ENOUGH} s or more between turns; check the table's log, and \
-         reading_sigma_arcsec if it is noisier than stated; without a log, the gyros' prior bias and noise \
-         figures"
+        "no still interval (dwell) was found. Hold the sensor still for at least {LONG_ENOUGH} s between turns, at \
+         best with each axis up and each axis down. Check the table's log, and reading_sigma_arcsec if it is noisier \
+         than stated; without a log, the gyros' prior bias and noise figures"
     )]
     NoDwells,
     /// A prior of σ zero or an estimate that went astray.
     #[error(
-        "the sensitivity matrix K·C of the {} became singular: the data and [imu.prior.{0}] \
-         do not fit each other; check scale and units there, and whether an axis is dead, stuck or wrapped, rows \
-         are lost or the table's log is of another run", .sensor.name()
+        "the {} data contradict [imu.prior.{0}] (the fit diverged: K·C became singular). Check scale and units there, \
+         and whether an axis is dead, stuck or wrapped, rows are lost or the table's log is of another run",
+        .sensor.name()
     )]
     Singular {
         /// Which triad.

@@ -3,26 +3,21 @@
 
 use std::collections::BTreeMap;
 
-use super::auxiliary::auxiliary_name;
 use super::budget::BudgetSource;
 use super::error::CalibrationError;
 use super::iterations::{Iterated, Progress};
 use super::layout::Layout;
 use super::linearisation::not_invertible;
 use super::outcome::Outcome;
-use super::parameters::parameter_name;
 use super::problem::Problem;
 use super::several;
 use super::solved::Solved;
+use crate::calibration::checks;
 use crate::calibration::checks::dwell_scatter::DwellScores;
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::{FormTest, form_test};
-use crate::calibration::checks::innovation::{consistency, inconsistencies};
+use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::Observability;
-use crate::calibration::checks::prior_distance::far_from_prior;
-use crate::calibration::checks::rest_scatter::scatter_at_rest;
-use crate::calibration::checks::rounding::{by_rounding, rounded};
-use crate::calibration::checks::unexplained::unexplained;
+use crate::calibration::checks::rounding::by_rounding;
 use crate::calibration::start::attempt::{from_coarse_start, learnt_or_stated};
 use crate::imu::Sensor;
 
@@ -127,99 +122,12 @@ fn outcome(
     }
     let growth = outcome.growth_by(BudgetSource::DwellScatter);
     outcome.set_part(BudgetSource::Rounding, rounding);
-    outcome.findings = findings(as_stated, &outcome);
+    outcome.findings = checks::findings(as_stated, &outcome);
     outcome.findings.extend(solved.findings);
     if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
-        outcome.findings.push(Finding::DwellsScatter {
-            mean: scatter.mean,
-            limit: scatter.limit,
-            growth,
-        });
+        outcome.findings.push(scatter.finding(growth));
     }
     Ok(outcome)
-}
-
-fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
-    let notes = problem.notes().into_iter();
-    let mut findings: Vec<Finding> = notes.map(|note| Finding::Recording { note }).collect();
-    if !outcome.converged {
-        let last = outcome.passes.last();
-        findings.push(Finding::NotConverged {
-            passes: outcome.passes.len(),
-            largest_step_sigma: last.map_or(f64::NAN, |pass| pass.largest_step),
-        });
-    }
-    let noise = &outcome.noise;
-    if let Some(test) = noise.test.filter(|test| noise.learnt && test.rejected) {
-        findings.push(Finding::NoiseLearnt {
-            ratio: test.ratio.unwrap_or(f64::NAN),
-            limit: test.ratio_limit,
-            sources: noise.sources.clone(),
-        });
-    }
-    findings.extend(scatter_at_rest(problem, &outcome.estimate.triads));
-    let covariance = &outcome.estimate.covariance;
-    findings.extend(rounded(
-        problem,
-        &outcome.part(BudgetSource::Rounding),
-        covariance,
-    ));
-    findings.extend(far_from_prior(&problem.model, &outcome.estimate));
-    let form = outcome.estimate.form();
-    let unobserved = outcome.unobserved();
-    let by = "this path";
-    if !unobserved.is_empty() {
-        let names = unobserved.iter().filter_map(|&i| parameter_name(form, i));
-        findings.push(Finding::NotObserved {
-            by,
-            parameters: names.collect(),
-        });
-    }
-    let combinations = outcome.observability.combinations(form, &unobserved);
-    if !combinations.is_empty() {
-        findings.push(Finding::CombinationsNotObserved { combinations });
-    }
-    if !outcome.heading_observed() {
-        findings.push(Finding::HeadingNotObserved {
-            sigma_rad: outcome.attitude_sigma.z,
-        });
-    }
-    let hidden = outcome.auxiliary.unobserved();
-    let hidden: Vec<String> = hidden.filter_map(auxiliary_name).collect();
-    if !hidden.is_empty() {
-        findings.push(Finding::NotObserved {
-            by,
-            parameters: hidden,
-        });
-    }
-    if outcome.auxiliary.even_terms_inseparable() {
-        findings.push(Finding::EvenTermsInseparable);
-    }
-    if let Some(test) = outcome.form_test.filter(FormTest::rejects) {
-        findings.push(Finding::FormRejected {
-            form,
-            angles: test.angles,
-            gain: test.gain,
-            limit: test.limit,
-        });
-    }
-    let rejected = outcome.innovations.iter().filter(|i| !i.accepted).count();
-    if rejected > 0 {
-        findings.push(Finding::Outliers {
-            rejected,
-            observations: outcome.innovations.len(),
-        });
-    }
-    // Angles that the form lacks are a cause that is found.
-    if !outcome.form_test.as_ref().is_some_and(FormTest::rejects) {
-        let all = &outcome.consistency.all;
-        findings.extend(unexplained(all, &outcome.innovations));
-    }
-    let looks = inconsistencies(&outcome.innovations);
-    if !looks.is_empty() {
-        findings.push(Finding::Inconsistent { looks });
-    }
-    findings
 }
 
 #[cfg(test)]

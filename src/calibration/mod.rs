@@ -39,14 +39,12 @@ pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::dwell_scatter::DwellScatter;
 pub use checks::error_term_test::{ErrorTermTest, LeftOff, Role, test_error_terms};
-pub use checks::finding::{Finding, RecordingDifference};
+pub use checks::finding::Finding;
 pub use checks::form::FormTest;
-pub use checks::innovation::{
-    Consistency, Inconsistency, Innovation, Look, Nis, Observation, mean_square_interval,
-};
+pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
 pub use checks::observability::{AttitudePart, Direction, Observability, Part};
-pub use checks::prior_cause::PriorCause;
 pub use checks::quality::{Measures, Quality, Spread};
+pub use checks::recordings::RecordingDifference;
 pub use error::{CalibrationError, ComparisonError};
 pub use error_term::ErrorTerm;
 pub use estimate::Estimate;
@@ -60,7 +58,7 @@ pub use options::Options;
 pub use outcome::{Outcome, Pass};
 pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
-    parameter, parameter_name, sensor_and_parameter, to_vector,
+    parameter, parameter_index, parameter_name, sensor_and_parameter, to_vector,
 };
 pub use pass::{Epoch, Own};
 pub use problem::Problem;
@@ -72,8 +70,8 @@ pub use result::nees::{Nees, nees};
 pub use result::record::truth_record;
 pub use result::scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use result::thermal_record::{
-    CoefficientRecord, RangeRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE,
-    ThermalRecord, ValueRecord,
+    CoefficientRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE, ThermalRecord,
+    ValueRecord,
 };
 pub use result::{Calibration, Method, triads_of};
 pub use several::alone::Alone;

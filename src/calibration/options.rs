@@ -4,6 +4,7 @@ use super::error_term::ErrorTerm;
 use super::noise::NoisePolicy;
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
+use crate::statistics::FALSE_ALARM;
 
 /// What is to be estimated, and how; the default is right for most runs.
 ///
@@ -27,7 +28,7 @@ pub struct Options {
     pub terms: Vec<ErrorTerm>,
     /// Which noise is used.
     pub noise: NoisePolicy,
-    /// Chance that the gate rejects any observation of a sound record.
+    /// Chance that the gate rejects any observation of a record without outliers.
     pub false_rejection: f64,
     /// Converged when no parameter moves by more than this many of its σ.
     pub converged_sigma: f64,
@@ -42,7 +43,7 @@ impl Default for Options {
             aiding: None,
             terms: Vec::new(),
             noise: NoisePolicy::default(),
-            false_rejection: 1e-3,
+            false_rejection: FALSE_ALARM,
             converged_sigma: 0.02,
             passes: 20,
         }

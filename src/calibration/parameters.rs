@@ -56,6 +56,11 @@ pub fn parameter_name(form: InstallationForm, index: usize) -> Option<String> {
     Triad::parameter_name(sensor, form, of_triad)
 }
 
+/// The index of a parameter by its name in files; `None` if the form does not have it.
+pub fn parameter_index(form: InstallationForm, name: &str) -> Option<usize> {
+    (0..PARAMETERS).find(|&index| parameter_name(form, index).as_deref() == Some(name))
+}
+
 /// A run has observed a parameter if it leaves less than this part of its prior σ.
 pub const OBSERVED_BELOW: f64 = 0.5;
 

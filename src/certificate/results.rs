@@ -147,9 +147,9 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
         let range = of.range.get(sensor);
         format!(
             "{name} at {} °C, known from {} to {} °C",
-            number(range.reference_degc),
-            number(range.lowest_degc),
-            number(range.highest_degc)
+            number(range.reference),
+            number(range.lowest),
+            number(range.highest)
         )
     };
     let triads = [("gyros", Sensor::Gyro), ("accelerometers", Sensor::Accel)].map(triad);

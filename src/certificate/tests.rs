@@ -2,9 +2,9 @@ use super::conformity::decide;
 use super::*;
 use crate::calibration::result::frame::tests::{record, with_covariance};
 use crate::calibration::result::{EQUATION_WITH_TERMS, InputFile, TermRecord};
-use crate::calibration::{BudgetRecord, RangeRecord, ThermalRecord};
+use crate::calibration::{BudgetRecord, ThermalRecord};
 use crate::formats::digest_of_bytes;
-use crate::imu::{InstallationForm, PerSensor};
+use crate::imu::{InstallationForm, PerSensor, ThermalRange};
 use crate::lot::Limit;
 use crate::report::certificate::files;
 use crate::units::{ARCSEC, PPM};
@@ -158,11 +158,11 @@ fn error_terms_are_results_with_their_uncertainty_and_stand_in_the_model() {
 
 #[test]
 fn results_that_change_with_temperature_state_at_which_they_hold() {
-    let range = RangeRecord {
-        lowest_degc: -20.0,
-        highest_degc: 60.0,
-        reference_degc: 21.5,
-        largest_rate_k_per_s: 1e-3,
+    let range = ThermalRange {
+        lowest: -20.0,
+        highest: 60.0,
+        reference: 21.5,
+        largest_rate: 1e-3,
     };
     let mut calibration = calibration();
     calibration.temperature = Some(ThermalRecord {

@@ -118,21 +118,21 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
             None => notes.push(format!(
                 "the run has no temperature, the calibration changes with it: all rows are corrected as at {} °C and \
                  have 0 in in_range",
-                thermal.range.gyro.reference_degc
+                thermal.range.gyro.reference
             )),
             Some(temperature) => {
                 for sensor in Sensor::ALL {
                     let ([lowest, highest], range) =
                         (temperature.range(sensor), thermal.range.get(sensor));
-                    if lowest < range.lowest_degc - TEMPERATURE_TOLERANCE
-                        || highest > range.highest_degc + TEMPERATURE_TOLERANCE
+                    if lowest < range.lowest - TEMPERATURE_TOLERANCE
+                        || highest > range.highest + TEMPERATURE_TOLERANCE
                     {
                         notes.push(format!(
                             "{}: the run is at {lowest:.1} to {highest:.1} °C, the calibration holds for {:.1} to \
                              {:.1} °C; rows beyond have 0 in in_range",
                             sensor.name(),
-                            range.lowest_degc,
-                            range.highest_degc
+                            range.lowest,
+                            range.highest
                         ));
                     }
                 }

@@ -6,9 +6,8 @@ use std::path::Path;
 use super::error::{FileError, Place, suggestion};
 use super::small_file;
 use super::whole::write_whole;
-use crate::calibration::RangeRecord;
 use crate::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
-use crate::imu::{PARAMETERS, PerSensor, Sensor, Triad};
+use crate::imu::{PARAMETERS, PerSensor, Sensor, ThermalRange, Triad};
 use crate::shown::excerpt;
 
 impl Calibration {
@@ -185,11 +184,11 @@ impl Calibration {
             return Ok(());
         };
         for sensor in Sensor::ALL {
-            let RangeRecord {
-                lowest_degc: lowest,
-                highest_degc: highest,
-                reference_degc: reference,
-                largest_rate_k_per_s: rate,
+            let ThermalRange {
+                lowest,
+                highest,
+                reference,
+                largest_rate: rate,
             } = *thermal.range.get(sensor);
             let finite = [lowest, highest, reference, rate]
                 .iter()

@@ -28,12 +28,16 @@ pub type ThermalState = PerSensor<[ThermalValues; 3]>;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ThermalRange {
     /// The lowest, °C.
+    #[serde(rename = "lowest_degc")]
     pub lowest: f64,
     /// The highest, °C.
+    #[serde(rename = "highest_degc")]
     pub highest: f64,
     /// At which its parameters are stated, °C.
+    #[serde(rename = "reference_degc")]
     pub reference: f64,
     /// The largest magnitude of its rate, K/s.
+    #[serde(rename = "largest_rate_k_per_s")]
     pub largest_rate: f64,
 }
 
@@ -62,7 +66,19 @@ impl ThermalRange {
         values
     }
 
-    /// Whether a temperature lies within it, but for what its sensor is noisy by, K.
+    /// Both triads' functions at temperatures in °C that change by these rates in K/s.
+    pub fn state(
+        ranges: &PerSensor<Self>,
+        temperatures: &PerSensor<[f64; 3]>,
+        rates: &PerSensor<[f64; 3]>,
+    ) -> ThermalState {
+        PerSensor::from_fn(|sensor| {
+            let (t, rate) = (temperatures.get(sensor), rates.get(sensor));
+            [0, 1, 2].map(|axis| ranges.get(sensor).values(t[axis], rate[axis]))
+        })
+    }
+
+    /// Whether a temperature lies within it, except for the noise of its sensor, K.
     pub fn contains(&self, temperature: f64, tolerance: f64) -> bool {
         (self.lowest - tolerance..=self.highest + tolerance).contains(&temperature)
     }
@@ -120,14 +136,7 @@ impl ThermalModel {
         temperatures: &PerSensor<[f64; 3]>,
         rates: &PerSensor<[f64; 3]>,
     ) -> ThermalState {
-        PerSensor::from_fn(|sensor| {
-            let (range, t, rate) = (
-                self.range.get(sensor),
-                temperatures.get(sensor),
-                rates.get(sensor),
-            );
-            [0, 1, 2].map(|axis| range.values(t[axis], rate[axis]))
-        })
+        ThermalRange::state(&self.range, temperatures, rates)
     }
 
     /// Triad, parameter and function of each coefficient that is on.

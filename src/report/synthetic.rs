@@ -209,10 +209,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             attitude: nis(f64::NAN, 0),
         },
         velocity_sigma: 1.2e-5,
-        findings: vec![Finding::Recording {
-            note: "The path turns about z by less than a full turn; gyro K z rests on one move."
+        findings: vec![Finding::of_recording(
+            "The path turns about z by less than a full turn; gyro K z rests on one move."
                 .to_owned(),
-        }],
+        )],
     };
     let closed = estimate(&truth, &(final_sigma * 40.0), &vector(rng));
     let mission = Mission::standing_level(&run.site, 600);

@@ -73,8 +73,8 @@ fn static_sections_laid_end_to_end_show_accelerometers_and_name_what_gyros_hide(
     // Six static sections, each a stretch of its own; the turns between them cannot be navigated.
     assert_eq!(problem.dwells().count(), 6);
     assert_eq!(outcome.prior_attitudes.len(), 6);
-    let hidden = |finding: &Finding| match finding {
-        Finding::NotObserved { parameters, .. } => parameters.clone(),
+    let hidden = |finding: &Finding| match finding.kind.as_str() {
+        "not-observed" => serde_json::from_value(finding.figures["parameters"].clone()).unwrap(),
         _ => Vec::new(),
     };
     let hidden: Vec<String> = outcome.findings.iter().flat_map(hidden).collect();

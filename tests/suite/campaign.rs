@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use turncal::calibration::{
-    AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, estimate, parameter,
+    AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, RecordingDifference,
+    estimate, parameter,
 };
 use turncal::formats::Campaign;
 use turncal::imu::Sensor;
@@ -161,13 +162,7 @@ fn autopilots_take_off_the_bias_at_a_temperature() {
             fields.find(|&field| field == name);
             fields.next().unwrap().parse().unwrap()
         };
-        let reference = record
-            .temperature
-            .as_ref()
-            .unwrap()
-            .range
-            .gyro
-            .reference_degc;
+        let reference = record.temperature.as_ref().unwrap().range.gyro.reference;
         let there = record.at_temperature(reference).unwrap();
         for temperature in [2.0, 17.0, 38.0] {
             let at = record.at_temperature(temperature).unwrap();
@@ -276,9 +271,10 @@ fn recordings_that_differ_by_more_than_is_stated_are_found_to() {
     fs::write(&path, without).unwrap();
     let silent = estimated(&path);
     let sigma = |outcome: &Outcome| {
-        let found = outcome.findings.iter().find_map(|finding| match finding {
-            Finding::RecordingsDiffer { differences } => Some(differences.clone()),
-            _ => None,
+        let differ = |finding: &&Finding| finding.kind == "recordings-differ";
+        let found = outcome.findings.iter().find(differ).map(|finding| {
+            let differences = finding.figures["differences"].clone();
+            serde_json::from_value::<Vec<RecordingDifference>>(differences).unwrap()
         });
         (
             outcome.estimate.sigma()[PARAMETERS / 2 - 3] / DEG_PER_H,

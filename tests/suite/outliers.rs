@@ -176,7 +176,7 @@ fn a_prior_that_is_wrong_makes_no_outliers_and_is_named_itself() {
     let rejected = |outcome: &Outcome| outcome.innovations.iter().filter(|i| !i.accepted).count();
     assert_eq!(rejected(&wrong), rejected(&right));
     assert!((spoilt - clean).amax() < 0.1);
-    let named = |finding: &Finding| matches!(finding, Finding::FarFromPrior { .. });
+    let named = |finding: &Finding| finding.kind == "far-from-prior";
     assert!(wrong.findings.iter().any(named));
 }
 
@@ -208,7 +208,7 @@ fn a_prior_that_is_wrong_is_neither_noise_nor_an_error_term() {
         by_scale(run.recording.imu.gyro.to_mut(), &prior.gyro.scale_sigma);
     });
     for findings in [mems, positions] {
-        let far = |finding: &Finding| matches!(finding, Finding::FarFromPrior { .. });
+        let far = |finding: &Finding| finding.kind == "far-from-prior";
         assert!(
             !findings.is_empty() && findings.iter().all(far),
             "{findings:?}"

@@ -41,7 +41,7 @@ fn clipped(column: usize, rate: f64) -> f64 {
 #[test]
 #[ignore = "statistical: 12 runs"]
 fn claimed_accuracy_is_true_of_rows_rounded_to_steps_wider_than_their_noise() {
-    accurate_as_claimed(12, |stream| trial(stream, rounded, "rounded to steps"));
+    accurate_as_claimed(12, |stream| trial(stream, rounded, "values are rounded to"));
 }
 
 #[test]

@@ -233,7 +233,7 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations_not_g
     assert!(outcome.innovations.iter().all(|i| i.accepted));
     assert!(outcome.form_test.is_some_and(|test| test.rejects()));
     for sentence in [
-        "Innovations are not as large as their σ says",
+        "The filter is inconsistent",
         "The data reject the three-angle installation form",
     ] {
         assert!(says(&outcome, sentence));

@@ -1,15 +1,16 @@
 //! Parameters that change while the closed form's positions are visited.
 
 use nalgebra::DMatrix;
+use serde_json::json;
 
-use super::finding::Finding;
+use super::finding::{Finding, triad_name};
 use super::residuals::Residuals;
 use crate::imu::{AXES, ParameterKind, Sensor};
-use crate::statistics::chi_square_limit;
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEG_PER_H, MICRO_G, PPM};
 
-/// Chance that a run whose parameters stay rings, of both kinds of both triads.
-const FALSE_ALARM: f64 = 1e-3 / 4.0;
+/// Both kinds of both triads are tested.
+const TESTS: f64 = 4.0;
 
 /// How one kind of a triad's parameters makes the residuals' equations.
 pub struct Changing {
@@ -46,7 +47,7 @@ pub fn drift(
             row *= (time - first) / span - 0.5;
         }
         let explained = residuals.explained_by(&columns);
-        let limit = chi_square_limit(explained.degrees as f64, FALSE_ALARM);
+        let limit = chi_square_limit(explained.degrees as f64, FALSE_ALARM / TESTS);
         let rings = explained.degrees > 0 && explained.fall > limit && explained.fall > least;
         rings.then_some((changing, explained, limit))
     });
@@ -57,28 +58,35 @@ pub fn drift(
         _ => ("scale factor", "ppm", PPM),
     };
     let axes = changing.axes.iter().zip(&explained.coefficients);
-    Some(Finding::ChangesInTime {
-        of: changing.sensor.name(),
-        parameters,
-        unit,
-        changes: axes
-            .map(|(&axis, change)| (AXES[axis], change / of_one))
-            .collect(),
-        times: [first, last],
-        fall: explained.fall,
-        limit,
-    })
+    let changes = axes.map(|(&axis, change)| (AXES[axis], change / of_one));
+    let changes: Vec<(char, f64)> = changes.collect();
+    let (fall, each) = (explained.fall, changes.iter());
+    let each: Vec<String> = each
+        .map(|(axis, by)| format!("{axis} by {by:+.4} {unit}"))
+        .collect();
+    let text = format!(
+        "{} {parameters} appears to drift between {first:.1} s and {last:.1} s: {} (χ² falls by {fall:.0}; limit \
+         {limit:.0}). σ are valid only for parameters that do not change. Let the instrument warm up and keep its \
+         temperature constant, look for a step, or state the bias instability in [imu.noise].",
+        triad_name(changing.sensor),
+        each.join(", ")
+    );
+    let figures = json!({
+        "of": changing.sensor.name(), "parameters": parameters, "unit": unit, "changes": changes,
+        "times": [first, last], "fall": fall, "limit": limit
+    });
+    Some(Finding::new("changes-in-time", text, figures))
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::{Finding, Options, Problem, six_position};
+    use crate::calibration::{Options, Problem, six_position};
     use crate::run::Aiding;
     use crate::simulation::Scenario;
     use crate::units::{MICRO_G, PPM};
 
     /// What is said to drift of a run whose accelerometers' rows change by so much over it, m/s² and parts.
-    fn drifts(seed: u64, bias: f64, scale: f64, with_table: bool) -> Option<(&'static str, f64)> {
+    fn drifts(seed: u64, bias: f64, scale: f64, with_table: bool) -> Option<(String, f64)> {
         let scenario = Scenario::load("mems").unwrap();
         let mut run = scenario.simulate(seed, 0).unwrap().run;
         let imu = &mut run.recording.imu;
@@ -94,14 +102,10 @@ mod tests {
         };
         let problem = Problem::new(&run, &Options::default().aiding(aiding));
         let findings = six_position(&problem).unwrap().findings;
-        findings.into_iter().find_map(|finding| match finding {
-            Finding::ChangesInTime {
-                parameters,
-                changes,
-                ..
-            } => Some((parameters, changes[0].1)),
-            _ => None,
-        })
+        let mut drifts = findings.into_iter().filter(|f| f.kind == "changes-in-time");
+        let figures = drifts.next()?.figures;
+        let parameters = figures["parameters"].as_str()?.to_owned();
+        Some((parameters, figures["changes"][0][1].as_f64()?))
     }
 
     #[test]

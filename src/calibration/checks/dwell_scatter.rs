@@ -10,14 +10,15 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
+use super::finding::{Finding, widened_by};
 use super::innovation::mean_square_interval;
+use crate::statistics::FALSE_ALARM;
 
 /// A direction of which a dwell has less than this part of all information says nothing of the dwell but
 /// rounding.
 const SHARE: f64 = 1e-3;
-/// Chance that scores of a right model are said to be too large.
-const FALSE_ALARM: f64 = 1e-3;
 
 /// Mean and covariance of the constants of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,13 +34,23 @@ pub struct DwellScatter {
     pub mean: f64,
     /// How many scores.
     pub count: usize,
-    /// What the mean stays below in 999 runs of 1000 if σ are true.
+    /// Its limit if σ are true, at the false-alarm rate.
     pub limit: f64,
-    /// Difference of the estimate from the first half of the dwells and that from the second: squared,
-    /// over its covariance, for each of its directions; one if σ are true …
-    pub halves: f64,
-    /// … with its 95 % interval.
-    pub halves_interval: (f64, f64),
+}
+
+impl DwellScatter {
+    /// The finding where σ were widened by so much because of it.
+    pub fn finding(&self, growth: f64) -> Finding {
+        let Self { mean, limit, .. } = self;
+        let text = format!(
+            "The dwells disagree with one another by more than σ allow (scatter statistic {mean:.2}; limit \
+             {limit:.2}). turncal widened σ {}. This usually means an unmodelled error: look at the effects of \
+             error terms, and rerun with --with and the one that explains most.",
+            widened_by(growth)
+        );
+        let figures = json!({ "mean": mean, "limit": limit, "growth": growth });
+        Finding::new("dwells-scatter", text, figures)
+    }
 }
 
 /// The scores of dwells in units in which the covariance of the estimate is the identity.
@@ -71,8 +82,7 @@ impl DwellScores {
         let mut squares = Vec::new();
         let mut robust = DMatrix::zeros(n, n);
         let mut before = whitened(prior)?;
-        let mut middle = None;
-        for (number, posterior) in after.iter().enumerate() {
+        for posterior in after {
             let now = whitened(posterior)?;
             let (gained, score) = (&now.0 - &before.0, &now.1 - &before.1);
             let eigen = gained.symmetric_eigen();
@@ -90,9 +100,6 @@ impl DwellScores {
                 corrected.axpy(along / (1.0 - share).sqrt(), &direction, 1.0);
             }
             robust.ger(1.0, &corrected, &corrected, 1.0);
-            if number + 1 == after.len() / 2 {
-                middle = Some(now.clone());
-            }
             before = now;
         }
         // What the estimate takes of the scores they do not have: as many as there are constants that
@@ -103,14 +110,11 @@ impl DwellScores {
             return None;
         }
         let (_, limit) = mean_square_interval(freedom as usize, 2.0 * FALSE_ALARM);
-        let (halves, directions) = middle.map_or((0.0, 0), |middle| halves(&middle));
         Some(Self {
             scatter: DwellScatter {
                 mean: squares.iter().sum::<f64>() / squares.len() as f64,
                 count: squares.len(),
                 limit,
-                halves: halves / directions.max(1) as f64,
-                halves_interval: mean_square_interval(directions, 0.05),
             },
             root,
             robust,
@@ -127,22 +131,6 @@ impl DwellScores {
         eigen.eigenvalues.apply(|value| *value = value.max(1.0));
         Some(&self.root * eigen.recompose() * self.root.transpose())
     }
-}
-
-/// Sum of squares of the difference between what the first half says and all, over its σ, and of how many
-/// directions. Both share the first half, so the covariance of their difference is that of the half less
-/// that of all, and the difference is a multiple of that of the two halves.
-fn halves((information, score): &(DMatrix<f64>, DVector<f64>)) -> (f64, usize) {
-    let eigen = information.clone().symmetric_eigen();
-    let directions = eigen
-        .eigenvalues
-        .iter()
-        .zip(eigen.eigenvectors.column_iter());
-    let squares = directions.filter_map(|(&share, direction)| {
-        let seen = (SHARE..1.0 - SHARE).contains(&share);
-        seen.then(|| direction.dot(score).powi(2) / (share * (1.0 - share)))
-    });
-    squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1))
 }
 
 #[cfg(test)]
@@ -188,7 +176,7 @@ mod tests {
         let truth = estimated(&run);
         run.table.position_sigma /= 3.0;
         let outcome = estimated(&run);
-        let said = |finding: &Finding| matches!(finding, Finding::DwellsScatter { .. });
+        let said = |finding: &Finding| finding.kind == "dwells-scatter";
         assert!(outcome.findings.iter().any(said));
         // What positions tell most is again known as well as with the figure that is right.
         let sigma = |outcome: &Outcome| outcome.estimate.sigma().rows(3, 6).norm();

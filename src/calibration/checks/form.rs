@@ -1,14 +1,16 @@
 //! Whether the data reject the installation form.
 
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use serde_json::json;
 
+use super::finding::Finding;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::parameters::in_general_form;
 use crate::calibration::pass::{Gate, Mode, PassResult, pass};
 use crate::calibration::problem::Problem;
 use crate::imu::InstallationForm;
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// The likelihood ratio of a restricted installation form against the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,13 +23,27 @@ pub struct FormTest {
     pub limit: f64,
 }
 
-/// Chance that a right form is rejected.
-const FALSE_REJECTION: f64 = 1e-3;
-
 impl FormTest {
     /// Whether the data reject the form.
     pub fn rejects(&self) -> bool {
         self.gain > self.limit
+    }
+
+    /// The finding where the data reject this form.
+    pub fn finding(&self, form: InstallationForm) -> Option<Finding> {
+        let Self {
+            gain,
+            angles,
+            limit,
+        } = self;
+        let text = format!(
+            "The data reject the {} installation form: {angles} more angles, as the general form has them, are \
+             needed (χ² falls by {gain:.0}; limit {limit:.1}). Rerun with --installation general.",
+            form.name()
+        );
+        let figures = json!({ "form": form, "angles": angles, "gain": gain, "limit": limit });
+        self.rejects()
+            .then(|| Finding::new("form-rejected", text, figures))
     }
 }
 
@@ -42,9 +58,9 @@ pub fn form_test(
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();
     let more = angles(general) - angles(restricted.model.form);
-    let Ok(chi2) = ChiSquared::new(more as f64) else {
+    if more == 0 {
         return Ok(None);
-    };
+    }
     let model = restricted.model.in_form(restricted.run(), general);
     let at = Linearisation {
         triads: in_general_form(&held.estimate.triads),
@@ -55,6 +71,6 @@ pub fn form_test(
     Ok(Some(FormTest {
         gain: held.cost - free.cost,
         angles: more,
-        limit: chi2.inverse_cdf(1.0 - FALSE_REJECTION),
+        limit: chi_square_limit(more as f64, FALSE_ALARM),
     }))
 }

@@ -1,8 +1,11 @@
-//! Innovations: what an observation differs from its prediction by, and whether it is as much as its
-//! covariance says.
+//! Innovations: observation minus prediction, and whether they are as large as their covariance.
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::finding::Finding;
+use crate::statistics::FALSE_ALARM;
 
 /// What was observed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -43,7 +46,7 @@ pub struct Innovation {
     pub accepted: bool,
     /// Number of the dwell in which it was made.
     pub dwell: usize,
-    /// Whether what the move before that dwell has done is in it: nothing goes on where rows are lost.
+    /// Whether it shows the errors of the move before that dwell: not where rows are lost between them.
     pub after_move: bool,
 }
 
@@ -89,113 +92,98 @@ pub struct Nis {
     pub lag_one: f64,
 }
 
-/// Innovations that are looked at apart: what is wrong with a model shows in a few of them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Look {
-    /// All that were let in.
-    All,
-    /// The first of each dwell after a move, let in or not: it carries what that has done.
-    AfterMoves,
-    /// Sums over each dwell, each over its σ: they carry what lasts.
-    OverDwells,
+/// What is wrong with a model shows in a few innovations only: squares, of which the mean is one if σ are true.
+type Squares = fn(&[&Innovation]) -> Vec<f64>;
+
+/// Innovations that are tested separately: their kind, in words after what was observed, and their squares.
+const LOOKS: [(&str, &str, Squares); 3] = [
+    ("all", "", of_all),
+    (AFTER_MOVES, " first after each move", after_moves),
+    ("over-dwells", " summed over each dwell", over_dwells),
+];
+const AFTER_MOVES: &str = "after-moves";
+
+/// Those that were let in.
+fn of_all(innovations: &[&Innovation]) -> Vec<f64> {
+    let accepted = innovations.iter().filter(|i| i.accepted);
+    accepted.flat_map(|i| i.whitened.map(|w| w * w)).collect()
 }
 
-impl Look {
-    const ALL: [Self; 3] = [Self::All, Self::AfterMoves, Self::OverDwells];
-
-    /// In words, after what was observed.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::All => "",
-            Self::AfterMoves => " first after each move",
-            Self::OverDwells => " summed over each dwell",
-        }
-    }
-
-    /// What the mean of so many squares stays within but for this chance.
-    ///
-    /// How far the IMU stands from the table's centre is stated as what it stays within, and the velocity after a
-    /// move is uncertain by what that leaves open: innovations that are smaller say nothing against the model.
-    fn limits(self, of: Observation, count: usize, chance: f64) -> (f64, f64) {
-        match (self, of) {
-            (Self::AfterMoves, Observation::Velocity) => {
-                (0.0, mean_square_interval(count, 2.0 * chance).1)
-            }
-            _ => mean_square_interval(count, chance),
-        }
-    }
-
-    /// Squares of independent numbers of σ 1.
-    fn squares(self, of_kind: &[&Innovation]) -> Vec<f64> {
-        let accepted = || of_kind.iter().filter(|i| i.accepted);
-        let dwells = || of_kind.chunk_by(|a, b| a.dwell == b.dwell);
-        match self {
-            Self::All => accepted().flat_map(|i| i.whitened.map(|w| w * w)).collect(),
-            Self::AfterMoves => {
-                let first = dwells().filter_map(|dwell| dwell.first());
-                first
-                    .filter(|innovation| innovation.after_move)
-                    .flat_map(|i| i.whitened.map(|w| w * w))
-                    .collect()
-            }
-            Self::OverDwells => dwells().flat_map(summed).collect(),
-        }
-    }
-}
-
-/// Squares of the sums over a dwell of what was let in, over their variance.
-fn summed(dwell: &[&Innovation]) -> Vec<f64> {
-    let accepted: Vec<_> = dwell.iter().filter(|i| i.accepted).collect();
-    let sum = |axis: usize| accepted.iter().map(|i| i.whitened[axis]).sum::<f64>();
-    match accepted.len() {
-        0 => Vec::new(),
-        n => (0..3).map(|axis| sum(axis).powi(2) / n as f64).collect(),
-    }
-}
-
-/// Innovations that are not as large as their covariance says.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Inconsistency {
-    /// Of what.
-    pub observation: Observation,
-    /// Which of them.
-    pub look: Look,
-    /// Mean of their squares.
-    pub nis: f64,
-    /// How many numbers.
-    pub count: usize,
-    /// What the mean stays within, for all looks at once, in 999 runs of 1000 if σ are true.
-    pub limits: (f64, f64),
-}
-
-/// Chance that any look at a run finds a right model inconsistent.
-const FALSE_ALARM: f64 = 1e-3;
-
-/// The looks at innovations that find them larger or smaller than chance allows.
-pub fn inconsistencies(innovations: &[Innovation]) -> Vec<Inconsistency> {
-    let kinds = Observation::ALL.map(|kind| {
-        let of_kind = innovations.iter().filter(|i| i.observation == kind);
-        (kind, of_kind.collect::<Vec<_>>())
-    });
-    let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
-    let looks = kinds.clone().count() * Look::ALL.len();
-    let looked = kinds.flat_map(|(observation, of_kind)| {
-        Look::ALL.into_iter().map(move |look| {
-            let squares = look.squares(of_kind);
-            let count = squares.len();
-            Inconsistency {
-                observation: *observation,
-                look,
-                nis: squares.iter().sum::<f64>() / count as f64,
-                count,
-                limits: look.limits(*observation, count, FALSE_ALARM / looks as f64),
-            }
-        })
-    });
-    looked
-        .filter(|found| found.nis < found.limits.0 || found.nis > found.limits.1)
+/// The first of each dwell after a move, let in or not: it shows the errors that the move made.
+fn after_moves(innovations: &[&Innovation]) -> Vec<f64> {
+    let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
+    let first = dwells.filter_map(|dwell| dwell.first());
+    first
+        .filter(|innovation| innovation.after_move)
+        .flat_map(|i| i.whitened.map(|w| w * w))
         .collect()
+}
+
+/// Sums over each dwell of those that were let in, each over its σ: they show errors that last.
+fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
+    let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
+    let summed = dwells.flat_map(|dwell| {
+        let accepted: Vec<_> = dwell.iter().filter(|i| i.accepted).collect();
+        let sum = |axis: usize| accepted.iter().map(|i| i.whitened[axis]).sum::<f64>();
+        match accepted.len() {
+            0 => Vec::new(),
+            n => (0..3).map(|axis| sum(axis).powi(2) / n as f64).collect(),
+        }
+    });
+    summed.collect()
+}
+
+/// Observations that the gate rejected, if there are any.
+pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
+    let observations = innovations.len();
+    let rejected = innovations.iter().filter(|i| !i.accepted).count();
+    let text = format!(
+        "{rejected} of {observations} observations were rejected as outliers. Look for bumps at their times, which \
+         the figure of innovations shows."
+    );
+    let figures = json!({ "rejected": rejected, "observations": observations });
+    (rejected > 0).then(|| Finding::new("outliers", text, figures))
+}
+
+/// Innovations that are larger or smaller than their covariance makes them, if there are any.
+pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
+    let of = |kind| -> Vec<&Innovation> {
+        let of_kind = innovations.iter().filter(|i| i.observation == kind);
+        of_kind.collect()
+    };
+    let kinds = Observation::ALL.map(|kind| (kind, of(kind)));
+    let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
+    let chance = FALSE_ALARM / (kinds.clone().count() * LOOKS.len()) as f64;
+    let (mut each, mut looks) = (Vec::new(), Vec::new());
+    for (observation, of_kind) in kinds {
+        for (look, which, squares) in LOOKS {
+            let squares = squares(of_kind);
+            let count = squares.len();
+            let nis = squares.iter().sum::<f64>() / count as f64;
+            // The distance of the IMU from the table's centre is stated by a bound, which makes the velocity after
+            // a move uncertain: smaller innovations do not contradict the model.
+            let (low, high) = match (look, observation) {
+                (AFTER_MOVES, Observation::Velocity) => {
+                    (0.0, mean_square_interval(count, 2.0 * chance).1)
+                }
+                _ => mean_square_interval(count, chance),
+            };
+            if nis < low || nis > high {
+                let name = observation.name();
+                each.push(format!("{name}{which} {nis:.2} ({low:.2} to {high:.2})"));
+                looks.push(json!({
+                    "observation": observation, "look": look, "nis": nis, "count": count, "limits": [low, high]
+                }));
+            }
+        }
+    }
+    let text = format!(
+        "The filter is inconsistent: NIS is outside its 99.9 % interval for {}. Where to look: only after moves – \
+         table position, scale factor or timing; during dwells – bias drift; everywhere – the white noise stated in \
+         [imu.noise].",
+        each.join("; ")
+    );
+    (!looks.is_empty()).then(|| Finding::new("inconsistent", text, json!({ "looks": looks })))
 }
 
 /// Two-sided probability outside the intervals.
@@ -236,7 +224,7 @@ fn nis(whitened: impl Iterator<Item = [f64; 3]>) -> Nis {
     }
 }
 
-/// The interval that holds the mean of `count` squared standard normal numbers but for a chance of
+/// The interval that holds the mean of `count` squared standard normal numbers except with probability
 /// `outside`, half on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
 /// Tracking and Navigation*, §5.4.2). NaN if there are none.
 pub fn mean_square_interval(count: usize, outside: f64) -> (f64, f64) {
@@ -278,10 +266,11 @@ mod tests {
             let dwells = (0..20).flat_map(|k| dwell.map(|whitened| of_dwell(k, whitened)));
             dwells.collect()
         };
-        assert_eq!(inconsistencies(&of(Observation::Velocity)), []);
-        let found = inconsistencies(&of(Observation::Table));
-        assert_eq!(found.len(), 1, "{found:?}");
-        assert_eq!(found[0].look, Look::AfterMoves);
+        assert_eq!(inconsistent(&of(Observation::Velocity)), None);
+        let found = inconsistent(&of(Observation::Table)).unwrap();
+        let looks = found.figures["looks"].as_array().unwrap();
+        assert_eq!(looks.len(), 1, "{found:?}");
+        assert_eq!(looks[0]["look"], AFTER_MOVES);
     }
 
     #[test]

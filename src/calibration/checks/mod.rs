@@ -1,4 +1,4 @@
-//! What the data say of the model, noise and record: one file a check, its words beside it.
+//! Checks of model, noise and record by the data: each file a check with its words.
 
 pub mod drift;
 pub mod dwell_scatter;
@@ -6,11 +6,63 @@ pub mod error_term_test;
 pub mod finding;
 pub mod form;
 pub mod innovation;
+pub mod labels;
+pub mod noise_learnt;
 pub mod observability;
-pub mod prior_cause;
 pub mod prior_distance;
 pub mod quality;
+pub mod recordings;
 pub mod residuals;
 pub mod rest_scatter;
 pub mod rounding;
 pub mod unexplained;
+
+use super::budget::BudgetSource;
+use super::outcome::Outcome;
+use super::problem::Problem;
+use error_term_test::{ErrorTermTest, biases_may_vary};
+use finding::Finding;
+
+/// What the checks find of a filter's outcome, in the order in which findings are read. The problem is the one with
+/// what is stated.
+pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
+    let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
+    let rounding = outcome.part(BudgetSource::Rounding);
+    let notes = problem.notes().into_iter().map(Finding::of_recording);
+    let form = outcome
+        .form_test
+        .and_then(|test| test.finding(estimate.form()));
+    // Angles that the form lacks are a cause that is found.
+    let unexplained = match form {
+        Some(_) => None,
+        None => unexplained::unexplained(&outcome.consistency.all, innovations),
+    };
+    notes
+        .chain(unexplained::not_converged(outcome))
+        .chain(noise_learnt::of_report(&outcome.noise))
+        .chain(rest_scatter::scatter_at_rest(problem, &estimate.triads))
+        .chain(rounding::rounded(problem, &rounding, &estimate.covariance))
+        .chain(prior_distance::far_from_prior(&problem.model, estimate))
+        .chain(observability::not_observed_by_path(outcome))
+        .chain(form)
+        .chain(innovation::outliers(innovations))
+        .chain(unexplained)
+        .chain(innovation::inconsistent(innovations))
+        .collect()
+}
+
+impl Outcome {
+    /// Its findings with those of error terms, and of what these add to its covariance.
+    pub fn findings_with(&self, tests: &[ErrorTermTest]) -> Vec<Finding> {
+        let [variation, left_off] = [
+            BudgetSource::UnseenVariation,
+            BudgetSource::ErrorTermsLeftOff,
+        ]
+        .map(|of| self.growth_by(of));
+        let findings = self.findings.iter().cloned();
+        findings
+            .chain(biases_may_vary(variation))
+            .chain(ErrorTermTest::most_significant(tests, Some(left_off)))
+            .collect()
+    }
+}

@@ -1,22 +1,20 @@
 //! Parameters that the prior does not allow, and what most likely made them so.
 
 use nalgebra::Vector3;
+use serde_json::{Value, json};
 
 use super::finding::Finding;
-use super::prior_cause::PriorCause;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{
     ParameterMatrix, from_vector, parameter, parameter_name, sensor_and_parameter,
 };
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
-use crate::statistics::chi_square_limit;
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEGREE, PPM};
 
 /// Parameters further from their prior than this many of its σ contradict it.
 const CONTRADICTS: f64 = 5.0;
-/// Chance that a prior which is right is widened.
-const FALSE_ALARM: f64 = 1e-3;
 /// What data do not see, rounding moves by such a part of the prior's variance.
 const ROUNDING: f64 = 1e-9;
 /// Parts that differ by less than this much of what they have in common are alike.
@@ -26,15 +24,26 @@ const ALIKE: f64 = 0.5;
 pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let far = far(model, estimate);
     let off = estimate.vector() - model.prior_mean;
-    let names = far
-        .iter()
-        .filter_map(|&i| parameter_name(estimate.form(), i));
-    (!far.is_empty()).then(|| Finding::FarFromPrior {
-        sigmas: CONTRADICTS,
-        parameters: names.collect(),
-        distances: far.iter().map(|&i| off[i] / model.prior_sigma[i]).collect(),
-        causes: causes(&far, &estimate.triads),
-    })
+    let named = far.iter().filter_map(|&i| {
+        let name = parameter_name(estimate.form(), i)?;
+        Some((name, off[i] / model.prior_sigma[i]))
+    });
+    let (names, distances): (Vec<String>, Vec<f64>) = named.unzip();
+    let each = names.iter().zip(&distances);
+    let each: Vec<String> = each
+        .map(|(name, by)| format!("{name} by {by:+.0} σ"))
+        .collect();
+    let (words, causes): (Vec<String>, Vec<Value>) =
+        causes(&far, &estimate.triads).into_iter().unzip();
+    let text = format!(
+        "More than {CONTRADICTS} σ of [imu.prior] away from it: {}. Likely cause: {}.",
+        each.join(", "),
+        words.join("; ")
+    );
+    let figures = json!({
+        "sigmas": CONTRADICTS, "parameters": names, "distances": distances, "causes": causes
+    });
+    (!far.is_empty()).then(|| Finding::new("far-from-prior", text, figures))
 }
 
 /// Parameters of which the data alone say other than their prior does, where that is in the estimate; by the
@@ -99,50 +108,60 @@ fn far(model: &Model, estimate: &Estimate) -> Vec<usize> {
     estimate.estimated().filter(far).collect()
 }
 
-fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<PriorCause> {
-    let of = |sensor: Sensor, kind: ParameterKind| {
-        let is = |&&i: &&usize| {
-            let (of, parameter) = sensor_and_parameter(i);
-            of == sensor && Triad::kind(parameter) == kind
-        };
-        far.iter().filter(is).count()
+/// What most likely brought parameters away from their prior, in words and figures.
+type Cause = (String, Value);
+
+fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
+    let count = |sensor: Sensor, kind: ParameterKind| {
+        let of = far.iter().map(|&i| sensor_and_parameter(i));
+        of.filter(|&(of, i)| of == sensor && Triad::kind(i) == kind)
+            .count()
     };
-    let mut causes = Vec::new();
-    for sensor in Sensor::ALL {
-        let name = sensor.name();
-        let scale = triads.get(sensor).scale;
-        let reversed: Vec<char> = (0..3)
-            .filter(|&axis| scale[axis] < 0.0 && far.contains(&parameter(sensor, axis)))
-            .map(|axis| AXES[axis])
-            .collect();
-        let off = scale.add_scalar(-1.0);
-        if !reversed.is_empty() {
-            causes.push(PriorCause::Reversed {
-                sensor: name,
-                axes: reversed,
-            });
-        } else if of(sensor, ParameterKind::Scale) == 3 && alike(&off, &Vector3::repeat(off.mean()))
-        {
-            causes.push(PriorCause::Unit {
-                sensor: name,
-                off_ppm: off.mean() / PPM,
-            });
-        } else if of(sensor, ParameterKind::Scale) > 0 {
-            causes.push(PriorCause::Scale { sensor: name });
-        }
+    let scales = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let count = count(sensor, ParameterKind::Scale);
+        (count > 0).then(|| of_scales(sensor, &triads.get(sensor).scale, far, count))
+    });
+    let angles = PerSensor::from_fn(|sensor| count(sensor, ParameterKind::Installation) > 0);
+    let biases = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let (count, sensor) = (count(sensor, ParameterKind::Bias), sensor.name());
+        let words = format!(
+            "{sensor} bias or bias_sigma as stated does not fit the instrument; an offset of the register belongs in \
+             bias"
+        );
+        (count > 0).then(|| (words, json!({ "cause": "bias", "sensor": sensor })))
+    });
+    let installation = of_installation(triads, angles);
+    scales.chain(installation).chain(biases).collect()
+}
+
+/// Of scale factors of a triad, this count of which are far from their prior.
+fn of_scales(sensor: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> Cause {
+    let is_reversed = |&axis: &usize| scale[axis] < 0.0 && far.contains(&parameter(sensor, axis));
+    let reversed = (0..3).filter(is_reversed);
+    let reversed: Vec<String> = reversed.map(|axis| AXES[axis].to_string()).collect();
+    let off = scale.add_scalar(-1.0);
+    let other = match sensor {
+        Sensor::Gyro => "sample period",
+        Sensor::Accel => "gravity",
+    };
+    let sensor = sensor.name();
+    if !reversed.is_empty() {
+        let axes = reversed.join(", ");
+        let words =
+            format!("{sensor} {axes} reversed: give the column in columns of [imu] a minus");
+        let figures = json!({ "cause": "reversed", "sensor": sensor, "axes": reversed });
+        return (words, figures);
     }
-    causes.extend(of_installation(
-        triads,
-        PerSensor::from_fn(|sensor| of(sensor, ParameterKind::Installation) > 0),
-    ));
-    for sensor in Sensor::ALL {
-        if of(sensor, ParameterKind::Bias) > 0 {
-            causes.push(PriorCause::Bias {
-                sensor: sensor.name(),
-            });
-        }
+    if count == 3 && alike(&off, &Vector3::repeat(off.mean())) {
+        let off_ppm = off.mean() / PPM;
+        let words = format!(
+            "all three {sensor} scale factors off alike, by {off_ppm:+.0} ppm: {sensor}_unit, scale or {other}"
+        );
+        let figures = json!({ "cause": "unit", "sensor": sensor, "off_ppm": off_ppm });
+        return (words, figures);
     }
-    causes
+    let words = format!("{sensor} scale or scale_sigma_ppm as stated does not fit the instrument");
+    (words, json!({ "cause": "scale", "sensor": sensor }))
 }
 
 /// Whether a vector is near another by the measure of that.
@@ -150,37 +169,42 @@ fn alike(one: &Vector3<f64>, other: &Vector3<f64>) -> bool {
     (one - other).norm() < ALIKE * other.norm()
 }
 
-fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<PriorCause> {
-    // To first order the halves of installation that are a rotation, and what is left.
-    let turn = |sensor: Sensor| {
+/// Of installation angles of the triads in which some are far from their prior.
+fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause> {
+    // To first order the antisymmetric half of installation is a rotation, the symmetric half a skew.
+    let halves = |sensor: Sensor| {
         let c = triads.get(sensor).installation();
-        let half = (c - c.transpose()) * 0.5;
-        Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)])
+        let half = |sign: f64| {
+            let of = |i, j| 0.5 * (c[(i, j)] + sign * c[(j, i)]);
+            Vector3::new(of(2, 1), of(0, 2), of(1, 0))
+        };
+        (half(-1.0), half(1.0))
     };
-    let skew = |sensor: Sensor| {
-        let c = triads.get(sensor).installation();
-        Vector3::new(
-            c[(2, 1)] + c[(1, 2)],
-            c[(0, 2)] + c[(2, 0)],
-            c[(1, 0)] + c[(0, 1)],
-        ) * 0.5
-    };
-    let [of_gyro, of_accel] = Sensor::ALL.map(turn);
-    let common = (of_gyro + of_accel) * 0.5;
-    if far.gyro && far.accel && alike(&of_gyro, &common) {
-        return vec![PriorCause::Mount {
-            angle_deg: common.norm() / DEGREE,
-        }];
+    let common = (halves(Sensor::Gyro).0 + halves(Sensor::Accel).0) * 0.5;
+    if far.gyro && far.accel && alike(&halves(Sensor::Gyro).0, &common) {
+        let angle_deg = common.norm() / DEGREE;
+        let words = format!(
+            "both triads turned alike, by {angle_deg:.3}°: the instrument's mount, the table's zero, level or north, \
+             or the labels"
+        );
+        return vec![(words, json!({ "cause": "mount", "angle_deg": angle_deg }))];
     }
     let of_triad = |sensor: Sensor| {
-        let (turn, skew, name) = (turn(sensor).norm(), skew(sensor).norm(), sensor.name());
-        match skew < ALIKE * turn {
-            true => PriorCause::Turned {
-                sensor: name,
-                angle_deg: turn / DEGREE,
-            },
-            false => PriorCause::Skewed { sensor: name },
+        let ((turn, skew), sensor) = (halves(sensor), sensor.name());
+        if skew.norm() >= ALIKE * turn.norm() {
+            let words = format!(
+                "{sensor} axes not at right angles: positions or labels that are not as stated, or an \
+                 installation_sigma_arcsec too small"
+            );
+            return (words, json!({ "cause": "skewed", "sensor": sensor }));
         }
+        let angle_deg = turn.norm() / DEGREE;
+        let words = format!(
+            "the {sensor} triad turned by {angle_deg:.3}°: its mount in the instrument, or a time offset if it is the \
+             gyros"
+        );
+        let figures = json!({ "cause": "turned", "sensor": sensor, "angle_deg": angle_deg });
+        (words, figures)
     };
     let triads = Sensor::ALL.into_iter();
     triads
@@ -199,7 +223,7 @@ mod tests {
     use crate::simulation::Scenario;
 
     /// What is found of triads with this sensitivity, which are known to a part of the prior's σ.
-    fn found(sensitivity: PerSensor<Matrix3<f64>>) -> Option<Vec<PriorCause>> {
+    fn found(sensitivity: PerSensor<Matrix3<f64>>) -> Option<Value> {
         let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
         let model = Model::new(&run, &Options::default());
         let triads = PerSensor::from_fn(|sensor| {
@@ -207,10 +231,8 @@ mod tests {
             Triad::from_sensitivity(InstallationForm::General, sensitivity.get(sensor), bias)
         });
         let covariance = ParameterMatrix::from_diagonal(&(model.prior_sigma * 0.01).map(|s| s * s));
-        match far_from_prior(&model, &Estimate { triads, covariance }) {
-            Some(Finding::FarFromPrior { causes, .. }) => Some(causes),
-            _ => None,
-        }
+        let finding = far_from_prior(&model, &Estimate { triads, covariance })?;
+        Some(finding.figures["causes"].clone())
     }
 
     fn one_degree() -> Matrix3<f64> {
@@ -227,29 +249,21 @@ mod tests {
         let mut gyro = Matrix3::identity();
         gyro[(1, 1)] = -1.0;
         let accel = Matrix3::identity();
-        let reversed = PriorCause::Reversed {
-            sensor: "gyro",
-            axes: vec!['y'],
-        };
-        assert_eq!(found(PerSensor { gyro, accel }), Some(vec![reversed]));
+        let reversed = json!([{ "cause": "reversed", "sensor": "gyro", "axes": ["y"] }]);
+        assert_eq!(found(PerSensor { gyro, accel }), Some(reversed));
     }
 
     #[test]
     fn triads_turned_alike_are_the_mount_and_one_turned_is_itself() {
         let causes = found(PerSensor::from_fn(|_| one_degree())).unwrap();
-        assert!(
-            matches!(causes[..], [PriorCause::Mount { angle_deg }] if (angle_deg - 1.0).abs() < 1e-3)
-        );
+        assert_eq!(causes[0]["cause"], "mount");
+        assert!((causes[0]["angle_deg"].as_f64().unwrap() - 1.0).abs() < 1e-3);
         let accel = Matrix3::identity();
-        let causes = found(PerSensor {
-            gyro: one_degree(),
-            accel,
-        })
-        .unwrap();
-        assert!(
-            matches!(causes[..], [PriorCause::Turned { sensor: "gyro", .. }]),
-            "{causes:?}"
-        );
+        let gyro = one_degree();
+        let causes = found(PerSensor { gyro, accel }).unwrap();
+        assert_eq!(causes[0]["cause"], "turned");
+        assert_eq!(causes[0]["sensor"], "gyro");
+        assert_eq!(causes.as_array().unwrap().len(), 1);
     }
 
     #[test]
@@ -257,15 +271,8 @@ mod tests {
         let accel = Matrix3::identity() * 1.5;
         let gyro = Matrix3::identity();
         let causes = found(PerSensor { gyro, accel }).unwrap();
-        assert!(
-            matches!(
-                causes[..],
-                [PriorCause::Unit {
-                    sensor: "accel",
-                    ..
-                }]
-            ),
-            "{causes:?}"
-        );
+        assert_eq!(causes.as_array().unwrap().len(), 1);
+        assert_eq!(causes[0]["cause"], "unit");
+        assert_eq!(causes[0]["sensor"], "accel");
     }
 }

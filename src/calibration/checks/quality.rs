@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::attitude::{exp, level, log, tilt};
 use crate::calibration::error::CalibrationError;
@@ -13,36 +14,40 @@ use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::start::closed_form::{ClosedForm, Reference, six_position_by};
 use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
-use crate::recording::LabelledMotion;
+use crate::recording::{LabelledMotion, Segment};
 use crate::run::{Dwell, Run};
 
 /// What a calibration leaves of gravity and of turns.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Over the whole record.
     pub all: Measures,
     /// By a calibration that did without every other dwell, over those dwells and the turns that end in
-    /// them; none where the rest does not give a calibration.
+    /// them; absent if the rest does not give a calibration.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Measures>,
 }
 
 /// Departures from what is known of a body that stands and turns.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Measures {
     /// Magnitude of the mean specific force in each dwell minus gravity, m/s².
+    #[serde(rename = "gravity_m_s2")]
     pub gravity: Spread,
     /// Angle in each dwell between gravity as the accelerometers see it and as the gyros carry it there
     /// from the dwell before, rad.
+    #[serde(rename = "direction_rad")]
     pub direction: Spread,
     /// What the gyros are wrong by over a turn between two readings of the table, or about the axis of a
     /// labelled turn, rad.
+    #[serde(rename = "turns_rad")]
     pub turns: Spread,
 }
 
 /// Several departures of one kind.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Spread {
-    /// How many.
+    /// How many; the rest is zero if there are none.
     pub count: usize,
     /// Their root mean square.
     pub rms: f64,
@@ -213,31 +218,41 @@ fn measures(
             before = Some(dwell);
         }
     }
-    let (run, dwells) = (problem.run(), problem.dwells().collect::<Vec<_>>());
-    for segment in &run.recording.segments {
-        let ends = |dwell: &&Dwell| {
-            dwell
-                .samples
-                .contains(&segment.samples.end.saturating_sub(1))
-        };
-        let of_judged = dwells.iter().position(ends).is_none_or(&judged);
-        if let Some(LabelledMotion::Turns { axis, angle }) = segment.motion
-            && of_judged
-            && !run.recording.imu.is_lost(&segment.samples)
-        {
-            let triads = at.instrument(&problem.model, (run, 0), &segment.samples);
-            let triad = &triads.gyro;
-            let correction = triad.correction().ok_or_else(|| singular(&triads))?;
-            let sum: Vector3<f64> = run.recording.imu.gyro.sum(segment.samples.clone());
-            let duration = segment.samples.len() as f64 * run.recording.imu.period;
-            turns.push(axis.dot(&(correction * (sum - triad.bias * duration))) - angle);
-        }
-    }
+    turns.extend(labelled_turns(problem, at, judged)?);
     Ok(Measures {
         gravity: gravity.into_iter().collect(),
         direction: direction.into_iter().collect(),
         turns: turns.into_iter().collect(),
     })
+}
+
+/// Gyro angle minus labelled angle, rad, of labelled turns that end in judged dwells.
+fn labelled_turns(
+    problem: &Problem,
+    at: &Linearisation,
+    judged: impl Fn(usize) -> bool,
+) -> Result<Vec<f64>, CalibrationError> {
+    let (run, mut turns) = (problem.run(), Vec::new());
+    let imu = &run.recording.imu;
+    let dwells: Vec<&Dwell> = problem.dwells().collect();
+    for Segment {
+        samples, motion, ..
+    } in &run.recording.segments
+    {
+        let last = samples.end.saturating_sub(1);
+        let ends = |dwell: &&Dwell| dwell.samples.contains(&last);
+        let of_judged = dwells.iter().position(ends).is_none_or(&judged);
+        if let Some(LabelledMotion::Turns { axis, angle }) = motion
+            && of_judged
+            && !imu.is_lost(samples)
+        {
+            let triads = at.instrument(&problem.model, (run, 0), samples);
+            let correction = triads.gyro.correction().ok_or_else(|| singular(&triads))?;
+            let bias = triads.gyro.bias * (samples.len() as f64 * imu.period);
+            turns.push(axis.dot(&(correction * (imu.gyro.sum(samples.clone()) - bias))) - angle);
+        }
+    }
+    Ok(turns)
 }
 
 /// Attitude after these samples, navigated from this one before.

@@ -1,11 +1,16 @@
 //! What a triad's outputs leave of any linear triad, whatever its parameters.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde_json::json;
 
-use crate::statistics::chi_square_limit;
+use super::finding::{Finding, widened_by};
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
+use crate::units::ARCSEC;
 
-/// Chance that residuals of a right model ring, of each of the two triads.
-const FALSE_ALARM: f64 = 1e-3 / 2.0;
+/// The kind of the finding that residuals are large.
+pub const LARGE: &str = "residuals-large";
+/// Triads whose residuals are tested.
+const TRIADS: f64 = 2.0;
 /// Directions of unit columns that are shorter than this beside all others are rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -85,18 +90,18 @@ impl Residuals {
         self.explained.nrows() - self.explained.ncols()
     }
 
-    /// What χ² stays below if model and σ are right, but for one run in two thousand.
+    /// Limit of χ² if model and σ are right, at a triad's share of the false-alarm rate.
     pub fn limit(&self) -> f64 {
         limit(self.degrees())
     }
 
-    /// Whether this χ² is within its limit where so many equations are left out.
+    /// Whether this χ² is within its limit with this many equations left out.
     pub fn would_hold(&self, chi_square: f64, left_out: usize) -> bool {
         let degrees = self.degrees().saturating_sub(left_out);
         degrees > 0 && chi_square <= limit(degrees)
     }
 
-    /// By how much all σ are to grow, the Birge ratio; none where χ² is within its limit.
+    /// By how much all σ are to grow, the Birge ratio; absent if χ² is within its limit.
     pub fn growth(&self) -> Option<f64> {
         let (chi_square, degrees) = (self.chi_square(), self.degrees());
         (chi_square > self.limit()).then(|| (chi_square / degrees as f64).sqrt())
@@ -114,6 +119,45 @@ impl Residuals {
             groups: (0..groups.len()).filter(alike).collect(),
             without: self.chi_square() - largest,
         }
+    }
+
+    /// The finding that residuals of `gyro`, `accel` or `both triads` are large, by which the largest σ grew so much.
+    /// The worst equations are those of dwells or moves at these times in s; a base off level and north by
+    /// this σ in rad may explain all.
+    pub fn large(
+        &self,
+        of: &str,
+        growth: f64,
+        (worst, without): (Vec<[f64; 2]>, f64),
+        base: Option<f64>,
+    ) -> Finding {
+        let (chi_square, degrees, limit) = (self.chi_square(), self.degrees(), self.limit());
+        let times = worst
+            .iter()
+            .map(|[begin, end]| format!("{begin:.1}–{end:.1} s"));
+        let times: Vec<String> = times.collect();
+        let cause = match base {
+            Some(base) => format!(
+                "A table base off level and north by {:.1}″ (1σ) explains all of it, and σ include that: state \
+                 level_sigma_arcsec and north_sigma_arcsec in [turntable].",
+                base / ARCSEC
+            ),
+            None => "If that is small, look there for a bump, a wrong label or attitude; if not, check noise figures \
+                     in [imu.noise], the level and north of the table, the direction of gravity, and whether the \
+                     sensor was really still."
+                .to_owned(),
+        };
+        let text = format!(
+            "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit \
+             {limit:.0}). turncal widened σ {}. The worst interval is {}; without it χ² is {without:.0}. {cause}",
+            widened_by(growth),
+            times.join(" or ")
+        );
+        let figures = json!({
+            "of": of, "chi_square": chi_square, "degrees": degrees, "limit": limit, "growth": growth,
+            "worst": worst, "without": without, "base": base
+        });
+        Finding::new(LARGE, text, figures)
     }
 
     /// By how much χ² falls if these equations may be off by anything.
@@ -151,7 +195,7 @@ impl Residuals {
 }
 
 fn limit(degrees: usize) -> f64 {
-    chi_square_limit(degrees as f64, FALSE_ALARM)
+    chi_square_limit(degrees as f64, FALSE_ALARM / TRIADS)
 }
 
 #[cfg(test)]

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
+use serde_json::json;
 
-use super::finding::Finding;
+use super::finding::{Finding, triad_name, widened_by};
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::parameters::{ParameterMatrix, parameter};
 use crate::calibration::problem::Problem;
@@ -32,7 +33,7 @@ pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMat
         let first = parameter(sensor, 0);
         covariance
             .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
-            .copy_from(&of_triad(problem, sensor, triads.get(sensor)));
+            .copy_from(&of_triad(problem, sensor, triads.get(sensor)).unwrap_or_default());
     }
     covariance
 }
@@ -51,29 +52,31 @@ pub fn rounded(
         let without = with - of_triad(by_rounding);
         let growth = largest_growth(without.as_slice(), with.as_slice());
         let steps = problem.runs().map(|run| steps(run, sensor).max());
-        let (unit, name) = match sensor {
+        let (value, unit) = match sensor {
             Sensor::Gyro => (DEGREE, "°/s"),
             Sensor::Accel => (1.0, "m/s²"),
         };
-        (growth >= SAID).then(|| Finding::Rounded {
-            of: sensor.name(),
-            step: steps.fold(0.0, f64::max) / unit,
-            unit: name,
-            growth,
-        })
+        let step = steps.fold(0.0, f64::max) / value;
+        let text = format!(
+            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover \
+             where within a step they are. turncal widened σ {}. Log more digits.",
+            triad_name(sensor),
+            widened_by(growth)
+        );
+        let of = sensor.name();
+        let figures = json!({ "of": of, "step": step, "unit": unit, "growth": growth });
+        (growth >= SAID).then(|| Finding::new("rounded", text, figures))
     };
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Covariance of a triad's parameters by what rounding leaves in means of dwells.
+/// Covariance of a triad's parameters by rounding errors in means of dwells; absent if rows are not rounded.
 fn of_triad(
     problem: &Problem,
     sensor: Sensor,
     triad: &Triad,
-) -> SMatrix<f64, PER_TRIAD, PER_TRIAD> {
-    let Some(correction) = triad.correction() else {
-        return SMatrix::zeros();
-    };
+) -> Option<SMatrix<f64, PER_TRIAD, PER_TRIAD>> {
+    let correction = triad.correction()?;
     let response = triad.response();
     let sigma = &problem.model.prior_sigma;
     let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
@@ -83,7 +86,7 @@ fn of_triad(
         .collect();
     let variance: f64 = means.iter().map(|mean| mean.variance.mean()).sum();
     if variance == 0.0 {
-        return SMatrix::zeros();
+        return None;
     }
     let variance = variance / means.len() as f64;
     let along_gravity = sensor == Sensor::Accel && problem.model.aiding == Aiding::Velocity;
@@ -111,15 +114,11 @@ fn of_triad(
                 .or_insert_with(TriadVector::zeros) += error;
         }
     }
-    let Some(information) = information.cholesky() else {
-        return SMatrix::zeros();
-    };
-    let mut covariance = SMatrix::zeros();
-    for error in of_steps.values() {
-        let error = information.solve(error).component_mul(&sigma);
-        covariance += error * error.transpose();
-    }
-    covariance
+    let information = information.cholesky()?;
+    let errors = of_steps
+        .values()
+        .map(|error| information.solve(error).component_mul(&sigma));
+    Some(errors.map(|error| error * error.transpose()).sum())
 }
 
 /// Steps of rates along body axes, rad/s or m/s²; zero where there are none, or where rows are integrals, which may
@@ -146,7 +145,7 @@ struct Mean {
     variance: Vector3<f64>,
 }
 
-/// Means of a recording's dwells; none where rows are not rounded.
+/// Means of a recording's dwells; absent if rows are not rounded.
 fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) -> Vec<Mean> {
     let steps = steps(run, sensor);
     if steps == Vector3::zeros() {

@@ -1,8 +1,12 @@
-//! Innovations that no noise figure explains.
+//! Results that may not be used: of iterations without convergence, or with residuals that no noise figure explains.
+
+use serde_json::json;
 
 use super::finding::Finding;
 use super::innovation::{Innovation, Nis};
+use super::residuals::LARGE;
 use crate::calibration::noise::LOG_SIGMA;
+use crate::calibration::outcome::Outcome;
 use crate::statistics::chi_square_limit;
 
 /// Part of stated figures that are wrong by more than what is still taken for a wrong figure.
@@ -17,36 +21,51 @@ fn limit() -> f64 {
     (2.0 * LOG_SIGMA * sigmas).exp()
 }
 
+/// The finding where the iterations of the filter did not converge.
+pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
+    let passes = outcome.passes.len();
+    let step = outcome
+        .passes
+        .last()
+        .map_or(f64::NAN, |pass| pass.largest_step);
+    let text = format!(
+        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Use neither values nor \
+         σ. Check scale, units and axes in run.toml with turncal check."
+    );
+    let figures = json!({ "passes": passes, "largest_step_sigma": step });
+    (!outcome.converged).then(|| Finding::new("not-converged", text, figures))
+}
+
 /// The finding where innovations are larger than a data sheet's figures can be wrong by.
 pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
-    let limit = limit();
     let distances = innovations.iter().map(|i| (i.time, i.distance()));
     let worst = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;
-    (all.mean > limit).then_some(Finding::Unexplained {
-        nis: all.mean,
-        limit,
-        worst: worst.0,
+    rejected("NIS", all.mean, worst.0)
+}
+
+/// The same of a closed form, by the findings of its residuals: no noise explains the residuals even without the
+/// worst position, nor does the table's base.
+pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
+    let large = findings.iter().filter(|finding| finding.kind == LARGE);
+    let without_base = large.filter(|finding| finding.figures["base"].is_null());
+    without_base.into_iter().find_map(|finding| {
+        let figure = |name: &str| finding.figures[name].as_f64();
+        let nis = figure("without")? / figure("degrees")?;
+        let begin = finding.figures["worst"][0][0].as_f64();
+        rejected("χ² over its degrees of freedom", nis, begin.unwrap_or(0.0))
     })
 }
 
-/// The same of a closed form, by what its findings say of residuals: no noise explains what is left even where
-/// any one position may be off, and the table's base does not explain it.
-pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
+/// The finding where this mean of squares, the largest of them at this time in s, is beyond the limit.
+fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let limit = limit();
-    findings.iter().find_map(|finding| match finding {
-        Finding::ResidualsLarge {
-            degrees,
-            without,
-            worst,
-            base: None,
-            ..
-        } => {
-            let nis = without / *degrees as f64;
-            let worst = worst.first().map_or(0.0, |[begin, _]| *begin);
-            (nis > limit).then_some(Finding::Unexplained { nis, limit, worst })
-        }
-        _ => None,
-    })
+    let text = format!(
+        "Calibration rejected: {name} is {nis:.0}, far above anything a wrong noise figure could cause (limit \
+         {limit:.0}). The largest residual is at {worst:.1} s: look there for lost, repeated or wrapped rows, a bump \
+         or another table position. If it is noise after all, rerun with --noise auto."
+    );
+    let figures = json!({ "nis": nis, "limit": limit, "worst": worst });
+    (nis > limit).then(|| Finding::unexplained(text, figures))
 }
 
 #[cfg(test)]

@@ -2,13 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::learn::{FALSE_ALARM, INTERVAL};
+use super::learn::INTERVAL;
 use super::likelihood_ratio::limit;
 use super::report::{NoiseReport, SourceFigures};
 use super::source::Source;
 use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::noise_learnt::noise_learnt;
 use crate::calibration::model::Model;
 use crate::calibration::problem::Problem;
+use crate::statistics::FALSE_ALARM;
 
 /// Longest step of ln of a variance.
 const LONGEST: f64 = 3.0;
@@ -121,11 +123,7 @@ impl ByHand {
 
     /// What it is told with.
     pub fn finding(&self, report: &NoiseReport) -> Finding {
-        Finding::NoiseLearnt {
-            ratio: self.ratio,
-            limit: Self::limit(),
-            sources: report.sources.clone(),
-        }
+        noise_learnt(self.ratio, Self::limit(), &report.sources)
     }
 
     /// What became of the noise of a problem with it.

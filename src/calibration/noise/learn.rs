@@ -15,9 +15,8 @@ use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;
 use crate::calibration::solved::Solved;
+use crate::statistics::FALSE_ALARM;
 
-/// Chance that stated figures which are right are given up.
-pub const FALSE_ALARM: f64 = 1e-3;
 /// Chance that the score test calls for a likelihood ratio which it does not need. The score of a variance
 /// is as skewed as χ², so it does not decide; but it costs no fit.
 const SCREEN: f64 = 0.05;

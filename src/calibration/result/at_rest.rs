@@ -1,15 +1,16 @@
 //! What the outputs of an instrument that stands in one attitude say of its temperature.
 //!
-//! Nothing turns, so scale factors and installation are not seen, and of the accelerometers' biases only how they
+//! Nothing turns, so scale factors and misalignment are not observed, and of the accelerometers' biases only how they
 //! change. Each output is a polynomial in the temperature of its axis and follows its rate, by least squares over
-//! means of seconds; the order is the one that predicts best what is left out (cross-validation over blocks, Stone
-//! 1974, J. Royal Statistical Society B 36(2)), for noise of such a record is anything but white.
+//! means of seconds; the order is the one that predicts blocks best that are left out (cross-validation over blocks, Stone
+//! 1974, J. Royal Statistical Society B 36(2)), because noise of such a record is far from white.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::observability::{not_observed, temperature_not_seen};
 use crate::calibration::estimate::Estimate;
-use crate::calibration::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
+use crate::calibration::parameters::{PARAMETERS, parameter, parameter_name, sensor_and_parameter};
 use crate::calibration::several::thermal::{Coefficient, Thermal};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{
@@ -54,9 +55,9 @@ pub struct AxisAtRest {
     pub functions: Vec<usize>,
     /// RMS about the mean.
     pub about_mean: f64,
-    /// RMS of what is left.
+    /// RMS of the residuals.
     pub residual: f64,
-    /// RMS of what is left where it was left out.
+    /// RMS of the residuals in blocks that were left out of the fit.
     pub cross_validated: f64,
     /// The same of a cubic without its rate, which is what most compensate.
     pub cubic: f64,
@@ -113,43 +114,40 @@ impl AtRest {
 
     /// How the biases change.
     pub(in crate::calibration) fn thermal(&self) -> Thermal {
-        let all: Vec<(&AxisAtRest, usize)> = self
-            .axes
-            .iter()
-            .flat_map(|of| (0..of.functions.len()).map(move |k| (of, k)))
-            .collect();
-        let n = all.len();
-        let mut cross = DMatrix::zeros(PARAMETERS, n);
+        let n = self.axes.iter().map(|of| of.functions.len()).sum();
         let mut sigma = PerSensor::<ThermalCoefficients>::default();
-        let coefficients = all.iter().enumerate().map(|(place, &(of, k))| {
-            let coefficient = Coefficient {
-                sensor: of.sensor,
-                parameter: PER_TRIAD - 3 + of.axis,
-                function: of.functions[k],
-                axis: of.axis,
-            };
-            cross[(coefficient.index(), place)] = of.covariance[(0, k + 1)];
-            *coefficient.of_mut(&mut sigma) = f64::INFINITY;
-            coefficient
-        });
-        let coefficients: Vec<Coefficient> = coefficients.collect();
-        let covariance = DMatrix::from_fn(n, n, |i, j| {
-            let ((one, k), (other, l)) = (all[i], all[j]);
-            let same = (one.sensor, one.axis) == (other.sensor, other.axis);
-            if same {
-                one.covariance[(k + 1, l + 1)]
-            } else {
-                0.0
+        let (mut coefficients, mut values) = (Vec::new(), Vec::new());
+        let mut covariance = DMatrix::zeros(n, n);
+        let mut cross = DMatrix::zeros(PARAMETERS, n);
+        for of in &self.axes {
+            let (first, more) = (coefficients.len(), of.functions.len());
+            let own = of.covariance.view((1, 1), (more, more));
+            covariance
+                .view_mut((first, first), (more, more))
+                .copy_from(&own);
+            let with_reference = of.covariance.view((0, 1), (1, more));
+            let bias = PER_TRIAD - 3 + of.axis;
+            cross
+                .view_mut((parameter(of.sensor, bias), first), (1, more))
+                .copy_from(&with_reference);
+            for &function in &of.functions {
+                let coefficient = Coefficient {
+                    sensor: of.sensor,
+                    parameter: bias,
+                    function,
+                    axis: of.axis,
+                };
+                *coefficient.of_mut(&mut sigma) = f64::INFINITY;
+                coefficients.push(coefficient);
+                values.push(of.coefficients[function]);
             }
-        });
+        }
         Thermal {
             model: ThermalModel {
                 range: self.range,
                 sigma,
             },
-            values: DVector::from_fn(n, |i, _| {
-                all[i].0.coefficients[all[i].0.functions[all[i].1]]
-            }),
+            values: values.into(),
             coefficients,
             covariance,
             cross,
@@ -158,27 +156,20 @@ impl AtRest {
 
     /// What it does not show.
     pub fn findings(&self, estimate: &Estimate) -> Vec<Finding> {
-        let form = estimate.form();
-        let unseen = (0..PARAMETERS).filter(|&index| {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            Triad::kind(of_triad) != ParameterKind::Bias || sensor == Sensor::Accel
-        });
-        let turned = (0..PARAMETERS).filter(|&index| {
-            let (_, of_triad) = sensor_and_parameter(index);
-            Triad::kind(of_triad) != ParameterKind::Bias
-        });
-        let names = |of: &mut dyn Iterator<Item = usize>| -> Vec<String> {
+        let names = |which: &dyn Fn(Sensor, bool) -> bool| -> Vec<String> {
+            let is = |&index: &usize| {
+                let (sensor, of_triad) = sensor_and_parameter(index);
+                which(sensor, Triad::kind(of_triad) == ParameterKind::Bias)
+            };
+            let form = estimate.form();
+            let of = (0..PARAMETERS).filter(is);
             of.filter_map(|index| parameter_name(form, index)).collect()
         };
-        vec![
-            Finding::NotObserved {
-                by: "an instrument that stands in one attitude",
-                parameters: names(&mut { unseen }),
-            },
-            Finding::TemperatureNotSeen {
-                parameters: names(&mut { turned }),
-            },
-        ]
+        let by = "an instrument that stands in one attitude";
+        let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
+        let turned = names(&|_, is_bias| !is_bias);
+        let findings = [not_observed(by, hidden), temperature_not_seen(turned)];
+        findings.into_iter().flatten().collect()
     }
 
     /// Both triads at the reference temperature and 1σ of their parameters: biases of the gyros within Earth rate, all
@@ -208,11 +199,8 @@ impl AxisAtRest {
         mut seconds: Vec<Second>,
         highest_order: usize,
     ) -> Option<Self> {
-        let mean = seconds.iter().map(|s| s.output).sum::<f64>() / seconds.len() as f64;
-        let rms = |of: &mut dyn Iterator<Item = f64>| {
-            let (sum, count) = of.fold((0.0, 0usize), |(sum, n), x| (sum + x * x, n + 1));
-            (sum / count.max(1) as f64).sqrt()
-        };
+        let count = seconds.len() as f64;
+        let mean = seconds.iter().map(|s| s.output).sum::<f64>() / count;
         let choices = (0..=highest_order.min(RATE)).flat_map(|order| {
             let plain: Vec<usize> = (0..order).collect();
             let with_rate = plain.iter().copied().chain([RATE]).collect();
@@ -226,31 +214,28 @@ impl AxisAtRest {
         });
         let (score, functions) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let cubic = cross_validated(range, &seconds, &[0, 1, 2]).unwrap_or(f64::NAN);
-        let all: Vec<&Second> = seconds.iter().collect();
-        let (solution, inverse) = fit(range, &all, &functions)?;
+        let curve = Curve::fit(range, &functions, seconds.iter())?;
         for second in &mut seconds {
-            second.residual = second.output - predicted(range, second, &functions, &solution);
+            second.residual = second.output - curve.output(second.temperature, second.rate);
         }
-        let residual = rms(&mut seconds.iter().map(|s| s.residual));
-        // What is left of neighbouring seconds is alike: as many are independent as blocks.
-        let independent = (seconds.len() as f64 * TEMPERATURE_SPACING / BLOCK).max(1.0);
-        let alike = seconds.len() as f64 / independent;
+        // Residuals of neighbouring seconds are alike: as many are independent as there are blocks.
+        let independent = (count * TEMPERATURE_SPACING / BLOCK).max(1.0);
+        let covariance = &curve.inverse * (score * score * (count / independent));
         let mut coefficients = ThermalValues::zeros();
         for (k, &function) in functions.iter().enumerate() {
-            coefficients[function] = solution[k + 1];
+            coefficients[function] = curve.solution[k + 1];
         }
-        let covariance = inverse * (score * score * alike);
         Some(Self {
             sensor,
             axis,
-            at_reference: (solution[0], covariance[(0, 0)].sqrt()),
+            at_reference: (curve.solution[0], covariance[(0, 0)].sqrt()),
             coefficients,
             covariance,
-            about_mean: rms(&mut seconds.iter().map(|s| s.output - mean)),
-            residual,
+            about_mean: rms(seconds.iter().map(|s| s.output - mean))?,
+            residual: rms(seconds.iter().map(|s| s.residual))?,
             cross_validated: score,
             cubic,
-            hysteresis: hysteresis(range, &seconds, &functions, &solution),
+            hysteresis: curve.hysteresis(&seconds),
             functions,
             seconds,
         })
@@ -259,103 +244,101 @@ impl AxisAtRest {
     /// Change of the output from that at the reference at a temperature in °C that does not change, and 1σ of the
     /// output then: of the curve, and of a second about it.
     pub fn at(&self, range: &ThermalRange, temperature: f64) -> (f64, f64) {
-        let values = range.values(temperature, 0.0);
-        let n = self.functions.len();
-        let row = DVector::from_fn(n + 1, |k, _| match k.checked_sub(1) {
-            None => 1.0,
-            Some(k) => values[self.functions[k]],
-        });
+        let row = row(range, &self.functions, temperature, 0.0);
         let variance = row.dot(&(&self.covariance * &row));
         (
-            self.coefficients.dot(&values),
+            self.coefficients.dot(&range.values(temperature, 0.0)),
             variance.max(0.0).sqrt().hypot(self.cross_validated),
         )
     }
 }
 
-fn row(range: &ThermalRange, second: &Second, functions: &[usize]) -> DVector<f64> {
-    let values = range.values(second.temperature, second.rate);
-    DVector::from_fn(functions.len() + 1, |k, _| match k.checked_sub(1) {
-        None => 1.0,
-        Some(k) => values[functions[k]],
-    })
+/// One, then these functions of a temperature and its rate.
+fn row(range: &ThermalRange, functions: &[usize], temperature: f64, rate: f64) -> DVector<f64> {
+    let values = range.values(temperature, rate);
+    let of_functions = functions.iter().map(|&function| values[function]);
+    DVector::from_iterator(
+        functions.len() + 1,
+        std::iter::once(1.0).chain(of_functions),
+    )
 }
 
-fn predicted(
-    range: &ThermalRange,
-    second: &Second,
-    functions: &[usize],
-    solution: &DVector<f64>,
-) -> f64 {
-    row(range, second, functions).dot(solution)
+/// Root mean square; none of none.
+fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0usize), |(sum, n), x| (sum + x * x, n + 1));
+    (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-/// Least squares, and the inverse of the normal matrix.
-fn fit(
-    range: &ThermalRange,
-    seconds: &[&Second],
-    functions: &[usize],
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let n = functions.len() + 1;
-    let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
-    for second in seconds {
-        let row = row(range, second, functions);
-        normal.ger(1.0, &row, &row, 1.0);
-        right.axpy(second.output, &row, 1.0);
+/// An output as a linear function of some functions of temperature.
+struct Curve<'a> {
+    range: &'a ThermalRange,
+    functions: &'a [usize],
+    /// Output at the reference, then the coefficient of each function.
+    solution: DVector<f64>,
+    /// Inverse of the normal matrix.
+    inverse: DMatrix<f64>,
+}
+
+impl<'a> Curve<'a> {
+    /// By least squares; `None` where the seconds do not determine it.
+    fn fit<'s>(
+        range: &'a ThermalRange,
+        functions: &'a [usize],
+        seconds: impl Iterator<Item = &'s Second>,
+    ) -> Option<Self> {
+        let n = functions.len() + 1;
+        let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for second in seconds {
+            let row = row(range, functions, second.temperature, second.rate);
+            normal.ger(1.0, &row, &row, 1.0);
+            right.axpy(second.output, &row, 1.0);
+        }
+        let factor = normal.cholesky()?;
+        Some(Self {
+            range,
+            functions,
+            solution: factor.solve(&right),
+            inverse: factor.inverse(),
+        })
     }
-    let factor = normal.cholesky()?;
-    Some((factor.solve(&right), factor.inverse()))
+
+    fn output(&self, temperature: f64, rate: f64) -> f64 {
+        row(self.range, self.functions, temperature, rate).dot(&self.solution)
+    }
+
+    /// Cooling minus heating where both passed the same temperature: of the residuals without its rate.
+    fn hysteresis(&self, seconds: &[Second]) -> Vec<(f64, f64)> {
+        let range = self.range;
+        let limit = CHANGES * range.largest_rate;
+        let bins = ((range.highest - range.lowest) / SAME).ceil().max(1.0) as usize;
+        let mut sums = vec![[(0.0, 0usize); 2]; bins];
+        for second in seconds.iter().filter(|second| second.rate.abs() > limit) {
+            let residual = second.output - self.output(second.temperature, 0.0);
+            let bin = ((second.temperature - range.lowest) / SAME) as usize;
+            if let Some(of) = sums.get_mut(bin) {
+                let (sum, count) = &mut of[usize::from(second.rate < 0.0)];
+                (*sum, *count) = (*sum + residual, *count + 1);
+            }
+        }
+        let means = sums.iter().enumerate().filter_map(|(bin, of)| {
+            let [heats, cools] = of.map(|(sum, count)| (count > 0).then(|| sum / count as f64));
+            Some((range.lowest + (bin as f64 + 0.5) * SAME, cools? - heats?))
+        });
+        means.collect()
+    }
 }
 
 /// RMS of every other block by a fit to the others.
 fn cross_validated(range: &ThermalRange, seconds: &[Second], functions: &[usize]) -> Option<f64> {
     let block = (BLOCK / TEMPERATURE_SPACING) as usize;
-    let (mut sum, mut count) = (0.0, 0usize);
+    let mut off = Vec::new();
     for left_out in 0..2 {
-        let is_out = |k: usize| (k / block) % 2 == left_out;
-        let kept = seconds.iter().enumerate().filter(|(k, _)| !is_out(*k));
-        let kept: Vec<&Second> = kept.map(|(_, second)| second).collect();
-        let (solution, _) = fit(range, &kept, functions)?;
-        for (_, second) in seconds.iter().enumerate().filter(|(k, _)| is_out(*k)) {
-            let off = second.output - predicted(range, second, functions, &solution);
-            sum += off * off;
-            count += 1;
-        }
+        let numbered = seconds.iter().enumerate();
+        let (out, kept): (Vec<_>, Vec<_>) =
+            numbered.partition(|(k, _)| (k / block) % 2 == left_out);
+        let curve = Curve::fit(range, functions, kept.into_iter().map(|(_, second)| second))?;
+        let of = |second: &Second| second.output - curve.output(second.temperature, second.rate);
+        off.extend(out.into_iter().map(|(_, second)| of(second)));
     }
-    (count > 0).then(|| (sum / count as f64).sqrt())
-}
-
-/// Cooling less heating where both passed the same temperature: of what a polynomial leaves without its rate.
-fn hysteresis(
-    range: &ThermalRange,
-    seconds: &[Second],
-    functions: &[usize],
-    solution: &DVector<f64>,
-) -> Vec<(f64, f64)> {
-    let steady = |second: &Second| Second {
-        rate: 0.0,
-        ..*second
-    };
-    let limit = CHANGES * range.largest_rate;
-    let bins = ((range.highest - range.lowest) / SAME).ceil().max(1.0) as usize;
-    let mut sums = vec![[(0.0, 0usize); 2]; bins];
-    for second in seconds.iter().filter(|second| second.rate.abs() > limit) {
-        let left = second.output - predicted(range, &steady(second), functions, solution);
-        let bin = ((second.temperature - range.lowest) / SAME) as usize;
-        let cools = usize::from(second.rate < 0.0);
-        if let Some(of) = sums.get_mut(bin) {
-            of[cools].0 += left;
-            of[cools].1 += 1;
-        }
-    }
-    let both = sums
-        .iter()
-        .enumerate()
-        .filter(|(_, of)| of[0].1 > 0 && of[1].1 > 0);
-    both.map(|(bin, [heats, cools])| {
-        let mean = |(sum, count): &(f64, usize)| sum / *count as f64;
-        let middle = range.lowest + (bin as f64 + 0.5) * SAME;
-        (middle, mean(cools) - mean(heats))
-    })
-    .collect()
+    rms(off.into_iter())
 }

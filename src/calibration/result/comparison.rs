@@ -28,7 +28,7 @@ pub struct Comparison {
     pub nominal: PerSensor<Nominal>,
     /// The truth, or the first calibration.
     pub reference: Canonical,
-    /// Whether the reference is a truth, taken as exact but for the σ that it may state.
+    /// Whether the reference is a truth, taken as exact except for the σ that it may state.
     pub against_truth: bool,
     /// Indices of the parameters that the common frame leaves free.
     pub parameters: Vec<usize>,
@@ -55,21 +55,43 @@ pub struct Side {
     /// Calibration minus reference, normalised: scale factors relative, angles pure numbers, biases in
     /// rad/s or m/s².
     pub difference: ParameterVector,
-    /// 1σ of the difference, as if both came of different data; none where a side claims no σ.
+    /// 1σ of the difference, as if both came of different data; absent if a side claims no σ.
     pub difference_sigma: Option<ParameterVector>,
     /// Consistency of the difference with its covariance; none without covariance.
     pub nees: Option<Nees>,
 }
 
 impl Side {
-    /// Difference in units of its σ; none where there is no σ.
+    /// A calibration minus the reference of this covariance.
+    fn new(
+        calibration: Canonical,
+        reference: &Canonical,
+        known: Option<ParameterMatrix>,
+        parameters: &[usize],
+    ) -> Self {
+        let difference = calibration.vector() - reference.vector();
+        let covariance = known.zip(calibration.covariance).map(|(a, b)| a + b);
+        // A reference without σ, a truth, has no correlations to miss.
+        let correlated =
+            calibration.correlated && (reference.correlated || reference.covariance.is_none());
+        Self {
+            difference,
+            difference_sigma: covariance.map(|p| p.diagonal().map(|v| v.max(0.0).sqrt())),
+            nees: covariance
+                .filter(|_| correlated)
+                .and_then(|p| nees(&difference, &p, parameters)),
+            calibration,
+        }
+    }
+
+    /// Difference in units of its σ; absent if there is no σ.
     pub fn z(&self, parameter: usize) -> Option<f64> {
         let sigma = self.difference_sigma?[parameter];
         (sigma > 0.0).then(|| self.difference[parameter] / sigma)
     }
 }
 
-/// Holds calibrations against the truth, or, without one, against the first of them.
+/// Compares calibrations with the truth, or, without one, with the first of them.
 pub fn compare(
     calibrations: &[Named],
     truth: Option<Named>,
@@ -83,55 +105,32 @@ pub fn compare(
     };
     same_units(&all)?;
     let in_accelerometer_frame = |n: &Named| n.record.body_frame == BodyFrame::Accelerometer;
-    let body_frame = if all.iter().any(in_accelerometer_frame) {
-        BodyFrame::Accelerometer
-    } else {
-        BodyFrame::Table
+    let body_frame = match all.iter().any(in_accelerometer_frame) {
+        true => BodyFrame::Accelerometer,
+        false => BodyFrame::Table,
     };
     let nominal = own_nominal(first.record);
-    let all: Vec<Canonical> = all
-        .iter()
-        .map(|n| Canonical::new(n.name, n.record, &nominal, body_frame))
-        .collect::<Result<_, _>>()?;
+    let canonical = |n: &Named| Canonical::new(n.name, n.record, &nominal, body_frame);
+    let mut all: Vec<Canonical> = all.iter().map(canonical).collect::<Result<_, _>>()?;
     let parameters = free_parameters(body_frame);
     let estimates = &all[usize::from(truth.is_some())..];
     let scatter = (estimates.len() >= 3).then(|| {
         let reference = all[0].vector();
         scatter(estimates, &reference, &parameters)
     });
-    let mut all = all.into_iter();
-    let Some(reference) = all.next() else {
-        return Err(ComparisonError::Single);
-    };
+    let reference = all.remove(0);
     let exact = truth.is_some().then(ParameterMatrix::zeros);
-    let reference_covariance = reference.covariance.or(exact);
-    let sides = all
-        .map(|calibration| {
-            let difference = calibration.vector() - reference.vector();
-            let covariance = reference_covariance
-                .zip(calibration.covariance)
-                .map(|(a, b)| a + b);
-            // A reference without σ, a truth, has no correlations to miss.
-            let correlated =
-                calibration.correlated && (reference.correlated || reference.covariance.is_none());
-            Side {
-                difference,
-                difference_sigma: covariance.map(|p| p.diagonal().map(|v| v.max(0.0).sqrt())),
-                nees: covariance
-                    .filter(|_| correlated)
-                    .and_then(|p| nees(&difference, &p, &parameters)),
-                calibration,
-            }
-        })
-        .collect();
+    let known = reference.covariance.or(exact);
+    let sides = all.into_iter();
+    let sides = sides.map(|calibration| Side::new(calibration, &reference, known, &parameters));
     Ok(Comparison {
         body_frame,
         nominal,
-        reference,
         against_truth: truth.is_some(),
-        parameters,
-        sides,
+        sides: sides.collect(),
         scatter,
+        reference,
+        parameters,
     })
 }
 

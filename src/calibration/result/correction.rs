@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
-use super::frame::triad_record;
 use crate::calibration::result::Calibration;
 use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
 use crate::recording::{Near, TEMPERATURE_SPACING};
@@ -101,10 +100,7 @@ pub enum CorrectionError {
 impl Correction {
     /// What a record says. Constants of the table (`table.…`) are no part of it.
     pub fn of_record(record: &Calibration) -> Result<Self, CorrectionError> {
-        let sensitivity = PerSensor::from_fn(|sensor| {
-            let triad = triad_record(record, sensor);
-            Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j])
-        });
+        let sensitivity = PerSensor::from_fn(|sensor| record.triad(sensor).sensitivity());
         let inverse = |sensor: Sensor| {
             let sensitivity = sensitivity.get(sensor);
             let volume = sensitivity.determinant()
@@ -128,7 +124,7 @@ impl Correction {
                 gyro: inverse(Sensor::Gyro)?,
                 accel: inverse(Sensor::Accel)?,
             },
-            bias: PerSensor::from_fn(|sensor| Vector3::from(triad_record(record, sensor).bias)),
+            bias: PerSensor::from_fn(|sensor| Vector3::from(record.triad(sensor).bias)),
             sensitivity,
             terms,
             changing: record
@@ -143,29 +139,25 @@ impl Correction {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
             let expected = run.instrument.unit.get(sensor);
-            if let Some(unit) = &record.unit
-                && unit.get(sensor) != expected
-            {
+            let unit = record.unit.as_ref().map(|unit| unit.get(sensor));
+            if let Some(unit) = unit.filter(|&unit| unit != expected) {
                 return Err(CorrectionError::Unit {
                     sensor,
-                    calibration: unit.get(sensor).clone(),
+                    calibration: unit.clone(),
                     run: expected.clone(),
                 });
             }
             let scales = correction.sensitivity.get(sensor).diagonal();
-            for (axis, (&calibration, &run)) in scales
-                .iter()
-                .zip(&run.instrument.nominal.get(sensor).0)
-                .enumerate()
-            {
-                if !(1.0 / SCALE_FACTOR..=SCALE_FACTOR).contains(&(calibration / run)) {
-                    return Err(CorrectionError::Scale {
-                        sensor,
-                        axis: AXES[axis],
-                        calibration,
-                        run,
-                    });
-                }
+            let nominal = &run.instrument.nominal.get(sensor).0;
+            let near = 1.0 / SCALE_FACTOR..=SCALE_FACTOR;
+            let other = (0..3).find(|&axis| !near.contains(&(scales[axis] / nominal[axis])));
+            if let Some(axis) = other {
+                return Err(CorrectionError::Scale {
+                    sensor,
+                    axis: AXES[axis],
+                    calibration: scales[axis],
+                    run: nominal[axis],
+                });
             }
         }
         Ok(correction)

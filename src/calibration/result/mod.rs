@@ -22,6 +22,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::checks::dwell_scatter::DwellScatter;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::quality::Quality;
+use crate::calibration::parameters::sensor_and_parameter;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
@@ -41,7 +44,7 @@ pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bi
 /// A calibration with its accuracy and how it was reached, or a known truth.
 ///
 /// Only the two triads are always there. Unknown fields are ignored when reading.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
     pub format: String,
@@ -100,14 +103,14 @@ pub struct Calibration {
     pub consistency: Option<ConsistencyRecord>,
     /// What it leaves of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub quality: Option<QualityRecord>,
+    pub quality: Option<Quality>,
     /// What error terms did, or would do.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<DirectionRecord>,
-    /// The noise that was used; none where a file states noise of another kind, as a truth may.
+    /// The noise that was used; absent if a file states noise of another kind, as a truth may.
     #[serde(
         default,
         deserialize_with = "if_known",
@@ -119,7 +122,7 @@ pub struct Calibration {
     pub warnings: Vec<String>,
     /// The same as values: kind, words, figures.
     #[serde(default)]
-    pub findings: Vec<FindingRecord>,
+    pub findings: Vec<Finding>,
     /// Names of parameters that were not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
@@ -177,7 +180,7 @@ pub struct NoiseRecord {
     /// Policy, test and sources.
     #[serde(flatten)]
     pub report: NoiseReport,
-    /// `[imu.noise]` of what was learnt, to be pasted into `run.toml`; none where nothing was.
+    /// `[imu.noise]` of what was learnt, to be pasted into `run.toml`; absent if nothing was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run_toml: Option<String>,
 }
@@ -220,7 +223,7 @@ pub enum Method {
 }
 
 /// Values of one triad.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct TriadRecord {
     /// The file's quantity per second for one rad/s or m/s².
     pub scale: [f64; 3],
@@ -242,7 +245,7 @@ pub struct ConsistencyRecord {
     /// Of the table's attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
-    /// Scores of dwells over their σ; none where there are too few dwells.
+    /// Scores of dwells over their σ; absent if there are too few dwells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dwells: Option<DwellScatter>,
     /// Of the attitude that does not change at standstill, without a table.
@@ -259,38 +262,6 @@ pub struct NisRecord {
     pub nis_interval: [f64; 2],
 }
 
-/// What a calibration leaves of what is known without a truth.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct QualityRecord {
-    /// Over the whole record.
-    pub all: MeasuresRecord,
-    /// In dwells whose observations a calibration did without, and over the turns that end in them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out: Option<MeasuresRecord>,
-}
-
-/// Departures from gravity and from known turns.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct MeasuresRecord {
-    /// Magnitude of specific force at rest minus gravity.
-    pub gravity_m_s2: SpreadRecord,
-    /// Angle between up as gyros carry it over a turn and as accelerometers see it after.
-    pub direction_rad: SpreadRecord,
-    /// Angle between a turn as gyros see it and as table or label say.
-    pub turns_rad: SpreadRecord,
-}
-
-/// Several departures.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct SpreadRecord {
-    /// How many; the rest is zero if none.
-    pub count: usize,
-    /// Root mean square.
-    pub rms: f64,
-    /// The largest.
-    pub largest: f64,
-}
-
 /// An error term against the same run without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
@@ -298,13 +269,12 @@ pub struct BlockRecord {
     pub block: String,
     /// Whether it was on; if not, it was tried with its usual σ.
     pub on: bool,
-    /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; none where there is
+    /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; absent if there is
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
     /// By how much the cost, −2 ln of likelihood and prior, falls with it.
     pub merit_gain: f64,
-    /// What that stays below where the block's errors are not there, but for its share of one false alarm
-    /// in a thousand runs.
+    /// Its limit at this term's share of the false-alarm rate.
     pub merit_gain_limit: f64,
     /// Whether it is more, so that the data ask for the block.
     pub asked_for: bool,
@@ -323,18 +293,6 @@ pub struct DirectionRecord {
     pub words: String,
     /// Name and component of the parameters that make up most of it; squares of all sum to one.
     pub parts: BTreeMap<String, f64>,
-}
-
-/// What must be known before using the values.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FindingRecord {
-    /// What kind of finding, such as `not-observed`.
-    pub kind: String,
-    /// In words.
-    pub text: String,
-    /// Its figures by name.
-    #[serde(default)]
-    pub figures: serde_json::Value,
 }
 
 /// A raw output of both triads and what it becomes, gyro first.
@@ -362,104 +320,103 @@ impl Index<&str> for Calibration {
 }
 
 impl Calibration {
+    /// A record of the two triads and nothing else, as a truth is.
+    pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            gyro,
+            accel,
+            ..Self::default()
+        }
+    }
+
+    /// The values of a triad.
+    pub fn triad(&self, sensor: Sensor) -> &TriadRecord {
+        match sensor {
+            Sensor::Gyro => &self.gyro,
+            Sensor::Accel => &self.accel,
+        }
+    }
+
     /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity,
     /// `gyro.installation.xy` the entry of the installation matrix in that row and column, the same for
     /// `accel`; then parameters of error terms such as `accel.time_offset`, in SI.
     pub fn get(&self, name: &str) -> Option<&f64> {
-        let in_triad = |sensor: &str| match sensor {
-            "gyro" => Some(&self.gyro),
-            "accel" => Some(&self.accel),
-            _ => None,
-        };
-        let mut parts = name.splitn(3, '.');
-        let (sensor, kind) = (parts.next()?, parts.next()?);
-        let found = in_triad(sensor).zip(parts.next());
-        let found = found.and_then(|(triad, axes)| entry(triad, kind, axes));
-        found.or_else(|| self.terms.get(name).map(|term| &term.value))
+        let of_triads = entry(name, |sensor| self.triad(sensor));
+        of_triads.or_else(|| self.terms.get(name).map(|term| &term.value))
     }
 
     /// 1σ of a parameter by name, zero where it was not estimated; none if no σ is claimed.
     pub fn sigma_of(&self, name: &str) -> Option<&f64> {
         let sigma = self.sigma.as_ref()?;
-        let mut parts = name.splitn(3, '.');
-        let triad = match parts.next()? {
-            "gyro" => Some(&sigma.gyro),
-            "accel" => Some(&sigma.accel),
-            _ => None,
-        };
-        let found = triad.zip(parts.next()).zip(parts.next());
-        let found = found.and_then(|((triad, kind), axes)| entry(triad, kind, axes));
-        found.or_else(|| self.terms.get(name)?.sigma.as_ref())
-    }
-
-    /// A record of the two triads and nothing else, as a truth is.
-    pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
-        Self {
-            format: FORMAT.to_owned(),
-            method: None,
-            installation_form: None,
-            aiding: None,
-            body_frame: BodyFrame::default(),
-            gyro,
-            accel,
-            unit: None,
-            sigma: None,
-            parameters: Vec::new(),
-            covariance: Vec::new(),
-            budget: None,
-            terms: BTreeMap::new(),
-            temperature: None,
-            recordings: Vec::new(),
-            gravity: None,
-            passes: None,
-            converged: None,
-            consistency: None,
-            quality: None,
-            blocks: Vec::new(),
-            observability: Vec::new(),
-            noise: None,
-            warnings: Vec::new(),
-            findings: Vec::new(),
-            fixed: Vec::new(),
-            equation: None,
-            correction: None,
-            test_vectors: Vec::new(),
-            provenance: None,
-            meta: BTreeMap::new(),
-        }
+        let of_triads = entry(name, |sensor| sigma.get(sensor));
+        of_triads.or_else(|| self.terms.get(name)?.sigma.as_ref())
     }
 }
 
-fn entry<'a>(triad: &'a TriadRecord, kind: &str, axes: &str) -> Option<&'a f64> {
-    let mut axes = axes
-        .chars()
-        .map(|axis| AXES.iter().position(|&a| a == axis));
-    let (first, second, more) = (axes.next()??, axes.next(), axes.next());
-    match (kind, second, more) {
-        ("scale", None, None) => Some(&triad.scale[first]),
-        ("bias", None, None) => Some(&triad.bias[first]),
-        ("installation", Some(Some(column)), None) => Some(&triad.installation[first][column]),
+/// The entry of that name, such as `gyro.scale.x`, of these triads.
+fn entry<'a>(name: &str, triad: impl Fn(Sensor) -> &'a TriadRecord) -> Option<&'a f64> {
+    let mut parts = name.splitn(3, '.');
+    let (of, kind, axes) = (parts.next()?, parts.next()?, parts.next()?);
+    let triad = triad(Sensor::ALL.into_iter().find(|sensor| sensor.name() == of)?);
+    let place = |axis: char| AXES.iter().position(|&a| a == axis);
+    let axes: Option<Vec<usize>> = axes.chars().map(place).collect();
+    match (kind, &axes?[..]) {
+        ("scale", &[axis]) => Some(&triad.scale[axis]),
+        ("bias", &[axis]) => Some(&triad.bias[axis]),
+        ("installation", &[row, column]) => Some(&triad.installation[row][column]),
         _ => None,
     }
 }
 
-/// Both triads of a record, normalised by these nominal scales and split in a form. A record may
-/// hold any installation matrix, so the split goes through `K C`, which all forms share.
+impl TriadRecord {
+    /// A triad in the file's quantity, by nominal scales.
+    pub(in crate::calibration) fn new(triad: &Triad, nominal: &Nominal) -> Self {
+        Self {
+            scale: triad.scale.component_mul(&nominal.0).into(),
+            installation: rows(&triad.installation()),
+            bias: triad.bias.component_mul(&nominal.0).into(),
+        }
+    }
+
+    /// `K C`: the file's quantity per second for one rad/s or m/s² along each body axis.
+    pub fn sensitivity(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| self.scale[i] * self.installation[i][j])
+    }
+
+    /// The triad, normalised by nominal scales and split in a form. A record may hold any installation matrix, so
+    /// the split goes through `K C`, which all forms share.
+    pub fn triad(&self, nominal: &Nominal, form: InstallationForm) -> Triad {
+        let sensitivity = self.normalised(nominal);
+        let bias = Vector3::from(self.bias).component_div(&nominal.0);
+        Triad::from_sensitivity(form, &sensitivity, bias)
+    }
+
+    /// `K C` over nominal scales.
+    fn normalised(&self, nominal: &Nominal) -> Matrix3<f64> {
+        let sensitivity = self.sensitivity();
+        Matrix3::from_fn(|i, j| sensitivity[(i, j)] / nominal.0[i])
+    }
+}
+
+/// A matrix row by row.
+pub fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    m.transpose().data.0
+}
+
+/// What brings a parameter to the file's unit.
+fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    nominal.get(sensor).factor(of_triad)
+}
+
+/// Both triads of a record, normalised by these nominal scales and split in a form.
 pub fn triads_of(
     record: &Calibration,
     nominal: &PerSensor<Nominal>,
     form: InstallationForm,
 ) -> PerSensor<Triad> {
-    PerSensor::from_fn(|sensor| {
-        let triad = match sensor {
-            Sensor::Gyro => &record.gyro,
-            Sensor::Accel => &record.accel,
-        };
-        let nominal = nominal.get(sensor).0;
-        let a = Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j] / nominal[i]);
-        let bias = Vector3::from(triad.bias).component_div(&nominal);
-        Triad::from_sensitivity(form, &a, bias)
-    })
+    PerSensor::from_fn(|sensor| record.triad(sensor).triad(nominal.get(sensor), form))
 }
 
 #[cfg(test)]

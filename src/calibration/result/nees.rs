@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::calibration::checks::innovation::mean_square_interval;
 
 /// A correlation matrix has no information in directions whose eigenvalue is below this: they are
-/// zero but for rounding, as where three angles stand for six.
+/// zero except for rounding, as where three angles stand for six.
 const NO_DIRECTION: f64 = 1e-11;
 
 /// Normalised estimation error squared, a mean of squares of independent numbers of σ 1.

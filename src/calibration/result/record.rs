@@ -2,31 +2,29 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::at_rest::AtRest;
 use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FORMAT, FORMAT_WITH_TEMPERATURE, FindingRecord, GravityRecord, MeasuresRecord, Method,
-    NisRecord, NoiseRecord, QualityRecord, SpreadRecord, TermRecord, TestVector, TriadRecord,
+    FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
+    TestVector, TriadRecord, factor, rows,
 };
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_name};
-use crate::calibration::budget::{Budget, BudgetSource};
+use crate::calibration::budget::Budget;
 use crate::calibration::checks::error_term_test::ErrorTermTest;
 use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::innovation::{Consistency, Nis};
-use crate::calibration::checks::observability::Direction;
-use crate::calibration::checks::quality::{Measures, Quality, Spread};
+use crate::calibration::checks::innovation::Nis;
+use crate::calibration::checks::quality::Quality;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, parameter, parameter_name, sensor_and_parameter,
-};
+use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, parameter, parameter_name};
 use crate::calibration::problem::Problem;
 use crate::calibration::start::closed_form::ClosedForm;
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
+    TriadVector,
 };
 use crate::run::Run;
 
@@ -38,17 +36,6 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// Its findings with those that come of the tests of error terms and of what these add to its covariance.
-    pub(in crate::calibration) fn findings_with(&self, tests: &[ErrorTermTest]) -> Vec<Finding> {
-        let growth = self.growth_by(BudgetSource::UnseenVariation);
-        // What rounds to once as large says nothing.
-        let may_vary = (growth >= 1.05).then_some(Finding::BiasesMayVary { growth });
-        let left_off = self.growth_by(BudgetSource::ErrorTermsLeftOff);
-        let shown = ErrorTermTest::most_significant(tests, Some(left_off));
-        let findings = self.findings.iter().cloned();
-        findings.chain(may_vary).chain(shown).collect()
-    }
-
     /// This calibration of a problem, with what error terms did to it and what it leaves of gravity and
     /// turns.
     pub fn record(
@@ -57,51 +44,81 @@ impl Outcome {
         tests: &[ErrorTermTest],
         quality: &Quality,
     ) -> Calibration {
-        let findings = self.findings_with(tests);
-        Calibration {
-            quality: Some(quality_record(quality)),
+        let (run, estimate) = (problem.run(), &self.estimate);
+        let equation = match self.auxiliary.has_terms() {
+            true => EQUATION_WITH_TERMS,
+            false => EQUATION,
+        };
+        let format = match self.thermal {
+            Some(_) => FORMAT_WITH_TEMPERATURE,
+            None => FORMAT,
+        };
+        let thermal = self.thermal.as_ref();
+        let record = Calibration {
+            format: format.to_owned(),
             method: Some(Method::Ekf),
-            provenance: Some(problem.provenance()),
-            blocks: tests.iter().map(BlockRecord::from).collect(),
             aiding: Some(problem.model.aiding),
             terms: self.auxiliary.records(),
-            equation: Some(match self.auxiliary.has_terms() {
-                true => EQUATION_WITH_TERMS.to_owned(),
-                false => EQUATION.to_owned(),
-            }),
-            gravity: Some(GravityRecord {
-                m_s2: self.gravity.0,
-                sigma_m_s2: self.gravity.1,
-            }),
+            temperature: thermal.map(|thermal| ThermalRecord::of(thermal, estimate, run)),
+            recordings: RecordingRecord::all(self, run),
+            gravity: Some(GravityRecord::new(self.gravity)),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
-            consistency: Some(ConsistencyRecord {
-                dwells: self.dwell_scatter,
-                ..consistency_record(&self.consistency)
-            }),
-            observability: direction_records(self),
-            noise: Some(noise_record(self)),
-            format: match self.thermal {
-                Some(_) => FORMAT_WITH_TEMPERATURE.to_owned(),
-                None => FORMAT.to_owned(),
-            },
-            temperature: self
-                .thermal
-                .as_ref()
-                .map(|thermal| ThermalRecord::of(thermal, &self.estimate, problem.run())),
-            recordings: RecordingRecord::all(self, problem.run()),
-            warnings: texts(&findings),
-            findings: findings.iter().map(FindingRecord::from).collect(),
-            ..self
-                .estimate
-                .record(problem.run(), problem.model.aiding.body_frame())
+            consistency: Some(self.consistency_record()),
+            quality: Some(*quality),
+            blocks: tests.iter().map(BlockRecord::from).collect(),
+            observability: self.direction_records(),
+            noise: Some(self.noise_record()),
+            equation: Some(equation.to_owned()),
+            provenance: Some(problem.provenance()),
+            ..estimate.record(run, problem.model.aiding.body_frame())
+        };
+        record.with_findings(self.findings_with(tests))
+    }
+
+    fn consistency_record(&self) -> ConsistencyRecord {
+        let of = |nis: Nis| NisRecord {
+            nis: nis.mean,
+            nis_interval: nis.interval.into(),
+        };
+        let some = |nis: Nis| (nis.count > 0).then(|| of(nis));
+        let consistency = &self.consistency;
+        ConsistencyRecord {
+            all: of(consistency.all),
+            velocity: some(consistency.velocity),
+            table: some(consistency.table),
+            attitude: some(consistency.attitude),
+            dwells: self.dwell_scatter,
+        }
+    }
+
+    fn direction_records(&self) -> Vec<DirectionRecord> {
+        let form = self.estimate.form();
+        let directions = self.observability.directions.iter();
+        let record = directions.map(|direction| {
+            let parts = direction.parts.iter();
+            let named =
+                parts.map(|part| Some((parameter_name(form, part.parameter)?, part.component)));
+            DirectionRecord {
+                remaining: direction.remaining,
+                words: direction.words(form),
+                parts: named.flatten().collect(),
+            }
+        });
+        record.collect()
+    }
+
+    fn noise_record(&self) -> NoiseRecord {
+        let time = |sensor| Some(self.model.noise.get(sensor).gauss_markov?.correlation_time);
+        NoiseRecord {
+            report: self.noise.clone(),
+            run_toml: self.noise.run_toml(PerSensor::from_fn(time)),
         }
     }
 }
 
 impl Calibration {
-    /// With what each source adds to its uncertainty, and with the covariance that is the sum of that: the
-    /// same as the filter's, but for the rounding of passes in which variances fall by ten orders of magnitude.
+    /// With what each source adds to its uncertainty.
     pub(in crate::calibration) fn take_budget(
         &mut self,
         run: &Run,
@@ -109,70 +126,71 @@ impl Calibration {
         budget: &Budget,
         tests: &[ErrorTermTest],
     ) {
-        let estimate = Estimate {
-            triads: outcome.estimate.triads,
-            covariance: budget.covariance(),
-        };
-        let estimated: Vec<usize> = estimate.estimated().collect();
-        self.budget = Some(budget.record(&estimated, |index| factor(run, index), tests));
-        let Self {
-            sigma, covariance, ..
-        } = estimate.record(run, self.body_frame);
-        (self.sigma, self.covariance) = (sigma, covariance);
+        let estimated: Vec<usize> = outcome.estimate.estimated().collect();
+        let factor = |index| factor(&run.instrument.nominal, index);
+        self.budget = Some(budget.record(&estimated, factor, tests));
+    }
+
+    fn with_findings(self, findings: Vec<Finding>) -> Self {
+        Self {
+            warnings: findings
+                .iter()
+                .map(|finding| finding.text.clone())
+                .collect(),
+            findings,
+            ..self
+        }
     }
 }
 
-/// What brings a parameter to the file's unit.
-fn factor(run: &Run, index: usize) -> f64 {
-    let (sensor, of_triad) = sensor_and_parameter(index);
-    run.instrument.nominal.get(sensor).factor(of_triad)
+impl GravityRecord {
+    fn new((m_s2, sigma_m_s2): (f64, f64)) -> Self {
+        Self { m_s2, sigma_m_s2 }
+    }
 }
 
 impl ClosedForm {
     /// This calibration of a problem, with what it leaves of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
-        Calibration {
-            quality: Some(quality_record(quality)),
+        let (run, noise) = (problem.run(), self.noise.clone());
+        let record = Calibration {
+            quality: Some(*quality),
             method: Some(Method::SixPosition),
             provenance: Some(problem.provenance()),
-            gravity: Some(GravityRecord {
-                m_s2: problem.run().site.gravity,
-                sigma_m_s2: problem.run().site.gravity_sigma,
-            }),
-            noise: self.noise.clone().map(|report| NoiseRecord {
+            gravity: Some(GravityRecord::new((
+                run.site.gravity,
+                run.site.gravity_sigma,
+            ))),
+            noise: noise.map(|report| NoiseRecord {
                 run_toml: report.run_toml(PerSensor::default()),
                 report,
             }),
-            warnings: texts(&self.findings),
-            findings: self.findings.iter().map(FindingRecord::from).collect(),
-            ..self
-                .estimate
-                .record(problem.run(), self.reference.body_frame())
-        }
+            ..self.estimate.record(run, self.reference.body_frame())
+        };
+        record.with_findings(self.findings.clone())
     }
 }
 
 impl AtRest {
-    /// What of a calibration it says: biases of the gyros within Earth rate, and how all biases change; the rest is as
-    /// it was known before.
+    /// What of a calibration it gives: biases of the gyros within Earth rate, and how all biases change; the rest is
+    /// the prior.
     pub fn record(&self, run: &Run) -> Calibration {
         let (triads, sigma) = self.triads(run);
-        let mut covariance = ParameterMatrix::zeros();
-        for sensor in Sensor::ALL {
-            for (of_triad, sigma) in sigma.get(sensor).iter().enumerate() {
-                let index = parameter(sensor, of_triad);
-                covariance[(index, index)] = sigma * sigma;
-            }
-        }
-        let estimate = Estimate { triads, covariance };
-        let findings = self.findings(&estimate);
-        Calibration {
+        let sigma = [sigma.gyro, sigma.accel];
+        let variances = ParameterMatrix::from_fn(|i, j| match i == j {
+            true => sigma[i / PER_TRIAD][i % PER_TRIAD].powi(2),
+            false => 0.0,
+        });
+        let estimate = Estimate {
+            triads,
+            covariance: variances,
+        };
+        let record = Calibration {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),
             temperature: Some(ThermalRecord::of(&self.thermal(), &estimate, run)),
-            warnings: texts(&findings),
-            findings: findings.iter().map(FindingRecord::from).collect(),
             ..estimate.record(run, BodyFrame::Accelerometer)
-        }
+        };
+        record.with_findings(self.findings(&estimate))
     }
 }
 
@@ -181,11 +199,8 @@ impl Auxiliary {
     pub fn records(&self) -> BTreeMap<String, TermRecord> {
         let sigma = self.sigma();
         let record = |k: usize| {
-            let record = TermRecord {
-                value: self.values[k],
-                sigma: Some(sigma[k]),
-            };
-            Some((auxiliary_name(k)?, record))
+            let (value, sigma) = (self.values[k], Some(sigma[k]));
+            Some((auxiliary_name(k)?, TermRecord { value, sigma }))
         };
         self.estimated().filter_map(record).collect()
     }
@@ -194,139 +209,79 @@ impl Auxiliary {
 impl Estimate {
     /// The record of this estimate, with a model card: equation, correction, test vectors.
     pub fn record(&self, run: &Run, body_frame: BodyFrame) -> Calibration {
-        let form = self.form();
-        let sigma = self.sigma();
-        let estimated: Vec<usize> = self.estimated().collect();
-        let names = |wanted: bool| {
-            (0..PARAMETERS)
-                .filter(|&i| (self.covariance[(i, i)] > 0.0) == wanted)
-                .filter_map(|i| parameter_name(form, i))
-                .collect()
+        let (form, sigma) = (self.form(), self.sigma());
+        let nominal = &run.instrument.nominal;
+        let (estimated, fixed): (Vec<usize>, Vec<usize>) =
+            (0..PARAMETERS).partition(|&i| self.covariance[(i, i)] > 0.0);
+        let names = |of: &[usize]| of.iter().filter_map(|&i| parameter_name(form, i)).collect();
+        let entry = |i, j| self.covariance[(i, j)] * factor(nominal, i) * factor(nominal, j);
+        let row = |&i: &usize| estimated.iter().map(|&j| entry(i, j)).collect();
+        let sigma_of = |sensor| {
+            let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
+            TriadRecord::of_sigma(form, &sigma.into_owned(), nominal.get(sensor))
         };
-        let of = |sensor| triad_record(self.triads.get(sensor), run.instrument.nominal.get(sensor));
         let correction = |sensor| {
-            let sensitivity = run
-                .instrument
-                .nominal
-                .get(sensor)
-                .sensitivity(self.triads.get(sensor));
+            let sensitivity = nominal.get(sensor).sensitivity(self.triads.get(sensor));
             Some(rows(&sensitivity.try_inverse()?))
         };
+        let correction = correction(Sensor::Gyro).zip(correction(Sensor::Accel));
+        let vectors = TEST_INPUTS.map(|input| self.test_vector(nominal, input));
         Calibration {
-            installation_form: Some(form),
             body_frame,
-            unit: Some(run.instrument.unit.clone()),
-            sigma: Some(PerSensor::from_fn(|sensor| {
-                let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
-                sigma_record(
-                    form,
-                    &sigma.into_owned(),
-                    run.instrument.nominal.get(sensor),
-                )
-            })),
-            parameters: names(true),
-            covariance: estimated
-                .iter()
-                .map(|&i| {
-                    estimated
-                        .iter()
-                        .map(|&j| self.covariance[(i, j)] * factor(run, i) * factor(run, j))
-                        .collect()
-                })
-                .collect(),
-            fixed: names(false),
+            sigma: Some(PerSensor::from_fn(sigma_of)),
+            parameters: names(&estimated),
+            covariance: estimated.iter().map(row).collect(),
+            fixed: names(&fixed),
             equation: Some(EQUATION.to_owned()),
-            correction: correction(Sensor::Gyro)
-                .zip(correction(Sensor::Accel))
-                .map(|(gyro, accel)| PerSensor { gyro, accel }),
-            test_vectors: TEST_INPUTS
-                .iter()
-                .map(|input| self.test_vector(run, input))
-                .collect(),
+            correction: correction.map(|(gyro, accel)| PerSensor { gyro, accel }),
+            test_vectors: vectors.into(),
             meta: run.recording.meta.clone(),
-            ..Calibration::new(of(Sensor::Gyro), of(Sensor::Accel))
+            ..truth_record(&self.triads, run)
         }
     }
 
-    fn test_vector(&self, run: &Run, input: &[f64; 6]) -> TestVector {
+    fn test_vector(&self, nominal: &PerSensor<Nominal>, calibrated: [f64; 6]) -> TestVector {
         let mut raw = [0.0; 6];
         for (sensor, first) in [(Sensor::Gyro, 0), (Sensor::Accel, 3)] {
-            let u = Vector3::from_column_slice(&input[first..first + 3]);
+            let u = Vector3::from_column_slice(&calibrated[first..first + 3]);
             let output = self.triads.get(sensor).output(&u);
-            let output = output.component_mul(&run.instrument.nominal.get(sensor).0);
+            let output = output.component_mul(&nominal.get(sensor).0);
             raw[first..first + 3].copy_from_slice(output.as_slice());
         }
-        TestVector {
-            raw,
-            calibrated: *input,
-        }
+        TestVector { raw, calibrated }
     }
 }
 
 /// The record of a known truth.
 pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
-    let of = |sensor| triad_record(truth.get(sensor), run.instrument.nominal.get(sensor));
+    let nominal = &run.instrument.nominal;
     Calibration {
         installation_form: Some(truth.gyro.form),
         unit: Some(run.instrument.unit.clone()),
-        ..Calibration::new(of(Sensor::Gyro), of(Sensor::Accel))
+        ..Calibration::new(
+            TriadRecord::new(&truth.gyro, &nominal.gyro),
+            TriadRecord::new(&truth.accel, &nominal.accel),
+        )
     }
 }
 
-fn triad_record(triad: &Triad, nominal: &Nominal) -> TriadRecord {
-    TriadRecord {
-        scale: triad.scale.component_mul(&nominal.0).into(),
-        installation: rows(&triad.installation()),
-        bias: triad.bias.component_mul(&nominal.0).into(),
-    }
-}
-
-/// σ of a triad's parameters where they stand in its record, in their own units.
-pub fn sigma_rows(form: InstallationForm, sigma: &crate::imu::TriadVector) -> TriadRecord {
-    sigma_record(form, sigma, &Nominal(Vector3::repeat(1.0)))
-}
-
-fn sigma_record(
-    form: InstallationForm,
-    sigma: &crate::imu::TriadVector,
-    nominal: &Nominal,
-) -> TriadRecord {
-    let triad = Triad::from_vector(form, sigma);
-    let mut installation = [[0.0; 3]; 3];
-    for (angle, &(row, column)) in form.angle_names().iter().enumerate() {
-        installation[row][column] = triad.angles[angle];
-        if form == InstallationForm::ThreeAngle {
-            installation[column][row] = triad.angles[angle];
+impl TriadRecord {
+    /// σ of a triad's parameters where they stand in its record, by nominal scales.
+    pub fn of_sigma(form: InstallationForm, sigma: &TriadVector, nominal: &Nominal) -> Self {
+        let triad = Triad::from_vector(form, sigma);
+        let mut installation = [[0.0; 3]; 3];
+        for (angle, &(row, column)) in form.angle_names().iter().enumerate() {
+            installation[row][column] = triad.angles[angle];
+            if form == InstallationForm::ThreeAngle {
+                installation[column][row] = triad.angles[angle];
+            }
+        }
+        Self {
+            scale: triad.scale.component_mul(&nominal.0).abs().into(),
+            installation,
+            bias: triad.bias.component_mul(&nominal.0).abs().into(),
         }
     }
-    TriadRecord {
-        scale: triad.scale.component_mul(&nominal.0).abs().into(),
-        installation,
-        bias: triad.bias.component_mul(&nominal.0).abs().into(),
-    }
-}
-
-pub fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
-}
-
-fn direction_records(outcome: &Outcome) -> Vec<DirectionRecord> {
-    let form = outcome.estimate.form();
-    let record = |direction: &Direction| DirectionRecord {
-        remaining: direction.remaining,
-        words: direction.words(form),
-        parts: direction
-            .parts
-            .iter()
-            .filter_map(|part| Some((parameter_name(form, part.parameter)?, part.component)))
-            .collect(),
-    };
-    outcome
-        .observability
-        .directions
-        .iter()
-        .map(record)
-        .collect()
 }
 
 impl From<&ErrorTermTest> for BlockRecord {
@@ -340,71 +295,6 @@ impl From<&ErrorTermTest> for BlockRecord {
             asked_for: test.significant(),
             nis_without: test.without,
             nis_with: test.with,
-        }
-    }
-}
-
-fn quality_record(quality: &Quality) -> QualityRecord {
-    let spread = |spread: &Spread| SpreadRecord {
-        count: spread.count,
-        rms: spread.rms,
-        largest: spread.largest,
-    };
-    let measures = |measures: &Measures| MeasuresRecord {
-        gravity_m_s2: spread(&measures.gravity),
-        direction_rad: spread(&measures.direction),
-        turns_rad: spread(&measures.turns),
-    };
-    QualityRecord {
-        all: measures(&quality.all),
-        held_out: quality.held_out.as_ref().map(measures),
-    }
-}
-
-fn consistency_record(consistency: &Consistency) -> ConsistencyRecord {
-    let Consistency {
-        all,
-        velocity,
-        table,
-        attitude,
-    } = consistency;
-    let of = |nis: &Nis| NisRecord {
-        nis: nis.mean,
-        nis_interval: [nis.interval.0, nis.interval.1],
-    };
-    let some = |nis: &Nis| (nis.count > 0).then(|| of(nis));
-    ConsistencyRecord {
-        all: of(all),
-        velocity: some(velocity),
-        table: some(table),
-        attitude: some(attitude),
-        dwells: None,
-    }
-}
-
-fn noise_record(outcome: &Outcome) -> NoiseRecord {
-    let correlation_time = PerSensor::from_fn(|sensor| {
-        let gauss_markov = outcome.model.noise.get(sensor).gauss_markov;
-        gauss_markov.map(|gauss_markov| gauss_markov.correlation_time)
-    });
-    NoiseRecord {
-        report: outcome.noise.clone(),
-        run_toml: outcome.noise.run_toml(correlation_time),
-    }
-}
-
-fn texts(findings: &[Finding]) -> Vec<String> {
-    findings.iter().map(Finding::to_string).collect()
-}
-
-impl From<&Finding> for FindingRecord {
-    fn from(finding: &Finding) -> Self {
-        // A finding is a kind and figures, which JSON always holds.
-        let value = serde_json::to_value(finding).unwrap_or_default();
-        Self {
-            kind: value["kind"].as_str().unwrap_or_default().to_owned(),
-            text: finding.to_string(),
-            figures: value["figures"].clone(),
         }
     }
 }

@@ -4,13 +4,17 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::factor;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{PARAMETERS, parameter_name, sensor_and_parameter};
+use crate::calibration::parameters::{
+    PARAMETERS, ParameterVector, parameter_index, parameter_name, sensor_and_parameter,
+};
+use crate::calibration::pass::Own;
 use crate::calibration::several::thermal::Thermal;
 use crate::imu::{
-    AXES, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalRange,
-    ThermalState, ThermalValues, powers,
+    AXES, HIGHEST_ORDER, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients,
+    ThermalRange, ThermalState, ThermalValues, powers,
 };
 use crate::run::Run;
 
@@ -19,7 +23,7 @@ const EQUATION: &str = "p(T) = p + sum_k c_k (P_k(tau) - P_k(tau_ref)) + c_rate 
                         tau = (2 T - lowest - highest) / (highest - lowest); P_k Legendre; p stands in scale, \
                         installation (off the diagonal) and bias. powers: the same as sum_k a_k (T - reference)^k.";
 
-/// Beyond its range a polynomial is not known; by so many kelvin a sensor may be off.
+/// Error of a temperature sensor, K, within which a temperature still counts as within a range.
 pub const TOLERANCE: f64 = 1.0;
 
 /// How the parameters of a calibration change with temperature.
@@ -29,7 +33,7 @@ pub struct ThermalRecord {
     #[serde(default)]
     pub equation: String,
     /// Where they hold, by triad; the calibration itself is at the reference.
-    pub range: PerSensor<RangeRecord>,
+    pub range: PerSensor<ThermalRange>,
     /// The coefficients, in the units of their parameters.
     pub coefficients: Vec<CoefficientRecord>,
     /// Their covariance, in this order.
@@ -41,19 +45,6 @@ pub struct ThermalRecord {
     /// Coefficients of the powers of T − reference in K from the first on, by parameter.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub powers: BTreeMap<String, Vec<f64>>,
-}
-
-/// The range of a triad's polynomials.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct RangeRecord {
-    /// Lowest temperature.
-    pub lowest_degc: f64,
-    /// Highest temperature.
-    pub highest_degc: f64,
-    /// Temperature of the calibration.
-    pub reference_degc: f64,
-    /// Largest magnitude of the rate of temperature.
-    pub largest_rate_k_per_s: f64,
 }
 
 /// One coefficient.
@@ -79,7 +70,7 @@ pub struct RecordingRecord {
     /// Mean temperature of its dwells, of all axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
-    /// Its parameters alone, by name; none where it alone gives no calibration.
+    /// Its parameters alone, by name; absent if it alone gives no calibration.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub alone: BTreeMap<String, ValueRecord>,
     /// By how much its parameters differ from what all have in common; `mounting.x` and so on, in rad: how the whole
@@ -97,77 +88,59 @@ pub struct ValueRecord {
     pub sigma: f64,
 }
 
-impl From<&ThermalRange> for RangeRecord {
-    fn from(range: &ThermalRange) -> Self {
-        Self {
-            lowest_degc: range.lowest,
-            highest_degc: range.highest,
-            reference_degc: range.reference,
-            largest_rate_k_per_s: range.largest_rate,
-        }
+impl CoefficientRecord {
+    /// Of a parameter of a form and a function of temperature, by their indices; `None` if there is no such parameter.
+    fn new(
+        (form, index, function): (InstallationForm, usize, usize),
+        value: f64,
+        sigma: Option<f64>,
+    ) -> Option<Self> {
+        Some(Self {
+            parameter: parameter_name(form, index)?,
+            order: (function != RATE).then_some(function + 1),
+            value,
+            sigma,
+        })
     }
-}
 
-impl From<&RangeRecord> for ThermalRange {
-    fn from(range: &RangeRecord) -> Self {
-        Self {
-            lowest: range.lowest_degc,
-            highest: range.highest_degc,
-            reference: range.reference_degc,
-            largest_rate: range.largest_rate_k_per_s,
-        }
+    /// Index of its parameter in a form, and of its function of temperature; `None` where there is none.
+    pub fn place(&self, form: InstallationForm) -> Option<(usize, usize)> {
+        let function = match self.order {
+            None => RATE,
+            Some(order @ 1..=RATE) => order - 1,
+            Some(_) => return None,
+        };
+        Some((parameter_index(form, &self.parameter)?, function))
     }
 }
 
 impl ThermalRecord {
     /// Of estimates at the reference and of coefficients, in the file's quantity.
     pub(in crate::calibration) fn of(thermal: &Thermal, estimate: &Estimate, run: &Run) -> Self {
-        let form = estimate.form();
-        let factor = |index: usize| {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            run.instrument.nominal.get(sensor).factor(of_triad)
-        };
-        let of = |k: usize| factor(thermal.coefficients[k].index());
+        let (form, nominal) = (estimate.form(), &run.instrument.nominal);
+        let of = |k: usize| factor(nominal, thermal.coefficients[k].index());
         let n = thermal.coefficients.len();
-        let names = thermal.coefficients.iter().enumerate();
-        let coefficients = names.filter_map(|(k, coefficient)| {
-            Some(CoefficientRecord {
-                parameter: parameter_name(form, coefficient.index())?,
-                order: (coefficient.function != RATE).then_some(coefficient.function + 1),
-                value: thermal.values[k] * of(k),
-                sigma: Some(thermal.covariance[(k, k)].max(0.0).sqrt() * of(k).abs()),
-            })
+        let coefficients = (0..n).filter_map(|k| {
+            let (coefficient, value) = (&thermal.coefficients[k], thermal.values[k] * of(k));
+            let sigma = thermal.covariance[(k, k)].max(0.0).sqrt() * of(k).abs();
+            let of = (form, coefficient.index(), coefficient.function);
+            CoefficientRecord::new(of, value, Some(sigma))
         });
-        let all = thermal.coefficients();
-        let mut by_powers = BTreeMap::new();
-        for index in 0..PARAMETERS {
-            let (order, _) = thermal.order(index);
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            if let (Some(name), 1..) = (parameter_name(form, index), order) {
-                let range = thermal.model.range.get(sensor);
-                let row: ThermalValues = all.get(sensor).row(of_triad).transpose();
-                let of_powers = powers(range, &row).map(|a| a * factor(index));
-                by_powers.insert(name, of_powers[..order].to_vec());
-            }
-        }
-        let estimated = estimate.estimated();
+        let table = |rows: &mut dyn Iterator<Item = usize>, entry: &dyn Fn(usize, usize) -> f64| {
+            rows.map(|i| (0..n).map(|j| entry(i, j)).collect())
+                .collect()
+        };
+        let covariance = |i, j| thermal.covariance[(i, j)] * of(i) * of(j);
+        let cross = |i, j| thermal.cross[(i, j)] * factor(nominal, i) * of(j);
+        let orders = |index| Some(thermal.order(index).0).filter(|&order| order > 0);
+        let (range, all) = (&thermal.model.range, thermal.coefficients());
         Self {
             equation: EQUATION.to_owned(),
-            range: PerSensor::from_fn(|sensor| thermal.model.range.get(sensor).into()),
+            range: *range,
             coefficients: coefficients.collect(),
-            covariance: (0..n)
-                .map(|i| {
-                    let row = (0..n).map(|j| thermal.covariance[(i, j)] * of(i) * of(j));
-                    row.collect()
-                })
-                .collect(),
-            cross: estimated
-                .map(|i| {
-                    let row = (0..n).map(|j| thermal.cross[(i, j)] * factor(i) * of(j));
-                    row.collect()
-                })
-                .collect(),
-            powers: by_powers,
+            covariance: table(&mut (0..n), &covariance),
+            cross: table(&mut estimate.estimated(), &cross),
+            powers: all_powers((form, nominal), range, &all, orders),
         }
     }
 
@@ -177,41 +150,31 @@ impl ThermalRecord {
         coefficients: &PerSensor<ThermalCoefficients>,
         run: &Run,
     ) -> Self {
-        let form = InstallationForm::General;
-        let mut all = Vec::new();
-        let mut by_powers = BTreeMap::new();
-        for index in 0..PARAMETERS {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            let factor = run.instrument.nominal.get(sensor).factor(of_triad);
-            let row: ThermalValues = coefficients.get(sensor).row(of_triad).transpose();
-            let Some(name) = parameter_name(form, index) else {
-                continue;
-            };
-            for function in (0..row.len()).filter(|&function| row[function] != 0.0) {
-                all.push(CoefficientRecord {
-                    parameter: name.clone(),
-                    order: (function != RATE).then_some(function + 1),
-                    value: row[function] * factor,
-                    sigma: None,
-                });
-            }
-            let of_powers = powers(range.get(sensor), &row).map(|a| a * factor);
-            by_powers.insert(name, of_powers.to_vec());
-        }
+        let (form, nominal) = (InstallationForm::General, &run.instrument.nominal);
+        let all = (0..PARAMETERS).flat_map(|index| {
+            let row = functions(coefficients, index);
+            let on = (0..row.len()).filter(move |&function| row[function] != 0.0);
+            on.filter_map(move |function| {
+                let value = row[function] * factor(nominal, index);
+                CoefficientRecord::new((form, index, function), value, None)
+            })
+        });
         Self {
             equation: EQUATION.to_owned(),
-            range: PerSensor::from_fn(|sensor| range.get(sensor).into()),
-            coefficients: all,
+            range: *range,
+            coefficients: all.collect(),
             covariance: Vec::new(),
             cross: Vec::new(),
-            powers: by_powers,
+            powers: all_powers((form, nominal), range, coefficients, |_| {
+                Some(HIGHEST_ORDER)
+            }),
         }
     }
 
     /// Whether all temperatures lie in their ranges.
     pub fn holds(&self, temperatures: &PerSensor<[f64; 3]>) -> bool {
         Sensor::ALL.into_iter().all(|sensor| {
-            let range = ThermalRange::from(self.range.get(sensor));
+            let range = self.range.get(sensor);
             let all = temperatures.get(sensor).iter();
             all.copied().all(|t| range.contains(t, TOLERANCE))
         })
@@ -223,57 +186,71 @@ impl ThermalRecord {
         temperatures: &PerSensor<[f64; 3]>,
         rates: &PerSensor<[f64; 3]>,
     ) -> ThermalState {
-        PerSensor::from_fn(|sensor| {
-            let range = ThermalRange::from(self.range.get(sensor));
-            let (t, rate) = (temperatures.get(sensor), rates.get(sensor));
-            [0, 1, 2].map(|axis| range.values(t[axis], rate[axis]))
-        })
+        ThermalRange::state(&self.range, temperatures, rates)
     }
+}
+
+/// Coefficients of a parameter's functions of temperature.
+fn functions(all: &PerSensor<ThermalCoefficients>, index: usize) -> ThermalValues {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    all.get(sensor).row(of_triad).transpose()
+}
+
+/// Coefficients of powers of temperature of each parameter, up to its order, in the file's quantity.
+fn all_powers(
+    (form, nominal): (InstallationForm, &PerSensor<Nominal>),
+    range: &PerSensor<ThermalRange>,
+    all: &PerSensor<ThermalCoefficients>,
+    order: impl Fn(usize) -> Option<usize>,
+) -> BTreeMap<String, Vec<f64>> {
+    let of = |index: usize| {
+        let (name, order) = (parameter_name(form, index)?, order(index)?);
+        let (sensor, _) = sensor_and_parameter(index);
+        let powers = powers(range.get(sensor), &functions(all, index));
+        let powers = powers.iter().map(|a| a * factor(nominal, index));
+        Some((name, powers.take(order).collect()))
+    };
+    (0..PARAMETERS).filter_map(of).collect()
 }
 
 impl RecordingRecord {
     /// Of each recording of an outcome, in the file's quantity.
     pub(in crate::calibration) fn all(outcome: &Outcome, run: &Run) -> Vec<Self> {
-        let form = outcome.estimate.form();
-        let nominal: &PerSensor<Nominal> = &run.instrument.nominal;
-        let named = |index: usize, value: f64, sigma: f64| {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            let factor = nominal.get(sensor).factor(of_triad);
-            let value = ValueRecord {
-                value: value * factor,
-                sigma: sigma * factor.abs(),
+        let (form, nominal) = (outcome.estimate.form(), &run.instrument.nominal);
+        let named = |values: &ParameterVector, sigma: &ParameterVector| {
+            let known = (0..PARAMETERS).filter(|&i| sigma[i] > 0.0);
+            let of = |i: usize| {
+                let value = ValueRecord {
+                    value: values[i] * factor(nominal, i),
+                    sigma: sigma[i] * factor(nominal, i).abs(),
+                };
+                Some((parameter_name(form, i)?, value))
             };
-            Some((parameter_name(form, index)?, value))
+            known.filter_map(of).collect::<BTreeMap<_, _>>()
         };
         let all = outcome.alone.iter().enumerate();
         all.map(|(number, alone)| {
-            let of = |estimate: &Estimate| {
-                let (v, sigma) = (estimate.vector(), estimate.sigma());
-                let estimated = estimate.estimated();
-                estimated
-                    .filter_map(|i| named(i, v[i], sigma[i]))
-                    .collect::<BTreeMap<_, _>>()
-            };
-            let own = outcome.own.get(number).map(|own| {
+            let estimate = alone.estimate.as_ref();
+            let of_own = |own: &Own| {
                 let (values, sigma) = (&own.values, &own.sigma);
-                let differ = (0..PARAMETERS).filter(|&i| sigma.parameters[i] > 0.0);
-                let parameters =
-                    differ.filter_map(|i| named(i, values.parameters[i], sigma.parameters[i]));
                 let turned = (0..3).filter(|&axis| sigma.mounting[axis] > 0.0);
                 let mounting = turned.map(|axis| {
-                    let value = ValueRecord {
-                        value: values.mounting[axis],
-                        sigma: sigma.mounting[axis],
-                    };
-                    (format!("mounting.{}", AXES[axis]), value)
+                    let (value, sigma) = (values.mounting[axis], sigma.mounting[axis]);
+                    (
+                        format!("mounting.{}", AXES[axis]),
+                        ValueRecord { value, sigma },
+                    )
                 });
-                parameters.chain(mounting).collect()
-            });
+                let parameters = named(&values.parameters, &sigma.parameters);
+                parameters.into_iter().chain(mounting).collect()
+            };
             Self {
                 name: alone.name.clone(),
                 temperature_degc: alone.mean_temperature(),
-                alone: alone.estimate.as_ref().map(of).unwrap_or_default(),
-                own: own.unwrap_or_default(),
+                alone: estimate
+                    .map(|of| named(&of.vector(), &of.sigma()))
+                    .unwrap_or_default(),
+                own: outcome.own.get(number).map(of_own).unwrap_or_default(),
             }
         })
         .collect()

@@ -1,15 +1,17 @@
 //! A calibration that changes with temperature, at one.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use thiserror::Error;
 
-use crate::calibration::parameters::{PARAMETERS, parameter, parameter_name, sensor_and_parameter};
-use crate::calibration::result::record::{rows, sigma_rows};
-use crate::calibration::result::thermal_record::{TOLERANCE, ThermalRecord};
-use crate::calibration::result::{Calibration, FORMAT, TriadRecord};
-use crate::imu::{
-    InstallationForm, PerSensor, RATE, Sensor, ThermalRange, ThermalState, Triad, TriadVector,
+use crate::calibration::parameters::{
+    PARAMETERS, parameter, parameter_index, sensor_and_parameter,
 };
+use crate::calibration::result::thermal_record::{TOLERANCE, ThermalRecord};
+use crate::calibration::result::{Calibration, FORMAT, TriadRecord, rows};
+use crate::imu::{InstallationForm, Nominal, PerSensor, Sensor, ThermalState, Triad, TriadVector};
+
+/// Of a triad that stays in the file's quantity.
+const ONE: Nominal = Nominal(Vector3::new(1.0, 1.0, 1.0));
 
 /// Why there is no calibration at a temperature.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -48,12 +50,12 @@ impl Calibration {
         };
         for sensor in Sensor::ALL {
             let range = thermal.range.get(sensor);
-            if !ThermalRange::from(range).contains(temperature, TOLERANCE) {
+            if !range.contains(temperature, TOLERANCE) {
                 return Err(TemperatureError::Outside {
                     sensor,
                     found: temperature,
-                    lowest: range.lowest_degc,
-                    highest: range.highest_degc,
+                    lowest: range.lowest,
+                    highest: range.highest,
                 });
             }
         }
@@ -74,15 +76,7 @@ impl Calibration {
         let mut by = DMatrix::zeros(PARAMETERS, n);
         for (k, coefficient) in thermal.coefficients.iter().enumerate() {
             let unknown = || TemperatureError::Unknown(coefficient.parameter.clone());
-            let named = |&index: &usize| {
-                parameter_name(form, index).as_ref() == Some(&coefficient.parameter)
-            };
-            let index = (0..PARAMETERS).find(named).ok_or_else(unknown)?;
-            let function = match coefficient.order {
-                None => RATE,
-                Some(order @ 1..=RATE) => order - 1,
-                Some(_) => return Err(unknown()),
-            };
+            let (index, function) = coefficient.place(form).ok_or_else(unknown)?;
             let (sensor, of_triad) = sensor_and_parameter(index);
             let axis = Triad::axis(form, of_triad).ok_or_else(unknown)?;
             by[(index, k)] = state.get(sensor)[axis][function];
@@ -92,9 +86,7 @@ impl Calibration {
         let places: Vec<usize> = self
             .parameters
             .iter()
-            .filter_map(|name| {
-                (0..PARAMETERS).find(|&i| parameter_name(form, i).as_ref() == Some(name))
-            })
+            .filter_map(|name| parameter_index(form, name))
             .collect();
         let covariance = self.covariance_by(thermal, &by, &places);
         let variance = |index: usize| {
@@ -104,22 +96,20 @@ impl Calibration {
                 .unwrap_or(0.0)
         };
         let triad = |sensor: Sensor| {
-            let record = match sensor {
-                Sensor::Gyro => &self.gyro,
-                Sensor::Accel => &self.accel,
-            };
-            moved(record, form, |of_triad| change[parameter(sensor, of_triad)])
+            moved(self.triad(sensor), form, |of_triad| {
+                change[parameter(sensor, of_triad)]
+            })
         };
         let sigma = self.sigma.is_some().then(|| {
             PerSensor::from_fn(|sensor| {
                 let sigma = TriadVector::from_fn(|of_triad, _| {
                     variance(parameter(sensor, of_triad)).max(0.0).sqrt()
                 });
-                sigma_rows(form, &sigma)
+                TriadRecord::of_sigma(form, &sigma, &ONE)
             })
         });
         let (gyro, accel) = (triad(Sensor::Gyro), triad(Sensor::Accel));
-        let inverse = |record: &TriadRecord| Some(rows(&sensitivity(record).try_inverse()?));
+        let inverse = |record: &TriadRecord| Some(rows(&record.sensitivity().try_inverse()?));
         let correction = inverse(&gyro).zip(inverse(&accel));
         Ok(Self {
             correction: self
@@ -171,17 +161,7 @@ fn moved(
     form: InstallationForm,
     change: impl Fn(usize) -> f64,
 ) -> TriadRecord {
-    let bias = Vector3::from(record.bias);
-    let triad = Triad::from_sensitivity(form, &sensitivity(record), bias);
-    let v = triad.to_vector() + TriadVector::from_fn(|of_triad, _| change(of_triad));
-    let triad = Triad::from_vector(form, &v);
-    TriadRecord {
-        scale: triad.scale.into(),
-        installation: rows(&triad.installation()),
-        bias: triad.bias.into(),
-    }
-}
-
-fn sensitivity(record: &TriadRecord) -> Matrix3<f64> {
-    Matrix3::from_fn(|i, j| record.scale[i] * record.installation[i][j])
+    let v = record.triad(&ONE, form).to_vector();
+    let v = v + TriadVector::from_fn(|of_triad, _| change(of_triad));
+    TriadRecord::new(&Triad::from_vector(form, &v), &ONE)
 }

@@ -4,16 +4,15 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::alone::Alone;
 use super::day_to_day::DayToDay;
-use crate::calibration::checks::finding::{Finding, RecordingDifference};
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::recordings::{RecordingDifference, recordings_differ};
 use crate::calibration::estimate::Estimate;
 use crate::calibration::group::Group;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{from_vector, sensor_and_parameter};
 use crate::imu::{RATE, ThermalModel, Triad};
-use crate::statistics::chi_square_limit;
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
-/// Chance that recordings which differ as is stated are said to differ more; each group has the same share.
-const FALSE_ALARM: f64 = 1e-3;
 /// Fewer recordings do not tell a difference from a change with temperature.
 const FEWEST: usize = 3;
 /// The least part of its prior variance that a recording is believed to leave of a direction; below it rounding rules.
@@ -63,8 +62,8 @@ pub fn learnt(model: &Model, alone: &[Alone]) -> Option<(DayToDay, Finding)> {
                 }
             },
         )
-        .collect();
-    Some((day_to_day, Finding::RecordingsDiffer { differences }))
+        .collect::<Vec<_>>();
+    Some((day_to_day, recordings_differ(&differences)))
 }
 
 /// A group whose parameters differ by this variance beyond what is stated.

@@ -4,13 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::thermal::{Coefficient, Thermal};
 use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::observability::temperature_not_seen;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::parameters::{OBSERVED_BELOW, ParameterMatrix, parameter_name};
 use crate::imu::{InstallationForm, ParameterKind, RATE, Sensor, ThermalModel, Triad};
-use crate::statistics::chi_square_limit;
-
-/// Chance that an order which is not there is kept.
-const FALSE_ALARM: f64 = 1e-3;
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// What of a model the data call for.
 pub struct Selected {
@@ -104,7 +102,7 @@ impl Selected {
         let names = self.unseen.iter();
         let names = names.filter_map(|c| parameter_name(form, c.index()));
         let parameters: Vec<String> = names.collect();
-        (!parameters.is_empty()).then_some(Finding::TemperatureNotSeen { parameters })
+        temperature_not_seen(parameters)
     }
 }
 

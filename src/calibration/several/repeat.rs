@@ -7,10 +7,7 @@ use super::day_to_day::Difference;
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{PARAMETERS, ParameterVector, to_vector};
-use crate::statistics::chi_square_limit;
-
-/// Chance that recordings which repeat are said not to.
-const FALSE_ALARM: f64 = 1e-3;
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// How a parameter repeats from one recording to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]

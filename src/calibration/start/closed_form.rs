@@ -7,7 +7,9 @@ use super::coarse;
 use super::labels::{self, Section, Used};
 use super::positions::{Observed, Position};
 use super::table;
+use crate::calibration::checks;
 use crate::calibration::checks::finding::Finding;
+use crate::calibration::checks::observability::not_observed;
 use crate::calibration::checks::prior_distance::far_by_data;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
 use crate::calibration::checks::rounding::{by_rounding, rounded};
@@ -111,7 +113,7 @@ pub fn six_position_by(
         estimate, findings, ..
     } = &mut closed_form;
     let notes = problem.notes().into_iter();
-    findings.splice(0..0, notes.map(|note| Finding::Recording { note }));
+    findings.splice(0..0, notes.map(Finding::of_recording));
     findings.extend(unexplained_residuals(findings));
     findings.extend(scatter_at_rest(problem, &estimate.triads));
     let rounding = by_rounding(problem, &estimate.triads);
@@ -213,12 +215,8 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let observed = labels::observed(run, &rests, &sections);
     let (estimate, mut findings) = both_triads(&observed, problem)?;
     findings.extend(hidden(&problem.model, &estimate, Reference::Labels));
-    if !contradicted.is_empty() {
-        findings.push(Finding::LabelsContradicted { contradicted });
-    }
-    if !lost.is_empty() {
-        findings.push(Finding::SectionsLost { labels: lost });
-    }
+    findings.extend(checks::labels::contradicted(&contradicted));
+    findings.extend(checks::labels::lost(&lost));
     let standing: Vec<&Section> = sections.iter().filter(|s| s.stands()).collect();
     let samples: usize = standing.iter().map(|section| section.samples.len()).sum();
     Ok(ClosedForm {
@@ -275,12 +273,10 @@ fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Fi
     let hidden: Vec<String> = names
         .filter_map(|index| parameter_name(estimate.form(), index))
         .collect();
-    (!hidden.is_empty()).then_some(Finding::NotObserved {
-        by: match reference {
-            Reference::Table => "these positions",
-            Reference::Labels => "these sections",
-            Reference::Gravity => "these dwells and moves",
-        },
-        parameters: hidden,
-    })
+    let by = match reference {
+        Reference::Table => "these positions",
+        Reference::Labels => "these sections",
+        Reference::Gravity => "these dwells and moves",
+    };
+    not_observed(by, hidden)
 }

@@ -67,15 +67,7 @@ impl Judged {
 
     /// That residuals are beyond chance, by which σ grow by this factor.
     pub fn large(&self, of: &'static str, growth: f64, base: Option<f64>) -> Finding {
-        Finding::ResidualsLarge {
-            of,
-            chi_square: self.residuals.chi_square(),
-            degrees: self.residuals.degrees(),
-            limit: self.residuals.limit(),
-            growth,
-            worst: self.times.clone(),
-            without: self.worst.without,
-            base,
-        }
+        let worst = (self.times.clone(), self.worst.without);
+        self.residuals.large(of, growth, worst, base)
     }
 }

@@ -21,7 +21,7 @@ pub(super) fn note(source: &Source) -> Option<String> {
     Some(format!(
         "change with temperature; this is the calibration at {} °C, another temperature is written with \
          --temperature-degc",
-        thermal.range.gyro.reference_degc
+        thermal.range.gyro.reference
     ))
 }
 
@@ -61,9 +61,9 @@ pub(super) fn px4(source: &Source, file: &mut Document) {
     for (sensor, letter) in [(Sensor::Gyro, 'G'), (Sensor::Accel, 'A')] {
         file.line(&format!("1\t1\tTC_{letter}_ENABLE\t1\t6"));
         let range = thermal.range.get(sensor);
-        line(file, &format!("TC_{letter}0_TREF"), range.reference_degc);
-        line(file, &format!("TC_{letter}0_TMIN"), range.lowest_degc);
-        line(file, &format!("TC_{letter}0_TMAX"), range.highest_degc);
+        line(file, &format!("TC_{letter}0_TREF"), range.reference);
+        line(file, &format!("TC_{letter}0_TMIN"), range.lowest);
+        line(file, &format!("TC_{letter}0_TMAX"), range.highest);
         for (place, (axis, sign)) in FRONT_RIGHT_DOWN.into_iter().enumerate() {
             let powers = bias_powers(source, thermal, sensor, axis);
             // What does not change is in CAL_*.
@@ -86,10 +86,10 @@ pub(super) fn ardupilot(source: &Source, file: &mut Document) {
     };
     let range = thermal.range.gyro;
     file.line("INS_TCAL1_ENABLE,1");
-    file.line(&format!("INS_TCAL1_TMIN,{:?}", range.lowest_degc as f32));
-    file.line(&format!("INS_TCAL1_TMAX,{:?}", range.highest_degc as f32));
+    file.line(&format!("INS_TCAL1_TMIN,{:?}", range.lowest as f32));
+    file.line(&format!("INS_TCAL1_TMAX,{:?}", range.highest as f32));
     for (sensor, kind) in [(Sensor::Accel, "ACC"), (Sensor::Gyro, "GYR")] {
-        let reference = thermal.range.get(sensor).reference_degc;
+        let reference = thermal.range.get(sensor).reference;
         for (place, (axis, sign)) in FRONT_RIGHT_DOWN.into_iter().enumerate() {
             let name = ["X", "Y", "Z"][place];
             // Of a polynomial about the reference the same about 35 °C, but for a constant.
@@ -142,11 +142,11 @@ pub(super) fn c(source: &Source, file: &mut Document) {
         };
         file.comment(&format!(
             "{name}: value at {} degC and coefficients of powers of T - {} from the first on; hold from {} to {} degC",
-            range.reference_degc, range.reference_degc, range.lowest_degc, range.highest_degc
+            range.reference, range.reference, range.lowest, range.highest
         ));
         file.line(&format!(
             "static const double turncal_{name}_reference_degc = {:e};",
-            range.reference_degc
+            range.reference
         ));
         for (kind, values) in [("scale", triad.scale), ("bias", triad.bias)] {
             let rows = (0..3).map(|axis| row(values[axis], &format!("{kind}.{}", AXES[axis])));

@@ -7,8 +7,7 @@ use super::{INTERVAL, Mission, NavigationStudyError, Pair, exposure};
 use crate::calibration::result::Calibration;
 use crate::calibration::{PARAMETERS, parameter_name, sensor_and_parameter, triads_of};
 use crate::imu::{
-    InstallationForm, Nominal, PerSensor, RATE, ThermalCoefficients, ThermalRange, ThermalState,
-    Triad,
+    InstallationForm, Nominal, PerSensor, ThermalCoefficients, ThermalRange, ThermalState, Triad,
 };
 use crate::navigation::error_model::STATES;
 use crate::navigation::{Instant, Linearisation, Sensitivity};
@@ -97,20 +96,13 @@ impl Changing {
         let mut all = PerSensor::<ThermalCoefficients>::default();
         let mut places = Vec::new();
         for coefficient in &of.coefficients {
-            let named =
-                |&i: &usize| parameter_name(general, i).as_ref() == Some(&coefficient.parameter);
-            let index = (0..PARAMETERS).find(named).ok_or(WarmingError::Unknown)?;
+            let (index, function) = coefficient.place(general).ok_or(WarmingError::Unknown)?;
             let (sensor, of_triad) = sensor_and_parameter(index);
-            let function = match coefficient.order {
-                None => RATE,
-                Some(order @ 1..=RATE) => order - 1,
-                Some(_) => return Err(WarmingError::Unknown),
-            };
             let factor = nominal.get(sensor).factor(of_triad);
             all.get_mut(sensor)[(of_triad, function)] = coefficient.value / factor;
             places.push((index, function));
         }
-        let range = PerSensor::from_fn(|sensor| of.range.get(sensor).into());
+        let range = of.range;
         let changing = Self {
             triads,
             thermal: Some((range, all)),

@@ -1,4 +1,4 @@
-//! How unlikely it is that errors which are not there explain so much.
+//! Probability that errors which are not there explain as much by chance.
 
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -48,7 +48,7 @@ impl Evidence {
         }
     }
 
-    /// What the gain stays below but for this chance.
+    /// Limit of the gain that chance exceeds with this probability.
     pub fn limit(&self, chance: f64) -> f64 {
         self.share * chi_square_limit(self.states, chance)
     }

@@ -1,29 +1,30 @@
 //! What each error term costs in σ, what it explains of the data, and which one explains them best.
 //!
-//! The last pass once more answers for all constant ones: those that are on are taken off by conditioning
-//! on zero, those that are off are tried beside it (see [`crate::calibration::pass`]). Varying biases are not constant;
+//! A repeated last pass answers for all constant ones: those that are on are taken off by conditioning
+//! on zero, those that are off are tried in it (see [`crate::calibration::pass`]). Varying biases are not constant;
 //! they take a pass of their own.
 
 mod evidence;
+mod explanation;
 mod joint;
-mod left_off;
-mod seen;
 mod unseen;
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
-use super::finding::Finding;
+use super::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::error_term::ErrorTerm;
 use crate::calibration::group::Group;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
+use crate::calibration::pass::PassResult;
 use crate::calibration::problem::Problem;
+use crate::statistics::FALSE_ALARM;
 use evidence::ln_survival;
-use joint::{Explanation, Fit, Joint, once_more};
-pub use left_off::LeftOff;
-use seen::seen_and_left_off;
-pub use unseen::unseen_variation;
+use explanation::{Explanation, seen_and_left_off};
+use joint::{Fit, Joint, last_pass};
+pub use unseen::{biases_may_vary, unseen_variation};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,15 +33,14 @@ pub struct ErrorTermTest {
     pub term: ErrorTerm,
     /// Whether it was on in the calibration; if not, it was tried with its usual σ.
     pub on: bool,
-    /// RMS σ of each of [`Group::all`] with it over that without it; none where the group has
+    /// RMS σ of each of [`Group::all`] with it over that without it; absent if the group has
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
     /// By how much the cost, −2 ln of likelihood and prior, falls with it; for varying biases, which
     /// are not constant, −2 ln of the likelihood of the whole record.
     pub gain: f64,
-    /// What the gain stays below, if its errors are not there, but for its share of one false alarm in a
-    /// thousand runs: χ² with as many degrees as it has states that the data show; a ratio of
-    /// likelihoods exceeds 1/p with no more chance than p.
+    /// Limit of the gain at this term's share of the false-alarm rate: χ² with as many degrees as it has states
+    /// that the data show; a ratio of likelihoods exceeds 1/p with no more chance than p.
     pub limit: f64,
     /// −2 ln of the chance of such a gain if its errors are not there: what terms of any number of states
     /// are compared by.
@@ -51,12 +51,21 @@ pub struct ErrorTermTest {
     pub without: f64,
     /// … and with it.
     pub with: f64,
-    /// What leaving it off may have done to the estimate; none where it is on, or not constant.
+    /// What leaving it off may have done to the estimate; absent if it is on, or not constant.
     #[serde(skip)]
     pub left_off: Option<LeftOff>,
 }
 
-/// What an error term that is off is to a record.
+/// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOff {
+    /// Where its own parameters have their usual σ around zero.
+    pub usual: ParameterVector,
+    /// RMS where they are also as the record shows them.
+    pub shown: ParameterVector,
+}
+
+/// Test result for an error term that is off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
     /// Nothing: it is on, or the record does not show it, or another explains what it would.
@@ -69,36 +78,72 @@ pub enum Role {
     Further,
 }
 
-/// Chance that a run without errors of any term shows one; each term that is tried has the same share.
-const FALSE_ALARM: f64 = 1e-3;
-/// Of two explanations, one that is less than so many times as likely is not told from the other.
+/// Two explanations are told apart if one is this many times likelier.
 const ODDS: f64 = 20.0;
 
 impl ErrorTermTest {
+    /// Of a calibration with it and one without, not yet judged.
+    fn new(term: ErrorTerm, on: bool, with: &Fit, without: &Fit) -> Self {
+        let factor = |group: Group| {
+            let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
+            let sums = of_group.map(|i| [with.variance[i], without.variance[i]]);
+            let [with, without] = sums.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+            Some(f64::sqrt(with / without)).filter(|ratio| ratio.is_finite())
+        };
+        let mut factors = Group::all().map(factor);
+        Self {
+            term,
+            on,
+            sigma_factors: std::array::from_fn(|_| factors.next().flatten()),
+            gain: without.cost - with.cost,
+            limit: f64::INFINITY,
+            significance: 0.0,
+            role: Role::None,
+            without: without.cost,
+            with: with.cost,
+            left_off: None,
+        }
+    }
+
     /// Whether the data show it.
     pub fn significant(&self) -> bool {
         self.gain > self.limit
     }
 
-    /// Of error terms that are off and that the data show, the one that is the likeliest, with those that
-    /// cannot be told from it and those that are significant beside it.
-    /// `growth` is how many times larger σ are for what leaving them off does; none where σ are without.
+    /// Of error terms that are off and that the data show, the likeliest, with those that cannot be told
+    /// from it and those that are also significant with it on. `growth` is that of σ by leaving them off;
+    /// none where σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
         let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
-        let names = |role: Role| {
+        let names = |role: Role| -> Vec<&str> {
             let of_role = tests.iter().filter(|test| test.role == role);
             of_role.map(|test| test.term.name()).collect()
         };
-        Some(Finding::ErrorTermSignificant {
-            term: likeliest.term.name(),
-            alternatives: names(Role::Alternative),
-            further: names(Role::Further),
-            gain: likeliest.gain,
-            limit: likeliest.limit,
-            nis_without: likeliest.without,
-            nis_with: likeliest.with,
-            growth,
-        })
+        let (alternatives, further) = (names(Role::Alternative), names(Role::Further));
+        let (term, gain, limit) = (likeliest.term.name(), likeliest.gain, likeliest.limit);
+        let mut text = format!(
+            "An unmodelled error is visible. The best explanation is {term} (χ² falls by {gain:.0}; limit \
+             {limit:.0}). Next: rerun with --with {term}."
+        );
+        for (names, words) in [
+            (&alternatives, "This path cannot tell it from"),
+            (&further, "Also significant with it on"),
+        ] {
+            if !names.is_empty() {
+                text += &format!(" {words}: {}.", names.join(", "));
+            }
+        }
+        if let Some(growth) = growth {
+            text += &format!(
+                " Until you do, σ are widened {} to cover it.",
+                widened_by(growth)
+            );
+        }
+        let figures = json!({
+            "term": term, "alternatives": alternatives, "further": further, "gain": gain, "limit": limit,
+            "nis_without": likeliest.without, "nis_with": likeliest.with, "growth": growth
+        });
+        Some(Finding::new("error-term-significant", text, figures))
     }
 }
 
@@ -138,181 +183,162 @@ fn significance_of_noise(outcome: &Outcome) -> f64 {
     -2.0 * ln_survival(noise.sources.len().max(1) as f64, ratio)
 }
 
+/// Biases that vary are not constant.
+const VARYING: ErrorTerm = ErrorTerm::GaussMarkovBias;
+
 /// All terms with one noise.
 struct Tested {
     tests: Vec<ErrorTermTest>,
     joint: Joint,
-    /// Biases that vary, where they are off.
-    varying: Option<Explanation>,
+    /// Where biases vary if they do not in the model, and the other way round.
+    otherwise: PassResult,
 }
 
 impl Tested {
     fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let model = &problem.model;
-        let scalars = 3.0 * outcome.innovations.len() as f64;
-        let varying = ErrorTerm::GaussMarkovBias;
-        let mut otherwise = model.clone();
-        if model.has(varying) {
-            otherwise.switch_off(varying);
-        } else {
-            otherwise.switch_on(varying);
+        let mut other = model.clone();
+        match model.has(VARYING) {
+            true => other.switch_off(VARYING),
+            false => other.switch_on(VARYING),
         }
-        // The longer of the two first: whoever is done with something else can take the other.
+        // The longer of the two first: a thread that is done with something else can take the other.
         let (otherwise, joint) = rayon::join(
-            || once_more(&problem.with_model(otherwise), outcome, &[]),
+            || last_pass(&problem.with_model(other), outcome, &[]),
             || Joint::new(problem, outcome),
         );
-        let (joint, otherwise) = (joint?, otherwise?);
-        let tried = ErrorTerm::ALL
-            .into_iter()
-            .filter(|&term| model.can_have(term));
-        let tried: Vec<ErrorTerm> = tried.collect();
+        let mut tested = Self {
+            joint: joint?,
+            otherwise: otherwise?,
+            tests: Vec::new(),
+        };
+        let tried = ErrorTerm::ALL.into_iter();
+        let tried: Vec<ErrorTerm> = tried.filter(|&term| model.can_have(term)).collect();
         let off = tried.iter().filter(|&&term| !model.has(term)).count();
         let chance = FALSE_ALARM / off.max(1) as f64;
-        let test = |term: ErrorTerm, with: &Fit, without: &Fit| ErrorTermTest {
-            term,
-            on: model.has(term),
-            sigma_factors: sigma_factors(&with.variance, &without.variance),
-            gain: without.cost - with.cost,
-            limit: f64::INFINITY,
-            significance: 0.0,
-            role: Role::None,
-            without: without.cost / scalars,
-            with: with.cost / scalars,
-            left_off: None,
-        };
-        let own = Fit::of(&joint.own);
-        let deviance_falls = joint.own.deviance() - otherwise.deviance();
-        let of_constant = |term: ErrorTerm| {
-            let (with, without, evidence) = if model.has(term) {
-                let (without, evidence) = joint.without(term)?;
-                (Fit::of(&joint.own), without, evidence)
-            } else {
-                let evidence = joint.evidence(term, &[])?;
-                (joint.with(&[term])?, Fit::of(&joint.own), evidence)
+        let scalars = 3.0 * outcome.innovations.len() as f64;
+        let tests = tried.into_iter().filter_map(|term| {
+            let mut test = match term {
+                VARYING => tested.varying(model.has(term), chance),
+                _ => tested.constant(term, model.has(term), chance)?,
             };
-            Some(ErrorTermTest {
-                limit: evidence.limit(chance),
-                significance: evidence.significance(),
-                left_off: joint.left_off(term).filter(|_| !model.has(term)),
-                ..test(term, &with, &without)
-            })
-        };
-        let of_varying = || {
-            let otherwise = Fit::of(&otherwise);
-            let (with, without, gain) = match model.has(varying) {
-                true => (&own, &otherwise, -deviance_falls),
-                false => (&otherwise, &own, deviance_falls),
-            };
-            ErrorTermTest {
-                gain,
-                limit: -2.0 * chance.ln(),
-                significance: gain,
-                ..test(varying, with, without)
-            }
-        };
-        let mut tests: Vec<ErrorTermTest> = tried
-            .into_iter()
-            .filter_map(|term| match term {
-                ErrorTerm::GaussMarkovBias => Some(of_varying()),
-                _ => of_constant(term),
-            })
-            .collect();
-        decide(&mut tests, &joint, chance);
-        let varying = (!model.has(varying)).then(|| {
-            let gain = 0.5 * deviance_falls;
-            Explanation {
-                ln_likelihood_ratio: gain,
-                of_term: gain,
-                added: otherwise.added_to(&joint.own),
-            }
+            test.without /= scalars;
+            test.with /= scalars;
+            Some(test)
         });
-        Ok(Self {
-            tests,
-            joint,
-            varying,
+        tested.tests = tests.collect();
+        tested.decide(chance);
+        Ok(tested)
+    }
+
+    /// The test of a constant term, with costs of the whole record. `None` if that is singular.
+    fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
+        let own = Fit::of(&self.joint.own);
+        let (with, without, evidence, left_off) = if on {
+            let (without, evidence) = self.joint.without(term)?;
+            (own, without, evidence, None)
+        } else {
+            let evidence = self.joint.evidence(term, &[])?;
+            let with = self.joint.with(&[term])?;
+            (with, own, evidence, self.joint.left_off(term))
+        };
+        Some(ErrorTermTest {
+            limit: evidence.limit(chance),
+            significance: evidence.significance(),
+            left_off,
+            ..ErrorTermTest::new(term, on, &with, &without)
         })
     }
 
-    /// What the covariance of the estimate lacks for terms that are off. How likely each is, and what is there
-    /// beside it, may be told by a test with another noise.
-    fn left_off(&self, told_by: &Self) -> Option<ParameterMatrix> {
-        let off = told_by.tests.iter().filter(|test| !test.on);
-        let off: Vec<ErrorTerm> = off.map(|test| test.term).collect();
-        let further = told_by
-            .tests
-            .iter()
-            .filter(|test| test.role == Role::Further);
-        let further: Vec<ErrorTerm> = further.map(|test| test.term).collect();
+    /// The same of biases that vary.
+    fn varying(&self, on: bool, chance: f64) -> ErrorTermTest {
+        let (own, otherwise) = (Fit::of(&self.joint.own), Fit::of(&self.otherwise));
+        let (with, without, gain) = match on {
+            true => (&own, &otherwise, -self.fall_otherwise()),
+            false => (&otherwise, &own, self.fall_otherwise()),
+        };
+        ErrorTermTest {
+            gain,
+            limit: -2.0 * chance.ln(),
+            significance: gain,
+            ..ErrorTermTest::new(VARYING, on, with, without)
+        }
+    }
+
+    /// By how much −2 ln of the likelihood falls where biases vary otherwise than in the model.
+    fn fall_otherwise(&self) -> f64 {
+        self.joint.own.deviance() - self.otherwise.deviance()
+    }
+
+    /// Gives each test its role: the likeliest explanation first, then what is significant once it is on, until
+    /// nothing is.
+    fn decide(&mut self, chance: f64) {
+        let Self { tests, joint, .. } = self;
+        let shown = tests.iter_mut().filter(|t| !t.on && t.significant());
+        let Some(likeliest) = shown.max_by(|a, b| a.significance.total_cmp(&b.significance)) else {
+            return;
+        };
+        likeliest.role = Role::Likeliest;
+        let mut on = vec![likeliest.term];
+        let told_apart = likeliest.significance - 2.0 * ODDS.ln();
+        let limit = -2.0 * chance.ln();
+        while !on.contains(&VARYING) {
+            let others = tests.iter_mut();
+            let others = others.filter(|test| !test.on && !on.contains(&test.term));
+            let others = others.filter_map(|test| {
+                let evidence = joint.evidence(test.term, &on)?;
+                Some((evidence.significance(), test))
+            });
+            match others.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((significance, test)) if significance > limit => {
+                    test.role = Role::Further;
+                    on.push(test.term);
+                }
+                _ => break,
+            }
+        }
+        for test in tests {
+            let alike = test.significant() && test.significance > told_apart;
+            if test.role == Role::None && !test.on && alike {
+                test.role = Role::Alternative;
+            }
+        }
+    }
+
+    /// What the covariance of the estimate lacks for terms that are off. How likely each is, and which others are
+    /// there, may come from a test with another noise.
+    fn left_off(&self, weights: &Self) -> Option<ParameterMatrix> {
+        let terms = |which: &dyn Fn(&ErrorTermTest) -> bool| -> Vec<ErrorTerm> {
+            let tests = weights.tests.iter().filter(|test| which(test));
+            tests.map(|test| test.term).collect()
+        };
+        let (off, further) = (terms(&|t| !t.on), terms(&|t| t.role == Role::Further));
         let explanations = off.iter().filter_map(|&term| {
-            let beside: Vec<ErrorTerm> = further.iter().copied().filter(|&f| f != term).collect();
-            let told = told_by.explanation(term, &beside)?;
-            let added = self.explanation(term, &beside)?.added;
-            Some(Explanation { added, ..told })
+            let others: Vec<ErrorTerm> = further.iter().copied().filter(|&f| f != term).collect();
+            let weight = weights.explanation(term, &others)?;
+            let added = self.explanation(term, &others)?.added;
+            Some(Explanation { added, ..weight })
         });
         let explanations: Vec<Explanation> = explanations.collect();
         seen_and_left_off(&explanations, off.len())
     }
 
-    fn explanation(&self, term: ErrorTerm, beside: &[ErrorTerm]) -> Option<Explanation> {
-        match term {
-            ErrorTerm::GaussMarkovBias => {
-                let varying = self.varying.as_ref()?;
-                Some(Explanation {
-                    added: varying.added + self.joint.effect(beside)?,
-                    ..*varying
-                })
-            }
-            _ => self.joint.explanation(term, beside),
+    fn explanation(&self, term: ErrorTerm, others: &[ErrorTerm]) -> Option<Explanation> {
+        if term != VARYING {
+            return self.joint.explanation(term, others);
         }
-    }
-}
-
-/// Gives each test its role: the likeliest explanation first, then what is left once it is on, and so on
-/// while anything is.
-fn decide(tests: &mut [ErrorTermTest], joint: &Joint, chance: f64) {
-    let shown = tests.iter_mut().filter(|t| !t.on && t.significant());
-    let Some(likeliest) = shown.max_by(|a, b| a.significance.total_cmp(&b.significance)) else {
-        return;
-    };
-    likeliest.role = Role::Likeliest;
-    let mut on = vec![likeliest.term];
-    let told_apart = likeliest.significance - 2.0 * ODDS.ln();
-    let limit = -2.0 * chance.ln();
-    while !on.contains(&ErrorTerm::GaussMarkovBias) {
-        let left = tests
-            .iter_mut()
-            .filter(|test| !test.on && !on.contains(&test.term));
-        let left = left.filter_map(|test| {
-            let evidence = joint.evidence(test.term, &on)?;
-            Some((evidence.significance(), test))
-        });
-        match left.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((significance, test)) if significance > limit => {
-                test.role = Role::Further;
-                on.push(test.term);
-            }
-            _ => break,
+        let is_on = |test: &ErrorTermTest| test.term == VARYING && test.on;
+        if self.tests.iter().any(is_on) {
+            return None;
         }
+        let ratio = 0.5 * self.fall_otherwise();
+        let added = self.otherwise.added_to(&self.joint.own);
+        Some(Explanation {
+            ln_likelihood_ratio: ratio,
+            of_term: ratio,
+            added: added + self.joint.on(others)?.added(),
+        })
     }
-    for test in tests {
-        let as_likely = test.significant() && test.significance > told_apart;
-        if test.role == Role::None && !test.on && as_likely {
-            test.role = Role::Alternative;
-        }
-    }
-}
-
-fn sigma_factors(with: &ParameterVector, without: &ParameterVector) -> [Option<f64>; 6] {
-    let mut cost = [None; 6];
-    for (cost, group) in cost.iter_mut().zip(Group::all()) {
-        let of_group = |i: &usize| Group::of(*i) == group;
-        let sum =
-            |of: &ParameterVector| -> f64 { (0..PARAMETERS).filter(of_group).map(|i| of[i]).sum() };
-        let ratio = (sum(with) / sum(without)).sqrt();
-        *cost = ratio.is_finite().then_some(ratio);
-    }
-    cost
 }
 
 #[cfg(test)]
@@ -332,7 +358,7 @@ mod tests {
         let problem = Problem::new(&run, &Options::default());
         let outcome = estimate(&problem, &|_| {}).unwrap();
         let (tests, _) = test_error_terms(&problem, &outcome).unwrap();
-        let with = Fit::of(&once_more(&problem, &outcome, &[]).unwrap());
+        let with = Fit::of(&last_pass(&problem, &outcome, &[]).unwrap());
         for term in [
             order,
             ErrorTerm::TableBase,
@@ -341,16 +367,13 @@ mod tests {
             let mut other = problem.model.clone();
             other.switch_off(term);
             let other = problem.with_model(other);
-            let without = Fit::of(&once_more(&other, &outcome, &[]).unwrap());
+            let without = Fit::of(&last_pass(&other, &outcome, &[]).unwrap());
             let test = tests.iter().find(|e| e.term == term).unwrap();
             println!("{term:?}: {} {}", test.gain, without.cost - with.cost);
             assert!(test.on);
             assert_relative_eq!(test.gain, without.cost - with.cost, max_relative = 1e-3);
-            for (a, b) in test
-                .sigma_factors
-                .iter()
-                .zip(sigma_factors(&with.variance, &without.variance))
-            {
+            let by_passes = ErrorTermTest::new(term, true, &with, &without);
+            for (a, b) in test.sigma_factors.iter().zip(by_passes.sigma_factors) {
                 assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-4);
             }
         }
@@ -372,9 +395,9 @@ mod tests {
             model.switch_on(term);
             // Behind a prior of 0.1 m the filter itself is not exact.
             model.term_sigma /= 100.0;
-            let joint = Joint::beside(&problem, &outcome, &model).unwrap();
+            let joint = Joint::with_model(&problem, &outcome, &model).unwrap();
             let without = Fit::of(&joint.own);
-            let with = Fit::of(&once_more(&problem.with_model(model), &outcome, &[]).unwrap());
+            let with = Fit::of(&last_pass(&problem.with_model(model), &outcome, &[]).unwrap());
             let tried = joint.with(&[term]).unwrap();
             let gain = without.cost - with.cost;
             println!("{term:?}: {gain} {}", without.cost - tried.cost);

@@ -1,9 +1,11 @@
-//! What biases do that may vary without the record showing it.
+//! Uncertainty by biases that may vary without the record showing it.
 
 use rayon::prelude::*;
+use serde_json::json;
 
-use super::joint::once_more;
+use super::joint::last_pass;
 use super::{ErrorTermTest, Role};
+use crate::calibration::checks::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::error_term::ErrorTerm;
 use crate::calibration::model::usual_variation;
@@ -15,21 +17,24 @@ use crate::calibration::problem::Problem;
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
+/// A growth that rounds to once as large is not a finding.
+const SAID: f64 = 1.05;
 /// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one …
 const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 /// … and its correlation time.
 const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 /// What the covariance of an estimate lacks for biases of a triad that may vary though its record does not
-/// call for it; none where the noise is the stated one, where biases of both triads vary in it, or where a table is
+/// call for it; absent if the noise is the stated one, where biases of both triads vary in it, or where a table is
 /// read, whose attitudes show how biases vary.
 ///
-/// A short record hardly tells a bias that varies slowly from one that does not, and the likelihood that
-/// chose the noise takes the simpler of the two. Where the data contradict the stated noise, it is no word
-/// of anybody's that biases are constant: that those of a triad vary is then as likely as not before the
-/// data, with σ and correlation time lognormal about the usual ones, as any stated figure is about its own.
-/// The mean square error of the estimate is that of all these models, each as likely as the data leave it
-/// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::test_error_terms`]).
+/// A short record hardly shows a bias that varies slowly, and the likelihood that chose the noise takes the simpler
+/// model. Where the data contradict the stated noise, nobody stated that biases are constant: that those of a triad
+/// vary then has the same probability before the data as that they do not, with σ and correlation time lognormal
+/// about the usual ones, as any stated figure is about its own. The mean square error of the estimate averages these
+/// models by their probabilities after the data (Hoeting, Madigan, Raftery, Volinsky 1999; see
+/// [`super::test_error_terms`]). The sizes count: with the usual one alone σ of an accelerometer bias of a record
+/// held by hand is half as large.
 ///
 /// # Errors
 /// [`CalibrationError`] where the problem is not the one of the outcome.
@@ -51,13 +56,24 @@ pub fn unseen_variation(
     if sensors.is_empty() {
         return Ok(None);
     }
-    let own = once_more(problem, outcome, &[])?;
+    let own = last_pass(problem, outcome, &[])?;
     let of_sensors = sensors.par_iter().map(|&sensor| {
         let stated = stated.get(sensor);
         of_one(problem, outcome, &own, sensor, stated)
     });
     let of_sensors: Vec<ParameterMatrix> = of_sensors.collect();
     Ok(Some(of_sensors.into_iter().sum()))
+}
+
+/// The finding where that widens the largest σ by so much.
+pub fn biases_may_vary(growth: f64) -> Option<Finding> {
+    let text = format!(
+        "You stated no bias instability, and this record is too short to measure it. turncal assumed a typical value, \
+         which widens σ {}. Measure it with turncal allan on a longer static record and state it in [imu.noise].",
+        widened_by(growth)
+    );
+    let figures = json!({ "growth": growth });
+    (growth >= SAID).then(|| Finding::new("biases-may-vary", text, figures))
 }
 
 /// The same of biases of one triad.
@@ -69,7 +85,6 @@ fn of_one(
     stated: &Noise,
 ) -> ParameterMatrix {
     let usual = usual_variation(stated);
-    let deviance = |result: &PassResult| result.cost + result.log_determinant;
     let density = |z: &f64| (-0.5 * z * z).exp();
     let sum_of = |nodes: &[f64]| -> f64 { nodes.iter().map(density).sum() };
     let all = sum_of(&SIGMAS) * sum_of(&TIMES);
@@ -84,10 +99,10 @@ fn of_one(
             correlation_time: usual.correlation_time * (time * LOG_SIGMA).exp(),
         });
         // What the filter cannot run with is not likely.
-        let Ok(with) = once_more(&problem.with_model(model), outcome, &[]) else {
+        let Ok(with) = last_pass(&problem.with_model(model), outcome, &[]) else {
             continue;
         };
-        let ratio = (0.5 * (deviance(own) - deviance(&with))).exp();
+        let ratio = (0.5 * (own.deviance() - with.deviance())).exp();
         let weight = ratio * density(sigma) * density(time) / all;
         if weight.is_finite() {
             weights += weight;

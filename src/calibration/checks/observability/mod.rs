@@ -5,12 +5,15 @@
 //! an eigenvalue is the part of the prior σ that is left (Ham and Brown 1983, "Observability,
 //! eigenvalues, and Kalman filtering", IEEE Trans. AES-19).
 
+mod not_observed;
+
 use faer::{Mat, Side};
 use nalgebra::SMatrix;
 
 use crate::calibration::estimate::Estimate;
 use crate::calibration::parameters::{OBSERVED_BELOW, PARAMETERS, ParameterVector, parameter_name};
 use crate::imu::InstallationForm;
+pub use not_observed::{not_observed, not_observed_by_path, temperature_not_seen};
 
 /// Directions left with the same part of their σ, to this part of it, are one space, in which the
 /// simplest directions are as good as any.

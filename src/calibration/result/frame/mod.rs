@@ -11,14 +11,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::triads_of;
-use super::{Calibration, TermRecord, TriadRecord};
+use super::{Calibration, TermRecord, factor, triads_of};
 use crate::attitude::skew;
 use crate::calibration::error::ComparisonError;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, in_general_form, parameter, parameter_name,
-    sensor_and_parameter, to_vector,
+    PARAMETERS, ParameterMatrix, ParameterVector, in_general_form, parameter, parameter_index,
+    parameter_name, sensor_and_parameter, to_vector,
 };
 use crate::imu::{
     AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector,
@@ -53,25 +52,15 @@ impl Canonical {
         nominal: &PerSensor<Nominal>,
         body_frame: BodyFrame,
     ) -> Result<Self, ComparisonError> {
-        let given = PerSensor::from_fn(|sensor| {
-            sensitivity(triad_record(record, sensor), nominal.get(sensor))
-        });
+        let given =
+            PerSensor::from_fn(|sensor| record.triad(sensor).normalised(nominal.get(sensor)));
         let rotation = match body_frame {
             BodyFrame::Table => Matrix3::identity(),
             BodyFrame::Accelerometer => accelerometer_frame(&given.accel),
         };
-        let triads = PerSensor::from_fn(|sensor| {
+        let triad = |sensor: Sensor| {
             let mut a = given.get(sensor) * rotation.transpose();
             clear_fixed(&mut a, sensor, body_frame);
-            let bias = Vector3::from(triad_record(record, sensor).bias);
-            let bias = bias.component_div(&nominal.get(sensor).0);
-            (
-                a,
-                Triad::from_sensitivity(InstallationForm::General, &a, bias),
-            )
-        });
-        for sensor in Sensor::ALL {
-            let a = triads.get(sensor).0;
             let turned = (0..3).find(|&i| a[(i, i)].is_nan() || a[(i, i)] <= 0.0);
             if let Some(axis) = turned {
                 return Err(ComparisonError::Turned {
@@ -80,8 +69,14 @@ impl Canonical {
                     axis: AXES[axis],
                 });
             }
-        }
-        let triads = PerSensor::from_fn(|sensor| triads.get(sensor).1);
+            let bias = Vector3::from(record.triad(sensor).bias);
+            let bias = bias.component_div(&nominal.get(sensor).0);
+            Ok(Triad::from_sensitivity(InstallationForm::General, &a, bias))
+        };
+        let triads = PerSensor {
+            gyro: triad(Sensor::Gyro)?,
+            accel: triad(Sensor::Accel)?,
+        };
         let own = own_covariance(name, record, nominal)?;
         let covariance = own.map(|own| {
             let form = record.installation_form.unwrap_or_default();
@@ -165,23 +160,11 @@ pub(crate) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
 /// of the rows of `K C`, with the sign of the scale factor.
 pub fn own_nominal(record: &Calibration) -> PerSensor<Nominal> {
     PerSensor::from_fn(|sensor| {
-        let triad = triad_record(record, sensor);
+        let triad = record.triad(sensor);
         Nominal(Vector3::from_fn(|i, _| {
             triad.scale[i] * Vector3::from(triad.installation[i]).norm()
         }))
     })
-}
-
-pub fn triad_record(record: &Calibration, sensor: Sensor) -> &TriadRecord {
-    match sensor {
-        Sensor::Gyro => &record.gyro,
-        Sensor::Accel => &record.accel,
-    }
-}
-
-/// `K C`, divided by the nominal scales.
-fn sensitivity(triad: &TriadRecord, nominal: &Nominal) -> Matrix3<f64> {
-    Matrix3::from_fn(|i, j| triad.scale[i] * triad.installation[i][j] / nominal.0[i])
 }
 
 /// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. Its rows are
@@ -207,47 +190,29 @@ fn own_covariance(
     nominal: &PerSensor<Nominal>,
 ) -> Result<Option<ParameterMatrix>, ComparisonError> {
     let form = record.installation_form.unwrap_or_default();
-    let factor = |index| {
-        let (sensor, of_triad) = sensor_and_parameter(index);
-        nominal.get(sensor).factor(of_triad)
-    };
+    let factor = |index| factor(nominal, index);
     let mut covariance = ParameterMatrix::zeros();
-    if let (true, Some(sigma)) = (record.covariance.is_empty(), &record.sigma) {
-        for sensor in Sensor::ALL {
-            let sigma = sigma.get(sensor);
-            let angles = form.angle_names().iter();
-            let angles = angles.map(|&(row, column)| sigma.installation[row][column]);
-            let mut vector = Triad {
-                form,
-                scale: sigma.scale.into(),
-                angles: Default::default(),
-                bias: sigma.bias.into(),
-            };
-            for (slot, angle) in vector.angles.iter_mut().zip(angles) {
-                *slot = angle;
-            }
-            for (of_triad, sigma) in vector.to_vector().iter().enumerate() {
-                let index = parameter(sensor, of_triad);
-                covariance[(index, index)] = (sigma / factor(index)).powi(2);
-            }
+    if record.covariance.is_empty() {
+        for index in 0..PARAMETERS {
+            let name = parameter_name(form, index);
+            let sigma = name.and_then(|name| record.sigma_of(&name).copied());
+            covariance[(index, index)] = (sigma.unwrap_or(0.0) / factor(index)).powi(2);
         }
     }
     let malformed = || ComparisonError::Covariance {
         name: name.to_owned(),
     };
-    let indices: Option<Vec<usize>> = record
-        .parameters
-        .iter()
-        .map(|p| (0..PARAMETERS).find(|&i| parameter_name(form, i).as_ref() == Some(p)))
-        .collect();
+    let names = record.parameters.iter();
+    let indices: Option<Vec<usize>> = names.map(|name| parameter_index(form, name)).collect();
     let indices = indices.ok_or_else(malformed)?;
-    if record.covariance.len() != indices.len() {
+    let square = record
+        .covariance
+        .iter()
+        .all(|row| row.len() == indices.len());
+    if !square || record.covariance.len() != indices.len() {
         return Err(malformed());
     }
     for (&i, row) in indices.iter().zip(&record.covariance) {
-        if row.len() != indices.len() {
-            return Err(malformed());
-        }
         for (&j, value) in indices.iter().zip(row) {
             covariance[(i, j)] = value / (factor(i) * factor(j));
         }

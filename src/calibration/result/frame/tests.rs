@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::attitude;
 use crate::calibration::parameters::to_vector;
+use crate::calibration::result::TriadRecord;
 use crate::calibration::result::comparison::{Named, compare};
 use crate::imu::{Instrument, Prior};
 
@@ -98,7 +99,7 @@ fn an_instrument_is_the_same_from_two_frames() {
 #[test]
 fn the_accelerometer_frame_makes_the_accelerometers_lower_triangular_by_a_rotation() {
     let record = record();
-    let a = sensitivity(&record.accel, &own_nominal(&record).accel);
+    let a = record.accel.normalised(&own_nominal(&record).accel);
     let r = accelerometer_frame(&a);
     assert!((r * r.transpose() - Matrix3::identity()).amax() < 1e-15);
     assert!((r.determinant() - 1.0).abs() < 1e-15);

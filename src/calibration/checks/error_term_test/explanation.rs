@@ -1,15 +1,24 @@
 //! What error terms that are not estimated leave in an estimate.
 
-use super::joint::Explanation;
 use crate::calibration::parameters::ParameterMatrix;
 
+/// A term as an explanation of what a record shows.
+pub struct Explanation {
+    /// ln of the likelihood with it, and with others that are on, over that without any.
+    pub ln_likelihood_ratio: f64,
+    /// The same over that with the others alone.
+    pub of_term: f64,
+    /// Mean square by which all of them change the parameters.
+    pub added: ParameterMatrix,
+}
+
 /// What the covariance of an estimate lacks for error terms that are not estimated and for which the data speak;
-/// none where they speak for none of `tried`.
+/// absent if they speak for none of `tried`.
 ///
 /// With a term the estimate would be `θ + Δ`, with the covariance `P + P_b`; so the mean square error of `θ` is
 /// `P + P_b + Δ Δᵀ`. Explanations, and that there is none, count as much as each is likely (Hoeting, Madigan,
 /// Raftery, Volinsky 1999, "Bayesian model averaging: a tutorial", Statistical Science 14(4)). Before the data it
-/// is as likely that there is a term as that there is none, and one term as likely as another. A term that
+/// has the same probability that there is a term as that there is none, and all terms have the same. A term that
 /// the data make less likely than it was counts as none.
 pub fn seen_and_left_off(explanations: &[Explanation], tried: usize) -> Option<ParameterMatrix> {
     let spoken_for = explanations.iter().filter(|of| of.of_term > 0.0);

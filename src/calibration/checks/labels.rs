@@ -1,0 +1,31 @@
+//! Whether labelled sections can be used.
+
+use serde_json::json;
+
+use super::finding::Finding;
+use crate::run::motion::ContradictedLabel;
+
+/// Sections whose labels the record contradicts, if there are any.
+pub fn contradicted(contradicted: &[ContradictedLabel]) -> Option<Finding> {
+    let each: Vec<String> = contradicted
+        .iter()
+        .map(ContradictedLabel::to_string)
+        .collect();
+    let text = format!(
+        "Labels and record disagree. Section {}.",
+        each.join("; section ")
+    );
+    let figures = json!({ "contradicted": contradicted });
+    (!contradicted.is_empty()).then(|| Finding::new("labels-contradicted", text, figures))
+}
+
+/// Labelled sections a part of which is missing, if there are any.
+pub fn lost(labels: &[String]) -> Option<Finding> {
+    let text = format!(
+        "Skipped because part of it is missing from the log: section {}. Record it again, or remove it from \
+         [segments].",
+        labels.join(", ")
+    );
+    let figures = json!({ "labels": labels });
+    (!labels.is_empty()).then(|| Finding::new("sections-lost", text, figures))
+}

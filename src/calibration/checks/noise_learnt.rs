@@ -1,0 +1,30 @@
+//! Whether the data contradict the stated noise.
+
+use serde_json::json;
+
+use super::finding::Finding;
+use crate::calibration::noise::{NoiseReport, SourceFigures};
+
+/// The finding of a report of noise that was learnt because the data contradict what is stated.
+pub fn of_report(noise: &NoiseReport) -> Option<Finding> {
+    let test = noise.test.filter(|test| noise.learnt && test.rejected)?;
+    Some(noise_learnt(
+        test.ratio.unwrap_or(f64::NAN),
+        test.ratio_limit,
+        &noise.sources,
+    ))
+}
+
+/// Noise that was learnt: −2 ln of the likelihood ratio of stated to learnt noise, its limit, and the sources.
+pub fn noise_learnt(ratio: f64, limit: f64, sources: &[SourceFigures]) -> Finding {
+    let used = sources.iter().filter(|figures| figures.counts());
+    let used: Vec<String> = used.map(SourceFigures::to_string).collect();
+    let text = format!(
+        "The noise you stated does not fit this record (likelihood-ratio statistic {ratio:.0}; expected below \
+         {limit:.0}, and each factor alone within its limit). turncal used the noise it estimated from the record \
+         instead; all σ include it: {}. To keep it, paste noise.run_toml of calibration.json into [imu.noise].",
+        used.join("; ")
+    );
+    let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources });
+    Finding::new("noise-learnt", text, figures)
+}

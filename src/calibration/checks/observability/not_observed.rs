@@ -1,0 +1,105 @@
+//! What the data do not determine: parameters, combinations of them, the heading, change with temperature.
+
+use serde_json::json;
+
+use crate::calibration::auxiliary::auxiliary_name;
+use crate::calibration::checks::finding::Finding;
+use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::parameter_name;
+use crate::units::DEGREE;
+
+/// What a filter's run along its path does not determine.
+pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
+    let path = "this path";
+    let (form, hidden) = (outcome.estimate.form(), outcome.unobserved());
+    let parameters = hidden.iter().filter_map(|&i| parameter_name(form, i));
+    let constants = outcome.auxiliary.unobserved().filter_map(auxiliary_name);
+    let findings = [
+        not_observed(path, parameters.collect()),
+        combinations(outcome.observability.combinations(form, &hidden)),
+        (!outcome.heading_observed()).then(|| heading(outcome.attitude_sigma.z)),
+        not_observed(path, constants.collect()),
+        outcome.auxiliary.even_terms_inseparable().then(even_terms),
+    ];
+    findings.into_iter().flatten().collect()
+}
+
+/// Parameters that kept more than half of their prior σ, if there are any.
+pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
+    let text = format!(
+        "Not determined by {by} (σ is still more than half of the prior): {}. Add positions or turns that excite \
+         them, or state a smaller σ in [imu.prior].",
+        listed(&parameters)
+    );
+    let figures = json!({ "by": by, "parameters": parameters });
+    (!parameters.is_empty()).then(|| Finding::new("not-observed", text, figures))
+}
+
+/// Parameters whose change with temperature the recordings do not show, if there are any.
+pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
+    let text = format!(
+        "The temperature dependence of these parameters is unknown: {}. Their σ are valid only at the recorded \
+         temperatures. Record turns at more temperatures to determine it.",
+        listed(&parameters)
+    );
+    let figures = json!({ "parameters": parameters });
+    (!parameters.is_empty()).then(|| Finding::new("temperature-not-seen", text, figures))
+}
+
+/// Combinations of parameters that were not observed though each of them was, if there are any.
+fn combinations(combinations: Vec<String>) -> Option<Finding> {
+    let text = format!(
+        "Not determined by this path, though each parameter alone was: {}. Add positions or turns that separate \
+         them.",
+        combinations.join("; ")
+    );
+    let figures = json!({ "combinations": combinations });
+    let any = !combinations.is_empty();
+    any.then(|| Finding::new("combinations-not-observed", text, figures))
+}
+
+/// The heading with its 1σ after the run, rad.
+fn heading(sigma_rad: f64) -> Finding {
+    let text = format!(
+        "Heading could not be determined (σ = {:.1}°): the gyros are too noisy to sense Earth rate, or their biases \
+         mask it. The other parameters were still estimated. If you need the heading, read a table or stand for \
+         longer.",
+        sigma_rad / DEGREE
+    );
+    let figures = json!({ "sigma_rad": sigma_rad });
+    Finding::new("heading-not-observed", text, figures)
+}
+
+/// Second order and asymmetry of the accelerometers cannot be told apart.
+fn even_terms() -> Finding {
+    let text = "Second order and asymmetry of the accelerometers have the same effect in dwells with an axis up or \
+                down. Add dwells between them, such as at 45°, or leave one of the two terms off.";
+    Finding::new("even-terms-inseparable", text.to_owned(), json!(null))
+}
+
+/// Parameters by sensor and kind, such as `gyro scale x, y; accel bias z`.
+fn listed(names: &[String]) -> String {
+    let group = |name: &String| name.rsplit_once('.').map(|(group, _)| group.to_owned());
+    let groups = names.chunk_by(|one, other| group(one) == group(other));
+    let of_group = |names: &[String]| match names[0].rsplit_once('.') {
+        Some((group, _)) => {
+            let axes = names.iter().filter_map(|name| name.rsplit('.').next());
+            let axes: Vec<&str> = axes.collect();
+            format!("{} {}", group.replace('.', " "), axes.join(", "))
+        }
+        None => names.join(", "),
+    };
+    groups.map(of_group).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_are_listed_by_sensor_and_kind() {
+        let names = ["gyro.scale.x", "gyro.scale.y", "accel.bias.z"].map(str::to_owned);
+        assert_eq!(listed(&names), "gyro scale x, y; accel bias z");
+        assert_eq!(listed(&[]), "");
+    }
+}

@@ -1,0 +1,39 @@
+//! Whether recordings differ by more than is stated.
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::finding::Finding;
+
+/// By how much recordings differ in a group of parameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecordingDifference {
+    /// The key of `[day_to_day]`.
+    pub key: String,
+    /// What it states, in its unit.
+    pub stated: f64,
+    /// 1σ that the recordings show, in its unit.
+    pub found: f64,
+    /// −2 ln of the likelihood ratio of stated to found …
+    pub ratio: f64,
+    /// … and its limit at this group's share of the false-alarm rate.
+    pub limit: f64,
+}
+
+/// Differences that were estimated and are used.
+pub fn recordings_differ(differences: &[RecordingDifference]) -> Finding {
+    let one =
+        |of: &RecordingDifference| format!("{} = {:.2e} (stated {})", of.key, of.found, of.stated);
+    let each: Vec<String> = differences.iter().map(one).collect();
+    let text = format!(
+        "The recordings differ more than their σ and [day_to_day] allow. turncal estimated the difference ({}) and \
+         included it in σ. Usual causes: bias changes at switch-on, remounting (set mounting_arcsec), or a \
+         temperature sensor away from the inertial sensors.",
+        each.join(", ")
+    );
+    Finding::new(
+        "recordings-differ",
+        text,
+        json!({ "differences": differences }),
+    )
+}
