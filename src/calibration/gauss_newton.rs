@@ -8,12 +8,15 @@ use super::error::CalibrationError;
 use super::iterations::{Iterated, Progress};
 use super::layout::Layout;
 use super::linearisation::not_invertible;
+use super::model::Model;
 use super::outcome::Outcome;
+use super::parameters::ParameterMatrix;
+use super::pass::PassResult;
 use super::problem::Problem;
 use super::several;
 use super::solved::Solved;
 use crate::calibration::checks;
-use crate::calibration::checks::dwell_scatter::DwellScores;
+use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
 use crate::calibration::checks::form::{FormTest, form_test};
 use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::Observability;
@@ -64,21 +67,15 @@ fn outcome(
         ..
     } = solved;
     let model = &problem.model;
-    let scores = held.posteriors.split_first();
-    let scores = scores.and_then(|(prior, after)| DwellScores::new(prior, after));
-    let by_scatter = scores.as_ref().and_then(DwellScores::widened);
     let estimate = held.both_triads();
-    let scattered = by_scatter.map(|widened| {
-        held.widen(&Layout::new(model), &widened);
-        held.both_triads().covariance - estimate.covariance
-    });
+    let (dwell_scatter, scattered) = scattered(&mut held, model);
     if let Some(sensor) = not_invertible(&estimate.triads) {
         return Err(CalibrationError::Singular { sensor });
     }
     let rounding = by_rounding(&problem, &estimate.triads);
     let mut outcome = Outcome {
         form_test,
-        dwell_scatter: scores.map(|scores| scores.scatter),
+        dwell_scatter,
         observability: Observability::new(
             &estimate,
             &as_stated.model.prior_sigma,
@@ -94,10 +91,7 @@ fn outcome(
         auxiliary: held.auxiliary,
         thermal: held.thermal,
         own: held.own,
-        warming: match problem.model.thermal {
-            Some(_) => problem.warming(),
-            None => Vec::new(),
-        },
+        warming: problem.warming(),
         alone: solved.alone,
         gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
         linearised_at: held.at,
@@ -108,10 +102,7 @@ fn outcome(
         feedback_history: solved.feedback_history,
         innovations: held.innovations,
         aiding: model.aiding,
-        velocity_sigma: problem
-            .stretches()
-            .first()
-            .map_or(0.0, |s| s.stillness(model, Sensor::Accel)),
+        velocity_sigma: problem.stillness(Sensor::Accel),
         model: model.clone(),
         noise: solved.noise,
         passes: solved.passes,
@@ -128,6 +119,23 @@ fn outcome(
         outcome.findings.push(scatter.finding(growth));
     }
     Ok(outcome)
+}
+
+/// How much dwells scatter, none where there are too few; and what the covariance gains where that is beyond chance.
+fn scattered(
+    held: &mut PassResult,
+    model: &Model,
+) -> (Option<DwellScatter>, Option<ParameterMatrix>) {
+    let scores = held.posteriors.split_first();
+    let Some(scores) = scores.and_then(|(prior, after)| DwellScores::new(prior, after)) else {
+        return (None, None);
+    };
+    let gained = scores.widened().map(|widened| {
+        let by_noise = held.both_triads().covariance;
+        held.widen(&Layout::new(model), &widened);
+        held.both_triads().covariance - by_noise
+    });
+    (Some(scores.scatter), gained)
 }
 
 #[cfg(test)]

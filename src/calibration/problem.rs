@@ -180,6 +180,12 @@ impl<'a> Problem<'a> {
         &self.stretches
     }
 
+    /// White 1σ at standstill in the first stretch, of attitude in rad (gyros) or velocity in m/s.
+    pub(in crate::calibration) fn stillness(&self, sensor: Sensor) -> f64 {
+        let first = self.stretches.first();
+        first.map_or(0.0, |stretch| stretch.stillness(&self.model, sensor))
+    }
+
     /// Variance at standstill over the least that is ever taken, of attitude in rad² (gyros) or velocity in
     /// m²/s²; of several stretches the mean.
     pub(in crate::calibration) fn unrest(&self, sensor: Sensor) -> f64 {

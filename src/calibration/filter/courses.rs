@@ -20,30 +20,25 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// Courses that parts of dwells have taken: a tree, from the begin of any of them on.
+/// The course that the last part of a dwell took. What another part has in common with it from its begin on is worked
+/// out already.
 pub struct Courses<const M: usize, const G: usize> {
     models: Vec<StepModel<M>>,
     points: Vec<Point<M, G>>,
-    gains: Vec<Gain<M, G>>,
 }
 
 /// A point of a course.
 struct Point<const M: usize, const G: usize> {
-    /// The point before it, and what happened since.
-    from: usize,
+    /// What happened since the point before it.
     event: Event,
-    /// How the last observation before it is taken in.
-    gain: usize,
-    /// A point that follows it, and another one that follows the point before it.
-    next: Option<usize>,
-    beside: Option<usize>,
-    /// What is known there. It goes on with the course; where one ends it stays.
-    known: Option<Box<Known<M, G>>>,
-    end: bool,
+    /// How an observation was taken in, if that is what happened.
+    gain: Option<Gain<M, G>>,
+    known: Known<M, G>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
 enum Event {
+    Begin,
     /// A step of this model.
     Step(usize),
     /// Three navigation errors from a state on are observed, each with this variance.
@@ -71,8 +66,8 @@ pub struct Known<const M: usize, const G: usize> {
     pub information: [[f64; G]; G],
 }
 
-/// So many bytes of points and gains are kept before a part begins: those of a few courses.
-const MOST: usize = 1 << 20;
+/// Models that are told apart at most: one for each length of a step and each gap in the samples.
+const MOST_MODELS: usize = 256;
 
 impl<const M: usize, const G: usize> Courses<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
@@ -90,33 +85,21 @@ impl<const M: usize, const G: usize> Courses<M, G> {
             covariance: [[0.0; M]; M],
             information: [[0.0; G]; G],
         };
-        let begin = Point {
-            from: Self::BEGIN,
-            event: Event::Step(0),
-            gain: 0,
-            next: None,
-            beside: None,
-            known: Some(Box::new(known)),
-            end: true,
-        };
         Self {
             models: Vec::new(),
-            points: vec![begin],
-            gains: vec![Gain::none()],
+            points: vec![Point {
+                event: Event::Begin,
+                gain: None,
+                known,
+            }],
         }
     }
 
-    /// Forgets what is kept where that is too much.
+    /// Forgets everything where models have become too many.
     pub fn tidy(&mut self) {
-        let of_points = self.points.len() * size_of::<Point<M, G>>();
-        let known = self.points.iter().filter(|point| point.known.is_some());
-        let of_known = known.count() * size_of::<Known<M, G>>();
-        let of_gains = self.gains.len() * size_of::<Gain<M, G>>();
-        if of_points + of_known + of_gains > MOST {
+        if self.models.len() > MOST_MODELS {
             self.models.clear();
             self.points.truncate(1);
-            self.points[Self::BEGIN].next = None;
-            self.gains.truncate(1);
         }
     }
 
@@ -133,117 +116,50 @@ impl<const M: usize, const G: usize> Courses<M, G> {
         &self.models[number]
     }
 
-    /// What is known where a course ends.
-    pub fn end(&mut self, point: usize) -> &Known<M, G> {
-        self.points[point].end = true;
-        self.known(point)
+    /// What is known at a point.
+    pub fn known(&self, point: usize) -> &Known<M, G> {
+        &self.points[point].known
     }
 
-    /// How the last observation before a point was taken in.
-    pub fn gain(&self, point: usize) -> &Gain<M, G> {
-        &self.gains[self.points[point].gain]
+    /// How the observation of a point was taken in.
+    pub fn gain(&self, point: usize) -> Option<&Gain<M, G>> {
+        self.points[point].gain.as_ref()
     }
 
     /// Where a step leads.
     pub fn step(&mut self, from: usize, model: usize) -> usize {
         let event = Event::Step(model);
-        self.reached(from, event).unwrap_or_else(|| {
-            let gain = self.points[from].gain;
-            self.leads(from, event, gain)
-        })
+        if !self.follows(from, event) {
+            let mut known = self.known(from).clone();
+            known.propagate(&self.models[model]);
+            let gain = None;
+            self.points.push(Point { event, gain, known });
+        }
+        from + 1
     }
 
     /// Where it leads to take in three navigation errors from a state on, observed with this variance each; `None`
     /// where their covariance is not positive definite.
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);
-        if let Some(reached) = self.reached(from, event) {
-            return Some(reached);
+        if !self.follows(from, event) {
+            let mut known = self.known(from).clone();
+            let gain = known.gain(state, variance)?;
+            known.tell(&gain);
+            let gain = Some(gain);
+            self.points.push(Point { event, gain, known });
         }
-        let gain = self.known(from).gain(state, variance)?;
-        self.gains.push(gain);
-        Some(self.leads(from, event, self.gains.len() - 1))
+        Some(from + 1)
     }
 
-    fn reached(&self, from: usize, event: Event) -> Option<usize> {
-        let mut point = self.points[from].next;
-        while let Some(number) = point {
-            let Point {
-                event: of_point,
-                beside,
-                ..
-            } = &self.points[number];
-            if *of_point == event {
-                return point;
-            }
-            point = *beside;
+    /// Whether this followed a point before; if not, another course begins there.
+    fn follows(&mut self, point: usize, event: Event) -> bool {
+        let next = self.points.get(point + 1);
+        let same = next.is_some_and(|next| next.event == event);
+        if !same {
+            self.points.truncate(point + 1);
         }
-        None
-    }
-
-    fn leads(&mut self, from: usize, event: Event, gain: usize) -> usize {
-        let number = self.points.len();
-        let beside = self.points[from].next.replace(number);
-        self.points.push(Point {
-            from,
-            event,
-            gain,
-            next: None,
-            beside,
-            known: None,
-            end: false,
-        });
-        number
-    }
-
-    /// What is known at a point.
-    fn known(&mut self, point: usize) -> &Known<M, G> {
-        let known = match self.points[point].known.take() {
-            Some(known) => known,
-            None => self.brought(point),
-        };
-        self.points[point].known.insert(known)
-    }
-
-    /// What is known at a point, brought there from the last before it where it is kept.
-    fn brought(&mut self, point: usize) -> Box<Known<M, G>> {
-        let mut way = Vec::new();
-        let mut at = point;
-        let mut known = loop {
-            if let Some(known) = self.points[at].leave() {
-                break known;
-            }
-            way.push(at);
-            at = self.points[at].from;
-        };
-        for at in way.into_iter().rev() {
-            match self.points[at].event {
-                Event::Step(model) => known.propagate(&self.models[model]),
-                Event::Observed(..) => known.tell(self.gain(at)),
-            }
-        }
-        known
-    }
-}
-
-impl<const M: usize, const G: usize> Point<M, G> {
-    /// What is known there, to go on with.
-    fn leave(&mut self) -> Option<Box<Known<M, G>>> {
-        match self.end {
-            true => self.known.clone(),
-            false => self.known.take(),
-        }
-    }
-}
-
-impl<const M: usize, const G: usize> Gain<M, G> {
-    /// Nothing is observed.
-    fn none() -> Self {
-        Self {
-            root: Matrix3::identity(),
-            rows: [[0.0; G]; 3],
-            of_errors: [[0.0; M]; 3],
-        }
+        same
     }
 }
 
@@ -332,23 +248,24 @@ mod tests {
     #[test]
     fn what_is_known_is_the_same_whichever_course_came_before() {
         let mut shared = courses();
-        let long = go(&mut shared, Courses::<9, 12>::BEGIN, 20, 0.5);
-        shared.end(long[19]);
-        // One that branches off where nothing is kept any more, and one that ends on the way.
-        let branch = go(&mut shared, long[9], 5, 2.0)[4];
-        for (point, variances) in [
-            (branch, [(10, 0.5), (5, 2.0)]),
-            (long[14], [(15, 0.5), (0, 0.0)]),
+        let begin = Courses::<9, 12>::BEGIN;
+        // One course, one that branches off it, and the first again.
+        for variances in [
+            [(10, 0.5), (5, 0.5)],
+            [(10, 0.5), (5, 2.0)],
+            [(15, 0.5), (0, 0.0)],
         ] {
+            let along = |courses: &mut Courses<9, 12>| {
+                variances.iter().fold(begin, |at, &(times, variance)| {
+                    go(courses, at, times, variance)
+                        .last()
+                        .copied()
+                        .unwrap_or(at)
+                })
+            };
             let mut alone = courses();
-            let mut at = Courses::<9, 12>::BEGIN;
-            for (times, variance) in variances {
-                at = go(&mut alone, at, times, variance)
-                    .last()
-                    .copied()
-                    .unwrap_or(at);
-            }
-            let (shared, alone) = (shared.end(point).clone(), alone.end(at).clone());
+            let (point, at) = (along(&mut shared), along(&mut alone));
+            let (shared, alone) = (shared.known(point), alone.known(at));
             assert_eq!(shared.of_given, alone.of_given);
             assert_eq!(shared.covariance, alone.covariance);
             assert_eq!(shared.information, alone.information);

@@ -91,7 +91,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         let to = self
             .courses
             .observe(self.at, observed.state, observed.variance)?;
-        let Gain { root, rows, .. } = self.courses.gain(to);
+        let Gain { root, rows, .. } = self.courses.gain(to)?;
         let expected = Vector3::from_fn(|axis, _| self.mean[observed.state + axis]);
         let residual = root.solve_lower_triangular(&(observed.residual - expected))?;
         let unexpected = self.given.look(rows, &residual)?;
@@ -114,16 +114,17 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     #[inline]
     pub fn take(&mut self, look: &Look<G>) {
         self.at = look.to;
-        let gain = self.courses.gain(look.to);
-        for k in 0..3 {
-            add(&mut self.mean, look.residual[k], &gain.of_errors[k]);
-            add(&mut self.vector, look.residual[k], &gain.rows[k]);
+        if let Some(gain) = self.courses.gain(look.to) {
+            for k in 0..3 {
+                add(&mut self.mean, look.residual[k], &gain.of_errors[k]);
+                add(&mut self.vector, look.residual[k], &gain.rows[k]);
+            }
         }
         self.given.take(&look.unexpected);
     }
 
     pub fn outcome(self) -> Outcome {
-        let known = self.courses.end(self.at);
+        let known = self.courses.known(self.at);
         let rows = factor(known.information, self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         Outcome {

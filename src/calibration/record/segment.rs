@@ -124,6 +124,45 @@ pub fn moves(
     cut(samples, length)
 }
 
+/// Error models of a segment's steps, and with their number of samples the last of which none is interpolated, and the
+/// last of all.
+#[derive(Default)]
+struct Models {
+    all: Vec<Block>,
+    whole: Option<(usize, usize)>,
+    last: Option<(usize, usize)>,
+}
+
+impl Models {
+    /// The number of the model of a step of this length, `made` where no other step is like it: anew, or after one that
+    /// differs by its interpolated samples alone.
+    fn of_step(
+        &mut self,
+        length: usize,
+        bridged: bool,
+        tied: bool,
+        made: impl FnOnce(Option<&Block>) -> Block,
+    ) -> usize {
+        let as_long = |model: Option<(usize, usize)>| {
+            let (of, number) = model?;
+            (of == length).then_some(number)
+        };
+        let number = as_long(self.whole).filter(|_| !bridged);
+        let number = number.unwrap_or_else(|| {
+            // A pass that holds its linearisation stays in one attitude.
+            let like = as_long(self.last).filter(|_| tied && bridged);
+            let model = made(like.and_then(|number| self.all.get(number)));
+            self.all.push(model);
+            self.all.len() - 1
+        });
+        self.last = Some((length, number));
+        if !bridged {
+            self.whole = self.last;
+        }
+        number
+    }
+}
+
 impl Segment {
     /// Navigates from where the navigator is. A pass that holds its linearisation begins each step at the
     /// same state of rest, `tied`, and what the step before led to is referred to it; `held` is the attitude
@@ -150,8 +189,7 @@ impl Segment {
         let whole = ends.map_or(0..0, |((first, _), (last, _))| {
             first.samples.start..last.samples.end
         });
-        // Models of so many samples: the last of which none is interpolated, and the last of all.
-        let (mut alike, mut of_length) = (None, None);
+        let mut models = Models::default();
         for (step, at_rest) in steps {
             let mut referred = Default::default();
             if tied && !segment.steps.is_empty() {
@@ -159,38 +197,16 @@ impl Segment {
                 referred = between(&from, &begin);
                 navigator.state = begin;
             }
-            let samples = step.samples.clone();
-            let length = samples.len();
-            let bridged = imu.bridged(&samples).next().is_some();
-            let number = |model: Option<(usize, usize)>| {
-                let (of, number) = model?;
-                (of == length).then_some(number)
-            };
-            let model = match number(alike).filter(|_| !bridged) {
-                Some(known) => known,
+            let bridged = imu.bridged(&step.samples).next().is_some();
+            let model = models.of_step(step.samples.len(), bridged, tied, |like| match like {
+                Some(model) => navigator.standing_like(model, &step.samples),
                 None => {
-                    // A pass that holds its linearisation stays in one attitude.
-                    let like = number(of_length).filter(|_| tied && bridged);
-                    let like = like.and_then(|number| segment.models.get(number));
-                    let model = match like {
-                        Some(model) => navigator.standing_like(model, &samples),
-                        None => {
-                            let attitude = match tied {
-                                true => begin.attitude,
-                                false => navigator.state.attitude,
-                            };
-                            navigator.warm(&whole);
-                            navigator.standing(&attitude, samples)
-                        }
-                    };
-                    segment.models.push(model);
-                    segment.models.len() - 1
+                    let state = if tied { &begin } else { &navigator.state };
+                    let attitude = state.attitude;
+                    navigator.warm(&whole);
+                    navigator.standing(&attitude, step.samples.clone())
                 }
-            };
-            of_length = Some((length, model));
-            if !bridged {
-                alike = of_length;
-            }
+            });
             navigator.warm(&step.samples);
             navigator.stand(&at_rest.sums);
             let computed = &navigator.state;
@@ -218,7 +234,8 @@ impl Segment {
                 seen: first..segment.seen.len(),
             });
         }
-        segment.models.shrink_to_fit();
+        models.all.shrink_to_fit();
+        segment.models = models.all;
         segment.seen.shrink_to_fit();
         segment
     }

@@ -82,8 +82,12 @@ impl<'a> Problem<'a> {
         Ok(problem.with_model(model))
     }
 
-    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known.
+    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known. None
+    /// where nothing follows temperature.
     pub(in crate::calibration) fn warming(&self) -> Vec<(f64, f64)> {
+        if self.model.thermal.is_none() {
+            return Vec::new();
+        }
         let of_stretch = |stretch: &Stretch| {
             let imu = &stretch.run.recording.imu;
             let mean =
