@@ -129,52 +129,65 @@ impl Sums {
         }
     }
 
-    pub fn result(mut self, model: &Model) -> PassResult {
-        let tried = self.filter.sensitivity.take().map(|sensitivity| {
-            let states = self.filter.layout.parameters();
-            let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();
-            let (information, score, of_states) = sensitivity.normal_equations(states.into_iter());
-            let mut of_parameters = DMatrix::zeros(PARAMETERS, score.len());
-            for (row, index) in of_states.row_iter().zip(indices) {
-                of_parameters.set_row(index, &row);
-            }
-            Tried {
-                information,
-                score,
-                of_parameters,
-            }
-        });
-        let filter = &self.filter;
-        let form = self.at.triads.gyro.form;
-        let own = self.own.iter().enumerate().map(|(recording, own)| {
-            let (mean, covariance) = own.smoothed(filter);
+    /// What auxiliary parameters that were tried would do.
+    fn take_tried(&mut self) -> Option<Tried> {
+        let sensitivity = self.filter.sensitivity.take()?;
+        let states = self.filter.layout.parameters();
+        let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();
+        let (information, score, of_states) = sensitivity.normal_equations(states.into_iter());
+        let mut of_parameters = DMatrix::zeros(PARAMETERS, score.len());
+        for (row, index) in of_states.row_iter().zip(indices) {
+            of_parameters.set_row(index, &row);
+        }
+        Some(Tried {
+            information,
+            score,
+            of_parameters,
+        })
+    }
+
+    /// By how much each recording differs, smoothed by those after it.
+    fn own(&self) -> Vec<Own> {
+        let of_recording = |(recording, own): (usize, &Earlier)| {
+            let (mean, covariance) = own.smoothed(&self.filter);
             let mut own = Own {
                 values: self.at.own(recording),
                 sigma: Difference::default(),
             };
-            for (k, (_, of)) in filter.layout.own().enumerate() {
+            for (k, (_, of)) in self.filter.layout.own().enumerate() {
                 *own.values.get_mut(of) += mean[k];
                 *own.sigma.get_mut(of) = covariance[(k, k)].max(0.0).sqrt();
             }
             own
-        });
-        let own: Vec<Own> = own.collect();
-        let errors = self.attitudes.iter().map(|attitude| {
-            let (mean, _) = attitude.smoothed(filter);
-            Vector3::from_column_slice(mean.as_slice())
-        });
-        let attitudes = self.at.initial_attitudes.iter().zip(errors);
-        let estimate = Linearisation {
-            triads: from_vector(form, &(to_vector(&self.at.triads) + filter.parameters())),
-            terms: self.at.terms + filter.terms(),
+        };
+        self.own.iter().enumerate().map(of_recording).collect()
+    }
+
+    /// Where the next pass linearises.
+    fn estimate(&self, own: &[Own]) -> Linearisation {
+        let (at, filter) = (&self.at, &self.filter);
+        let initial_attitude = |(at, error): (&Matrix3<f64>, &Earlier)| {
+            let (mean, _) = error.smoothed(filter);
+            from_tilt_and_heading(&Vector3::from_column_slice(mean.as_slice())) * at
+        };
+        let attitudes = at.initial_attitudes.iter().zip(&self.attitudes);
+        let parameters = to_vector(&at.triads) + filter.parameters();
+        Linearisation {
+            triads: from_vector(at.triads.gyro.form, &parameters),
+            terms: at.terms + filter.terms(),
             thermal: PerSensor::from_fn(|sensor| {
-                self.at.thermal.get(sensor) + filter.thermal().get(sensor)
+                at.thermal.get(sensor) + filter.thermal().get(sensor)
             }),
             own: own.iter().map(|own| own.values).collect(),
-            initial_attitudes: attitudes
-                .map(|(at, error): (&Matrix3<f64>, _)| from_tilt_and_heading(&error) * at)
-                .collect(),
-        };
+            initial_attitudes: attitudes.map(initial_attitude).collect(),
+        }
+    }
+
+    pub fn result(mut self, model: &Model) -> PassResult {
+        let tried = self.take_tried();
+        let own = self.own();
+        let estimate = self.estimate(&own);
+        let filter = &self.filter;
         let initial = filter.layout.initial_attitude();
         let attitude_sigma = filter.initial_attitude_sigma();
         let mut attitude_covariance = AttitudeCovariance::zeros();
