@@ -58,35 +58,19 @@ pub fn iterate(
     let mut at = from;
     let mut before: Option<PassResult> = None;
     let (mut fraction, mut last_step) = (1.0, f64::INFINITY);
-    let mut shortened = 0;
     loop {
         let gate_now = decision.as_deref().map_or(gate, Gate::As);
         let decided = matches!(gate_now, Gate::As(_));
-        let result = match (
-            pass(problem, priors, &at, Mode::Held(gate_now)),
-            before.take(),
-        ) {
-            (Ok(result), previous) => {
-                before = previous;
-                result
+        let result = match pass_towards(problem, priors, &mut at, gate_now, before.as_ref()) {
+            Ok(result) => result,
+            Err(error) => {
+                return before.map_or(Err(error), |last| Ok(Iterated::ended(last, false)));
             }
-            // Where no pass can be made, the step that led there was too long.
-            (Err(_), Some(previous)) if shortened < MOST_SHORTENED => {
-                shortened += 1;
-                at = previous.at.towards(&at, 0.5);
-                before = Some(previous);
-                continue;
-            }
-            (Err(_), Some(previous)) => return Ok(Iterated::ended(previous, false)),
-            (Err(error), None) => return Err(error),
         };
-        shortened = 0;
         let summary = summary(&result, &at, false);
         progress(&summary);
         passes.push(summary);
-        let same_data = before
-            .as_ref()
-            .is_some_and(|before| same_data(before, &result));
+        let same_data = before.as_ref().is_some_and(|last| same_data(last, &result));
         let settled = summary.largest_step <= problem.options.converged_sigma
             && (decided || same_data || (before.is_none() && summary.rejected == 0));
         let doubtful = !given && beyond(&result, problem.gate()) > MOST_OUTLIERS;
@@ -116,6 +100,28 @@ pub fn iterate(
         };
         before = Some(too_far.unwrap_or(result));
     }
+}
+
+/// A pass at a point; where none can be made there, at one half as far from the pass before, and so on.
+fn pass_towards(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    at: &mut Linearisation,
+    gate: Gate,
+    before: Option<&PassResult>,
+) -> Result<PassResult, CalibrationError> {
+    let mut made = pass(problem, priors, at, Mode::Held(gate));
+    let Some(before) = before else {
+        return made;
+    };
+    for _ in 0..MOST_SHORTENED {
+        if made.is_ok() {
+            break;
+        }
+        *at = before.at.towards(at, 0.5);
+        made = pass(problem, priors, at, Mode::Held(gate));
+    }
+    made
 }
 
 /// Whether two passes let the same observations in.

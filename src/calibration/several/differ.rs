@@ -10,7 +10,7 @@ use crate::calibration::estimate::Estimate;
 use crate::calibration::group::Group;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::{from_vector, sensor_and_parameter};
-use crate::imu::{RATE, ThermalModel, Triad};
+use crate::imu::{RATE, ThermalModel, ThermalState, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// Fewer recordings do not tell a difference from a change with temperature.
@@ -130,6 +130,33 @@ impl Says {
     }
 }
 
+/// What takes what all recordings have in common, in prior σ, to the parameters of one: themselves, and so many functions
+/// of its temperature.
+fn common(
+    model: &Model,
+    indices: &[usize],
+    state: Option<&ThermalState>,
+    functions: usize,
+) -> DMatrix<f64> {
+    let n = indices.len();
+    let mut common = DMatrix::zeros(n, n * (1 + functions));
+    for (i, &index) in indices.iter().enumerate() {
+        common[(i, i)] = 1.0;
+        let (sensor, of_triad) = sensor_and_parameter(index);
+        let axis = Triad::axis(model.form, of_triad);
+        let Some((state, axis)) = state.zip(axis) else {
+            continue;
+        };
+        for function in 0..functions {
+            let sigma = |thermal: &ThermalModel| thermal.sigma.get(sensor)[(of_triad, function)];
+            let coefficient = model.thermal.as_deref().map_or(0.0, sigma);
+            let by = state.get(sensor)[axis][function];
+            common[(i, (1 + function) * n + i)] = by * coefficient / model.prior_sigma[index];
+        }
+    }
+    common
+}
+
 impl Said {
     /// `None` where too few recordings say anything.
     fn new(model: &Model, alone: &[Alone]) -> Option<Self> {
@@ -142,11 +169,6 @@ impl Said {
         let n = indices.len();
         let prior = |i: usize| model.prior_sigma[indices[i]];
         let functions = model.thermal.as_ref().map_or(0, |_| RATE);
-        let coefficient = |i: usize, function: usize| {
-            let (sensor, of_triad) = sensor_and_parameter(indices[i]);
-            let sigma = |thermal: &ThermalModel| thermal.sigma.get(sensor)[(of_triad, function)];
-            model.thermal.as_deref().map_or(0.0, sigma)
-        };
         let mut widest = DVector::from_element(n, 1.0f64);
         let mut recordings = Vec::new();
         for alone in alone {
@@ -157,19 +179,7 @@ impl Said {
                 None if functions > 0 => continue,
                 state => state.as_ref(),
             };
-            let mut common = DMatrix::zeros(n, n * (1 + functions));
-            for i in 0..n {
-                common[(i, i)] = 1.0;
-                let (sensor, of_triad) = sensor_and_parameter(indices[i]);
-                let axis = Triad::axis(model.form, of_triad);
-                if let Some((state, axis)) = state.zip(axis) {
-                    for function in 0..functions {
-                        let by = state.get(sensor)[axis][function];
-                        common[(i, (1 + function) * n + i)] =
-                            by * coefficient(i, function) / prior(i);
-                    }
-                }
-            }
+            let common = common(model, &indices, state, functions);
             let (off, covariance) = in_prior_sigma(estimate, model, &indices);
             widest.zip_apply(&off, |widest, off| *widest = widest.max(off.abs()));
             recordings.extend(Says::new((&off, covariance), &common));
