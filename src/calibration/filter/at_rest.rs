@@ -112,86 +112,97 @@ impl Filter {
         )
     }
 
+    /// How the states that move go on in a step of a dwell, and what noise and constants add to them.
     pub fn step_model<const M: usize>(&self, block: &Block, moving: &[usize]) -> StepModel<M> {
-        let constants = moving.len() - 3;
+        let mut model = StepModel {
+            transition: Vec::new(),
+            driven: Vec::new(),
+            noise: [[0.0; M]; M],
+        };
+        at_rest(block, moving.len() - 3, &mut model);
+        self.biases_vary(block, &mut model);
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
-        let biases = M - self.varying.len();
-        let mut transition = Vec::new();
-        let mut driven = Vec::new();
-        let mut noise = [[0.0; M]; M];
-        let t = block.duration;
-        for row in 0..NAVIGATION {
-            for column in 0..NAVIGATION {
-                transition.push((row, column, block.navigation[(row, column)]));
-            }
-            // A rate tilts evenly while force acts on the tilt.
-            for axis in 0..3 {
-                let tilting = block.navigation[(VELOCITY + row % 3, axis)];
-                let here = f64::from(row % 3 == axis);
-                let (rate, force) = match row / 3 {
-                    0 => (t * here, 0.0),
-                    1 => (0.5 * t * tilting, t * here),
-                    _ => (t * t / 6.0 * tilting, 0.5 * t * t * here),
-                };
-                driven.push((row, constants + axis, rate));
-                driven.push((row, constants + 3 + axis, force));
-            }
-        }
-        for (k, (_, sensor, constant)) in self.layout.varying_biases().enumerate() {
-            let column = block.parameters.get(sensor).column(constant);
-            for row in 0..NAVIGATION {
-                transition.push((row, biases + k, column[row]));
-            }
-            let (state, sigma, correlation_time) = self.varying[k];
-            let keep = (-t / correlation_time).exp();
-            transition.push((biases + k, biases + k, keep));
-            let driven = sigma.powi(2) * self.weight_of(state);
-            noise[biases + k][biases + k] = driven * (1.0 - keep * keep);
-        }
         if let Some(turn) = turn {
-            // By as much as the attitude error changes.
-            for axis in 0..3 {
-                let of_attitude: Vec<_> = transition
-                    .iter()
-                    .filter(|&&(row, ..)| row == ATTITUDE + axis)
-                    .map(|&(row, column, phi)| {
-                        let itself = f64::from(column == row);
-                        (turn + axis, column, phi - itself)
-                    })
-                    .collect();
-                transition.extend(of_attitude);
-                transition.push((turn + axis, turn + axis, 1.0));
-                for column in 0..3 {
-                    driven.push((
-                        turn + axis,
-                        constants + column,
-                        t * f64::from(axis == column),
-                    ));
-                }
-            }
+            turns(block, (turn, moving.len() - 3), &mut model);
         }
         let of_navigation = self.noise_of(block);
         let own = |place: usize| match turn {
             Some(turn) if (turn..turn + 3).contains(&place) => Some(ATTITUDE + place - turn),
             _ => (place < NAVIGATION).then_some(place),
         };
-        for (row, of_row) in noise.iter_mut().enumerate() {
+        for (row, of_row) in model.noise.iter_mut().enumerate() {
             for (column, noise) in of_row.iter_mut().enumerate() {
                 if let (Some(i), Some(j)) = (own(row), own(column)) {
                     *noise = of_navigation[(i, j)];
                 }
                 if row == column && row >= NAVIGATION && own(row).is_some() {
-                    *noise += self.turning.powi(2) * t;
+                    *noise += self.turning.powi(2) * block.duration;
                 }
             }
         }
-        transition.retain(|&(.., phi)| phi != 0.0);
-        driven.retain(|&(.., by)| by != 0.0);
-        StepModel {
-            transition,
-            driven,
-            noise,
+        model.transition.retain(|&(.., phi)| phi != 0.0);
+        model.driven.retain(|&(.., by)| by != 0.0);
+        model
+    }
+
+    /// Varying biases, the last states that move, drive navigation errors as those that are constant do.
+    fn biases_vary<const M: usize>(&self, block: &Block, model: &mut StepModel<M>) {
+        let first = M - self.varying.len();
+        for (k, (_, sensor, constant)) in self.layout.varying_biases().enumerate() {
+            let column = block.parameters.get(sensor).column(constant);
+            for row in 0..NAVIGATION {
+                model.transition.push((row, first + k, column[row]));
+            }
+            let (state, sigma, correlation_time) = self.varying[k];
+            let keep = (-block.duration / correlation_time).exp();
+            model.transition.push((first + k, first + k, keep));
+            let driven = sigma.powi(2) * self.weight_of(state);
+            model.noise[first + k][first + k] = driven * (1.0 - keep * keep);
         }
+    }
+}
+
+/// Navigation errors at rest, driven by constant rates and specific forces, of which the first has this place in `g`.
+fn at_rest<const M: usize>(block: &Block, constants: usize, model: &mut StepModel<M>) {
+    let t = block.duration;
+    for row in 0..NAVIGATION {
+        for column in 0..NAVIGATION {
+            let phi = block.navigation[(row, column)];
+            model.transition.push((row, column, phi));
+        }
+        // A rate tilts evenly while force acts on the tilt.
+        for axis in 0..3 {
+            let tilting = block.navigation[(VELOCITY + row % 3, axis)];
+            let here = f64::from(row % 3 == axis);
+            let (rate, force) = match row / 3 {
+                0 => (t * here, 0.0),
+                1 => (0.5 * t * tilting, t * here),
+                _ => (t * t / 6.0 * tilting, 0.5 * t * t * here),
+            };
+            model.driven.push((row, constants + axis, rate));
+            model.driven.push((row, constants + 3 + axis, force));
+        }
+    }
+}
+
+/// The turn at rest becomes more by as much as the attitude error does.
+fn turns<const M: usize>(
+    block: &Block,
+    (turn, constants): (usize, usize),
+    model: &mut StepModel<M>,
+) {
+    for axis in 0..3 {
+        let of_attitude: Vec<_> = model
+            .transition
+            .iter()
+            .filter(|&&(row, ..)| row == ATTITUDE + axis)
+            .map(|&(row, column, phi)| (turn + axis, column, phi - f64::from(column == row)))
+            .collect();
+        model.transition.extend(of_attitude);
+        model.transition.push((turn + axis, turn + axis, 1.0));
+        model
+            .driven
+            .push((turn + axis, constants + axis, block.duration));
     }
 }
 

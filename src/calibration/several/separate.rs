@@ -18,6 +18,7 @@ use crate::calibration::solved::Solved;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::calibration::start::coarse::coarse_start;
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
+use crate::run::Dwell;
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
 /// more.
@@ -104,19 +105,7 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
             .into_iter()
             .fold(0.0, f64::max)
     });
-    let middle = temperature.map(|temperature| {
-        let imu = &run.recording.imu;
-        let times: Vec<f64> = plain
-            .dwells()
-            .map(|dwell| 0.5 * (imu.time(dwell.samples.start) + imu.time(dwell.samples.end)))
-            .collect();
-        PerSensor::from_fn(|sensor| {
-            [0, 1, 2].map(|axis| {
-                let values = times.iter().map(|&t| temperature.at(t).get(sensor)[axis]);
-                values.sum::<f64>() / times.len().max(1) as f64
-            })
-        })
-    });
+    let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
     let alone = |start, priors, initial_attitudes, estimate| Alone {
@@ -161,6 +150,21 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
             (alone, false)
         }
     })
+}
+
+/// Mean temperature of each axis in the middles of a recording's dwells, °C; none where it is not known.
+fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
+    let imu = &recording.run().recording.imu;
+    let temperature = imu.temperature.as_ref()?;
+    let middle =
+        |dwell: &Dwell| 0.5 * (imu.time(dwell.samples.start) + imu.time(dwell.samples.end));
+    let times: Vec<f64> = recording.dwells().map(middle).collect();
+    Some(PerSensor::from_fn(|sensor| {
+        [0, 1, 2].map(|axis| {
+            let values = times.iter().map(|&t| temperature.at(t).get(sensor)[axis]);
+            values.sum::<f64>() / times.len().max(1) as f64
+        })
+    }))
 }
 
 /// What a recording alone says with other noise.
