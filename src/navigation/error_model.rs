@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector3};
 
-use super::errors::{Rows, add_product, blocks};
+use super::errors::blocks;
 use super::instrument::{Response, response};
 use super::runge_kutta::step;
 use super::strapdown::{Height, Instant, Solution};
@@ -66,39 +66,29 @@ impl ErrorModel {
     pub fn about(truth: &Solution, force: &Vector3<f64>, height: Height) -> Self {
         let (latitude, transport) = (truth.latitude, truth.transport_rate());
         let earth = earth_rate_n(latitude);
-        // Columns by latitude, longitude and height.
-        let earth_by_latitude = Vector3::new(0.0, -earth.z, earth.y);
-        let earth_by_position =
-            Matrix3::from_columns(&[earth_by_latitude, Vector3::zeros(), Vector3::zeros()]);
-        let (transport_by_velocity, transport_by_position) = transport_slopes(truth, &transport);
-        let (gravity_by_latitude, gravity_by_height) =
-            normal_gravity_gradient(latitude, truth.height);
-        let gravity_by_position =
-            Vector3::z() * RowVector3::new(gravity_by_latitude, 0.0, gravity_by_height);
-        // δω_en × V = −V × δω_en.
-        let across = skew(truth.velocity);
         let (tan, sec) = (latitude.tan(), 1.0 / latitude.cos());
+        // Columns by latitude, longitude and height.
+        let zero = Vector3::zeros();
+        let earth_by = Matrix3::from_columns(&[Vector3::new(0.0, -earth.z, earth.y), zero, zero]);
+        let (by_velocity, transport_by) = transport_slopes(truth, &transport);
+        let turning_by = earth_by + transport_by;
+        let (north, up) = normal_gravity_gradient(latitude, truth.height);
+        let gravity_by = Vector3::z() * RowVector3::new(north, 0.0, up);
         let moves = Matrix3::from_diagonal(&Vector3::new(-1.0, sec, 0.0));
+        // −δω_en × V = V × δω_en.
+        let across = skew(truth.velocity);
+        let coriolis = across * by_velocity - skew(earth * 2.0 + transport);
+        let coriolis_by = across * (earth_by + turning_by);
 
-        let coriolis_by_velocity = across * transport_by_velocity - skew(earth * 2.0 + transport);
-        let coriolis_by_position = across * (earth_by_position * 2.0 + transport_by_position);
         let mut f: ErrorMatrix = blocks(&[
             (ATTITUDE, ATTITUDE, -skew(earth + transport)),
-            (ATTITUDE, VELOCITY, transport_by_velocity),
-            (
-                ATTITUDE,
-                POSITION,
-                earth_by_position + transport_by_position,
-            ),
+            (ATTITUDE, VELOCITY, by_velocity),
+            (ATTITUDE, POSITION, turning_by),
             (VELOCITY, ATTITUDE, skew(truth.attitude * force)),
-            (VELOCITY, VELOCITY, coriolis_by_velocity),
-            (
-                VELOCITY,
-                POSITION,
-                coriolis_by_position - gravity_by_position,
-            ),
-            (POSITION, VELOCITY, moves * transport_by_velocity),
-            (POSITION, POSITION, moves * transport_by_position),
+            (VELOCITY, VELOCITY, coriolis),
+            (VELOCITY, POSITION, coriolis_by - gravity_by),
+            (POSITION, VELOCITY, moves * by_velocity),
+            (POSITION, POSITION, moves * transport_by),
         ]);
         f[(LONGITUDE, LATITUDE)] += transport.y * tan * sec;
         f[(HEIGHT, VELOCITY + UP)] = 1.0;
@@ -180,9 +170,9 @@ pub struct Transition {
     pub input: InputMatrix,
 }
 
-/// `∂x/∂θ`, navigation errors by `N` unknown constants: the input errors themselves (`N = 6`) or the parameters of both
-/// triads ([`PARAMETERS`], [`SensedErrors`]). Zero where navigation starts without errors.
-pub type Sensitivity<const N: usize> = SMatrix<f64, STATES, N>;
+/// `∂x/∂θ`, navigation errors by `N` unknown constants: the input errors themselves (`N = 6`) or the parameters of
+/// both triads ([`PARAMETERS`], [`SensedErrors`]). Zero where navigation starts without errors.
+pub type Sensitivity<const N: usize = PARAMETERS> = SMatrix<f64, STATES, N>;
 
 /// `∂ε/∂θ`, errors of the sensed rate and force by parameter errors δθ = true − estimated:
 /// `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`, linear in `[u; 1]`.
@@ -205,14 +195,10 @@ impl SensedErrors {
         }))
     }
 
-    /// At an angular rate (rad/s) and specific force (m/s²) along body axes.
-    pub fn at(
-        &self,
-        rate: &Vector3<f64>,
-        force: &Vector3<f64>,
-    ) -> SMatrix<f64, INPUTS, PARAMETERS> {
+    /// Where this is sensed.
+    pub fn at(&self, at: &Instant) -> SMatrix<f64, INPUTS, PARAMETERS> {
         let mut sensed = SMatrix::<f64, INPUTS, PARAMETERS>::zeros();
-        for (place, (sensor, u)) in Sensor::ALL.into_iter().zip([rate, force]).enumerate() {
+        for (place, (sensor, u)) in Sensor::ALL.into_iter().zip([at.rate, at.force]).enumerate() {
             for axis in 0..3 {
                 let weights = self.0.get(sensor).fixed_rows::<4>(4 * axis);
                 sensed
@@ -228,38 +214,30 @@ impl SensedErrors {
 #[derive(Debug, Clone)]
 pub struct Linearisation {
     dynamics: ErrorMatrix,
-    forcing: Rows<STATES, PARAMETERS>,
+    forcing: Sensitivity,
 }
 
 impl Linearisation {
     /// About a true motion.
     pub fn about(at: &Instant, sensed: &SensedErrors) -> Self {
         let ErrorModel { dynamics, input } = at.linear_model();
-        let forcing = (input * sensed.at(&at.rate, &at.force)).transpose();
+        let forcing = input * sensed.at(at);
         Self { dynamics, forcing }
     }
 
     /// The same with what each parameter drives times a weight of its own.
     pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
         let mut weighted = self.clone();
-        for (parameter, mut forcing) in weighted.forcing.row_iter_mut().enumerate() {
+        for (parameter, mut forcing) in weighted.forcing.column_iter_mut().enumerate() {
             forcing *= weight(parameter);
         }
         weighted
     }
 
-    /// What errors by parameters become through a step of so many seconds, linearised at start, middle and end.
-    pub fn follow(
-        before: &Sensitivity<PARAMETERS>,
-        duration: f64,
-        linearised: [&Self; 3],
-    ) -> Sensitivity<PARAMETERS> {
-        let rate = |linear: &Self, at: &Rows<STATES, PARAMETERS>| {
-            let mut rate = linear.forcing;
-            add_product(&mut rate, &linear.dynamics, at);
-            rate
-        };
-        step(&before.transpose(), duration, linearised, rate).transpose()
+    /// What errors by parameters become through a step of this duration in s, linearised at start, middle and end.
+    pub fn follow(before: &Sensitivity, duration: f64, linearised: [&Self; 3]) -> Sensitivity {
+        let rate = |linear: &Self, at: &Sensitivity| linear.forcing + linear.dynamics * at;
+        step(before, duration, linearised, rate)
     }
 }
 

@@ -2,8 +2,6 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use crate::attitude::skew;
-
 /// Attitude error φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad.
 pub const ATTITUDE: usize = 0;
 /// Velocity error δV, computed − true, East-North-Up, m/s.
@@ -27,50 +25,42 @@ pub fn joined(kinds: [Vector3<f64>; 3]) -> ErrorVector {
 /// A matrix of these blocks, each at its first row and column, and zero elsewhere.
 #[inline]
 pub fn blocks<const N: usize>(blocks: &[(usize, usize, Matrix3<f64>)]) -> SMatrix<f64, STATES, N> {
-    let mut matrix = SMatrix::<f64, STATES, N>::zeros();
+    let mut whole = SMatrix::<f64, STATES, N>::zeros();
     for &(row, column, block) in blocks {
-        let mut place = matrix.fixed_view_mut::<3, 3>(row, column);
-        place.copy_from(&block);
+        whole.fixed_view_mut::<3, 3>(row, column).copy_from(&block);
     }
-    matrix
+    whole
 }
 
 /// `R` rows of `N` columns, kept transposed: what is done to all columns goes through memory without a stride.
 pub type Rows<const R: usize, const N: usize> = SMatrix<f64, N, R>;
 
-/// `sum += sparse · rows`, in as many steps as the sparse matrix has entries other than zero.
-#[inline]
-pub fn add_product<const R: usize, const M: usize, const N: usize>(
-    sum: &mut Rows<R, N>,
-    sparse: &SMatrix<f64, R, M>,
-    rows: &Rows<M, N>,
-) {
-    for i in 0..R {
-        for j in 0..M {
-            let weight = sparse[(i, j)];
-            if weight != 0.0 {
-                sum.column_mut(i).axpy(weight, &rows.column(j), 1.0);
+/// A short time at the site.
+pub struct Span {
+    /// Of the Earth, rad.
+    pub earth_turn: Vector3<f64>,
+    /// ∫f_n dt, m/s.
+    pub force: Vector3<f64>,
+    /// Length in s.
+    pub duration: f64,
+}
+
+impl Span {
+    /// Takes errors of any causes over it: the Earth turns them, force acts on tilt, velocity moves position.
+    #[inline]
+    pub fn carry<const N: usize>(&self, errors: &mut Rows<STATES, N>) {
+        for cause in 0..N {
+            let of = |first: usize| Vector3::from_fn(|axis, _| errors[(cause, first + axis)]);
+            let (tilt, drift) = (of(ATTITUDE), of(VELOCITY));
+            let by_force = self.force.cross(&tilt);
+            let changes = [
+                -self.earth_turn.cross(&tilt),
+                by_force - self.earth_turn.cross(&drift) * 2.0,
+                (by_force * 0.5 + drift) * self.duration,
+            ];
+            for row in 0..STATES {
+                errors[(cause, row)] += changes[row / 3][row % 3];
             }
         }
     }
-}
-
-/// `Φ − I` of a time in s over which the Earth turns by so much, rad, and specific force sums to so much in `n`,
-/// m/s: the Earth turns errors, force acts on tilt, velocity moves position.
-pub fn change(earth_turn: &Vector3<f64>, force: &Vector3<f64>, duration: f64) -> ErrorMatrix {
-    let (turn, force) = (skew(*earth_turn), skew(*force));
-    blocks(&[
-        (ATTITUDE, ATTITUDE, -turn),
-        (VELOCITY, ATTITUDE, force),
-        (VELOCITY, VELOCITY, turn * -2.0),
-        (POSITION, ATTITUDE, force * (0.5 * duration)),
-        (POSITION, VELOCITY, Matrix3::identity() * duration),
-    ])
-}
-
-/// Takes errors of any causes over a time with this `Φ − I`.
-#[inline]
-pub fn carry<const N: usize>(errors: &mut Rows<STATES, N>, change: &ErrorMatrix) {
-    let before = *errors;
-    add_product(errors, change, &before);
 }

@@ -5,9 +5,9 @@
 //! the computed position, and no transport rate arises: the equations are exact for the truth
 //! (`V = 0` at rest) and linear in velocity and position.
 //!
-//! [`Strapdown`] goes over the ellipsoid, nonlinear; [`NonlinearError`] is how far it departs from the truth
-//! and shows what a calibration is worth; [`ErrorModel`] is its linear error model, [`NavigationError`] what is reported. [`Trajectory`] is
-//! where a body that moves truly is.
+//! [`Strapdown`] goes over the ellipsoid, nonlinear; [`NonlinearError`] is how far it departs from the truth and
+//! shows what a calibration is worth; [`ErrorModel`] is its linear error model, [`NavigationError`] what is
+//! reported. [`Trajectory`] is where a body that moves truly is.
 //!
 //! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13.
 

@@ -47,7 +47,7 @@ impl NonlinearError {
         Self(errors)
     }
 
-    /// Continues by a step of so many seconds, driven thus at start, middle and end.
+    /// Continues by a step of this duration in s, driven thus at start, middle and end.
     ///
     /// # Errors
     /// If the computed position comes too near to a pole.

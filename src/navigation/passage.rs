@@ -5,9 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, RowVector3, Vector3, Vector4};
 
 use super::block::{Block, State, TermColumn};
-use super::errors::{
-    ATTITUDE, ErrorMatrix, POSITION, Rows, STATES, VELOCITY, add_product, carry, change,
-};
+use super::errors::{ATTITUDE, POSITION, Rows, STATES, Span, VELOCITY};
 use super::increments::Increments;
 use super::instrument::{INPUTS, Response};
 use super::process_noise::{NoiseInput, NoiseInputs};
@@ -18,7 +16,7 @@ use crate::imu::{PerSensor, Sensed, Sensor, Term, TermVector, ThermalState};
 ///
 /// The output of a triad is linear in `b = [u; 1]` (see [`crate::imu::Triad::response`]), so the integrals of
 /// `C_b_n b_k` ([`INPUTS`]) hold the derivative with respect to every parameter of any installation form.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct Part {
     /// ∫C_b_n b_k dt with the gyros' input in b.
     gyro: Rows<3, INPUTS>,
@@ -26,13 +24,8 @@ struct Part {
     forced: Rows<3, INPUTS>,
     /// ∫C_b_n b_k dt with the accelerometers' input in b.
     accel: Rows<3, INPUTS>,
-    /// ∫f_n dt.
-    force: Vector3<f64>,
-    duration: f64,
-    /// ∫|ω − ω_ie|² dt and ∫|f + g|² dt of a move.
-    motion: PerSensor<f64>,
-    /// Length of a move, s.
-    moving: f64,
+    /// Length, specific force and motion.
+    noise: NoiseInput,
 }
 
 /// What one term parameter does.
@@ -103,22 +96,22 @@ impl Passage {
         let input = increments.angle.push(period);
         add_outer(&mut part.gyro, attitude, &input);
         // The tilt at the middle of the sample acts on the force of the whole sample.
-        let so_far = skew(part.force + force * 0.5);
+        let so_far = skew(part.noise.force + force * 0.5);
         add_outer(&mut part.forced, &(so_far * attitude), &input);
         let input = increments.velocity.push(period);
         add_outer(&mut part.accel, attitude, &input);
-        part.force += force;
-        part.duration += period;
+        part.noise.force += force;
+        part.noise.duration += period;
     }
 
     /// Adds the motion of a sample of a move: the turn over that of the Earth, rad, and the change of
     /// velocity over that of gravity, m/s.
     #[inline]
     pub fn add_motion(&mut self, turned: &Vector3<f64>, change: &Vector3<f64>, period: f64) {
-        let part = &mut self.part;
-        part.motion.gyro += turned.norm_squared() / period;
-        part.motion.accel += change.norm_squared() / period;
-        part.moving += period;
+        let noise = &mut self.part.noise;
+        noise.motion.gyro += turned.norm_squared() / period;
+        noise.motion.accel += change.norm_squared() / period;
+        noise.moving += period;
     }
 
     /// Adds a sample's worth of error terms of these values: attitude at its middle, what the body senses in it,
@@ -143,40 +136,24 @@ impl Passage {
     /// Takes all errors over the samples that were added since the last part. `bridged` is the covariance, in
     /// `n`, that interpolated samples of each triad add to the integral of its input over it, rad² and (m/s)².
     pub fn end_part(&mut self, bridged: Option<Box<PerSensor<Matrix3<f64>>>>) {
-        let part = std::mem::take(&mut self.part);
-        let (t, force) = (part.duration, part.force);
-        let over = change(&(self.noise.earth_rate * t), &force, t);
-        carry(&mut self.navigation, &over);
+        let mut part = std::mem::take(&mut self.part);
+        let over = part.noise.span(&self.noise.earth_rate);
+        over.carry(&mut self.navigation);
         // What tilts from the gyros make of specific force, ∫[f_n×] (∫C_b_n b_k dt) dt, by parts.
-        let mut tilt = -part.forced;
-        add_product(&mut tilt, &skew(force), &part.gyro);
-        drive(&mut self.inputs.gyro, &over, t, &part.gyro, Some(&tilt));
-        drive(&mut self.inputs.accel, &over, t, &part.accel, None);
+        let tilt = part.gyro * skew(-over.force) - part.forced;
+        drive(&mut self.inputs.gyro, &over, &part.gyro, Some(&tilt));
+        drive(&mut self.inputs.accel, &over, &part.accel, None);
         // Stated gravity that is too small pulls the computed velocity down too little.
-        let up = RowVector3::new(0.0, 0.0, t);
-        drive(&mut self.gravity, &over, t, &up, None);
+        let up = RowVector3::new(0.0, 0.0, over.duration);
+        drive(&mut self.gravity, &over, &up, None);
         for term in &mut self.terms {
             let [input, tilt] = [&mut term.input, &mut term.tilt].map(std::mem::take);
             let tilt = (term.sensor == Sensor::Gyro).then(|| tilt.transpose());
-            drive(
-                &mut term.errors,
-                &over,
-                t,
-                &input.transpose(),
-                tilt.as_ref(),
-            );
+            drive(&mut term.errors, &over, &input.transpose(), tilt.as_ref());
         }
-        self.duration += t;
-        // Of no time there is no mean, and no noise either.
-        if t > 0.0 {
-            self.noise.parts.push(NoiseInput {
-                duration: t,
-                force: force / t,
-                motion: part.motion,
-                moving: part.moving,
-                bridged,
-            });
-        }
+        self.duration += over.duration;
+        part.noise.bridged = bridged;
+        self.noise.parts.push(part.noise);
     }
 
     /// The block of all parts, which ends in this computed state.
@@ -215,17 +192,16 @@ fn add_outer(sum: &mut Rows<3, INPUTS>, matrix: &Matrix3<f64>, weights: &Vector4
     }
 }
 
-/// Takes errors over a part of t seconds in which a triad's input errs by this integral. An error of a gyro tilts,
+/// Takes errors over a part in which a triad's input errs by this integral. An error of a gyro tilts,
 /// and its tilts make this of specific force.
 #[inline]
 fn drive<const N: usize>(
     errors: &mut Rows<STATES, N>,
-    over: &ErrorMatrix,
-    t: f64,
+    over: &Span,
     input: &Rows<3, N>,
     tilt: Option<&Rows<3, N>>,
 ) {
-    carry(errors, over);
+    over.carry(errors);
     let mut add = |kind: usize, rows: &Rows<3, N>, weight: f64| {
         let mut of_kind = errors.fixed_columns_mut::<3>(kind);
         of_kind += rows * weight;
@@ -235,11 +211,11 @@ fn drive<const N: usize>(
             add(ATTITUDE, input, -1.0);
             add(VELOCITY, tilt, -1.0);
             // A tilt that grows with time moves velocity with t² and position with t³.
-            add(POSITION, tilt, -t / 3.0);
+            add(POSITION, tilt, -over.duration / 3.0);
         }
         None => {
             add(VELOCITY, input, 1.0);
-            add(POSITION, input, 0.5 * t);
+            add(POSITION, input, 0.5 * over.duration);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::errors::{ATTITUDE, ErrorMatrix, POSITION, VELOCITY, blocks, carry, change};
+use super::errors::{ATTITUDE, ErrorMatrix, POSITION, Span, VELOCITY, blocks};
 use crate::attitude::skew;
 use crate::imu::PerSensor;
 
@@ -36,11 +36,10 @@ impl NoiseInputs {
         for (number, part) in self.parts.iter().enumerate() {
             // No covariance before the first part.
             if number > 0 {
-                let t = part.duration;
-                let over = change(&(self.earth_rate * t), &(part.force * t), t);
+                let over = part.span(&self.earth_rate);
                 // Φ P Φᵀ of a symmetric P, first from one side, then from the other.
                 for _ in 0..2 {
-                    carry(&mut sum, &over);
+                    over.carry(&mut sum);
                     sum.transpose_mut();
                 }
             }
@@ -55,7 +54,7 @@ impl NoiseInputs {
 pub struct NoiseInput {
     /// Length in s.
     pub duration: f64,
-    /// Mean specific force in `n`, m/s².
+    /// ∫f_n dt, m/s.
     pub force: Vector3<f64>,
     /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ where the block is of a move, else zero.
     pub motion: PerSensor<f64>,
@@ -67,11 +66,20 @@ pub struct NoiseInput {
 }
 
 impl NoiseInput {
+    /// The part, on an Earth of this rate in `n`, rad/s.
+    pub fn span(&self, earth_rate: &Vector3<f64>) -> Span {
+        Span {
+            earth_turn: earth_rate * self.duration,
+            force: self.force,
+            duration: self.duration,
+        }
+    }
+
     /// Covariance that noise of these densities adds to the navigation errors. Linear in the squares of
     /// the densities.
     ///
-    /// White noise through the chain attitude → velocity → position over the part, with the mean
-    /// specific force (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).
+    /// White noise through the chain attitude → velocity → position over the part, specific force constant
+    /// in it (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).
     fn covariance(&self, noise: &PerSensor<ProcessNoise>) -> ErrorMatrix {
         let t = self.duration;
         let PerSensor { gyro, accel } = PerSensor::from_fn(|sensor| {
@@ -88,14 +96,13 @@ impl NoiseInput {
         let force = skew(self.force);
         let tilting = force * gyro;
         let both = tilting * force.transpose();
-        let (t2, t3, t4) = (t * t, t * t * t, t * t * t * t);
         let mut covariance: ErrorMatrix = blocks(&[
             (ATTITUDE, ATTITUDE, gyro),
-            (VELOCITY, ATTITUDE, tilting * (t / 2.0)),
-            (POSITION, ATTITUDE, tilting * (t2 / 6.0)),
-            (VELOCITY, VELOCITY, accel + both * (t2 / 3.0)),
-            (POSITION, VELOCITY, accel * (t / 2.0) + both * (t3 / 8.0)),
-            (POSITION, POSITION, accel * (t2 / 3.0) + both * (t4 / 20.0)),
+            (VELOCITY, ATTITUDE, tilting / 2.0),
+            (POSITION, ATTITUDE, tilting * (t / 6.0)),
+            (VELOCITY, VELOCITY, accel + both / 3.0),
+            (POSITION, VELOCITY, (accel / 2.0 + both / 8.0) * t),
+            (POSITION, POSITION, (accel / 3.0 + both / 20.0) * t * t),
         ]);
         covariance.fill_upper_triangle_with_lower_triangle();
         covariance

@@ -2,7 +2,7 @@
 
 use nalgebra::SMatrix;
 
-/// What `at` has become after a step of so many seconds (Runge and Kutta, fourth order), driven thus at start, middle
+/// What `at` has become after a step of this duration in s (Runge and Kutta, fourth order), driven thus at start, middle
 /// and end.
 #[inline]
 pub fn step<const R: usize, const C: usize, F>(

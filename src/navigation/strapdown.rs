@@ -13,7 +13,7 @@ use thiserror::Error;
 use super::errors::{ATTITUDE, ErrorVector, POSITION, VELOCITY, joined};
 use super::increments::Increments;
 use super::runge_kutta::step;
-use crate::attitude::{exp, log, orthonormalised};
+use crate::attitude::{exp, orthonormalised};
 use crate::earth::{Curvature, earth_rate_n, normal_gravity};
 use crate::units::DEGREE;
 
@@ -208,15 +208,14 @@ impl Strapdown {
 impl Height {
     /// A state after part of a step from this start; height and vertical velocity those of the reference.
     #[inline]
-    fn hold(self, state: Solution, start: &Solution, part: f64, period: f64) -> Solution {
+    fn hold(self, mut state: Solution, start: &Solution, part: f64, period: f64) -> Solution {
         let Self::Held { height, velocity } = self else {
             return state;
         };
-        let mut held = state;
         let bulge = (start.velocity.z - velocity) * period * 0.5 * part * (1.0 - part);
-        held.velocity.z = start.velocity.z + (velocity - start.velocity.z) * part;
-        held.height = start.height + (height - start.height) * part + bulge;
-        held
+        state.velocity.z = start.velocity.z + (velocity - start.velocity.z) * part;
+        state.height = start.height + (height - start.height) * part + bulge;
+        state
     }
 }
 
@@ -230,16 +229,6 @@ impl Solution {
             velocity: self.velocity + errors.fixed_rows::<3>(VELOCITY),
             ..self.moved(&position)
         }
-    }
-
-    /// The errors of this computed solution against the true one.
-    pub fn errors(&self, truth: &Self) -> ErrorVector {
-        let position = |s: &Self| s.place().push(s.height);
-        joined([
-            -log(&(self.attitude * truth.attitude.transpose())),
-            self.velocity - truth.velocity,
-            position(self) - position(truth),
-        ])
     }
 
     /// Rates of what changes slowly at this velocity and position under no specific force: turn of East-North-Up,

@@ -22,7 +22,7 @@ use super::ratio::{bootstrap, median, quantile};
 use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::ModelError;
-use crate::navigation::{Instant, SensedErrors, Sensitivity, Trajectory};
+use crate::navigation::{SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
 
@@ -259,10 +259,9 @@ impl ExperimentStudy {
         let mut start = Sensitivity::zeros();
         let mut aligned = None;
         if let (Situation::SelfAligned, Motion::Standing(at)) = (situation, &mission.motion) {
-            let Instant { rate, force, .. } = at.steady();
             let by_sensed = alignment::by_itself(at);
             if let Ok(sensed) = SensedErrors::new(&instrument) {
-                start = by_sensed * sensed.at(&rate, &force);
+                start = by_sensed * sensed.at(&at.steady());
             }
             aligned = Some(by_sensed);
         }

@@ -283,7 +283,7 @@ impl Mission {
     /// As for [`Self::navigate`].
     pub fn exposure_from(
         &self,
-        mut sensitivity: Sensitivity<PARAMETERS>,
+        mut sensitivity: Sensitivity,
         truth: &PerSensor<Triad>,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
         let mut course = Course::new(&self.motion);
@@ -301,7 +301,7 @@ impl Mission {
         for interval in 1..=self.intervals {
             let time = f64::from(interval) * self.interval;
             if let Some((at, transition)) = &at_rest {
-                let sensed = sensed.at(&at.rate, &at.force);
+                let sensed = sensed.at(at);
                 sensitivity = transition.errors * sensitivity + transition.input * sensed;
             } else {
                 course.go(time, 0.0, |stride| {
@@ -345,7 +345,7 @@ fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Epoch {
 
 fn exposure(
     time: f64,
-    sensitivity: &Sensitivity<PARAMETERS>,
+    sensitivity: &Sensitivity,
     truth: &Solution,
 ) -> Result<Exposure, NavigationStudyError> {
     within_reach(truth.latitude)?;

@@ -64,8 +64,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             let mission = study.mission(situation);
             let start = match (&mission.motion, situation) {
                 (Motion::Standing(at), Situation::SelfAligned) => {
-                    let Instant { rate, force, .. } = at.steady();
-                    let sensed = SensedErrors::new(&pair.truth).unwrap().at(&rate, &force);
+                    let sensed = SensedErrors::new(&pair.truth).unwrap().at(&at.steady());
                     alignment::by_itself(at) * sensed * error
                 }
                 _ => Default::default(),

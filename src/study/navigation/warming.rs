@@ -266,31 +266,30 @@ impl Mission {
         let mut functions: Vec<usize> = pair.coefficients.iter().map(|c| c.1).collect();
         functions.sort_unstable();
         functions.dedup();
-        let mut constant = Sensitivity::<PARAMETERS>::zeros();
+        let mut constant: Sensitivity = Sensitivity::zeros();
         let mut changing = vec![constant; functions.len()];
-        let gather = |constant: &Sensitivity<PARAMETERS>,
-                      changing: &[Sensitivity<PARAMETERS>],
-                      course: &Course,
-                      time: f64| {
-            let n = pair.coefficients.len();
-            let own = exposure(time, constant, &course.here().truth)?.by_parameter;
-            let by_function = changing.iter().map(|sensitivity| {
-                Ok(exposure(time, sensitivity, &course.here().truth)?.by_parameter)
-            });
-            let by_function: Vec<_> = by_function.collect::<Result<_, NavigationStudyError>>()?;
-            let mut all = DMatrix::zeros(STATES, PARAMETERS + n);
-            for row in 0..STATES {
-                for column in 0..PARAMETERS {
-                    all[(row, column)] = own[(row, column)];
+        let gather =
+            |constant: &Sensitivity, changing: &[Sensitivity], course: &Course, time: f64| {
+                let n = pair.coefficients.len();
+                let own = exposure(time, constant, &course.here().truth)?.by_parameter;
+                let by_function = changing.iter().map(|sensitivity| {
+                    Ok(exposure(time, sensitivity, &course.here().truth)?.by_parameter)
+                });
+                let by_function: Vec<_> =
+                    by_function.collect::<Result<_, NavigationStudyError>>()?;
+                let mut all = DMatrix::zeros(STATES, PARAMETERS + n);
+                for row in 0..STATES {
+                    for column in 0..PARAMETERS {
+                        all[(row, column)] = own[(row, column)];
+                    }
+                    for (k, (index, function)) in pair.coefficients.iter().enumerate() {
+                        let place = functions.iter().position(|f| f == function);
+                        let of = place.and_then(|place| by_function.get(place));
+                        all[(row, PARAMETERS + k)] = of.map_or(0.0, |of| of[(row, *index)]);
+                    }
                 }
-                for (k, (index, function)) in pair.coefficients.iter().enumerate() {
-                    let place = functions.iter().position(|f| f == function);
-                    let of = place.and_then(|place| by_function.get(place));
-                    all[(row, PARAMETERS + k)] = of.map_or(0.0, |of| of[(row, *index)]);
-                }
-            }
-            Ok::<_, NavigationStudyError>(all)
-        };
+                Ok::<_, NavigationStudyError>(all)
+            };
         let mut exposures = vec![gather(&constant, &changing, &course, 0.0)?];
         for interval in 1..=self.intervals {
             let now = middle(interval);

@@ -1,6 +1,6 @@
 use nalgebra::{Complex, SMatrix, SVector, Vector3};
 use serde_json::Value;
-use turncal::attitude::{exp, from_pitch_roll_heading};
+use turncal::attitude::{exp, from_pitch_roll_heading, log};
 use turncal::earth::{Curvature, ROTATION_RATE, normal_gravity};
 use turncal::imu::{InstallationForm, PerSensor, Sensor, Triad, TriadVector};
 use turncal::navigation::error_model::{INPUTS, PARAMETERS, STATES};
@@ -225,10 +225,10 @@ fn the_linear_model_is_the_derivative_of_navigation_while_flying() {
             ErrorVector::from_column_slice(&[1e-4, 1e-4, 1e-4, 1.0, 1.0, 1.0, 1e-4, 1e-4, 100.0]);
         for state in (0..STATES).filter(|&state| !(is_held && (state == 5 || state == 8))) {
             let shifted = |sign: f64| {
-                let mut errors = ErrorVector::zeros();
-                errors[state] = sign * sizes[state];
-                let end = navigate(&truth.with_errors(&errors), &SVector::zeros(), height);
-                end.errors(&nominal)
+                let mut at_start = ErrorVector::zeros();
+                at_start[state] = sign * sizes[state];
+                let end = navigate(&truth.with_errors(&at_start), &SVector::zeros(), height);
+                errors(&end, &nominal)
             };
             let derivative = (shifted(1.0) - shifted(-1.0)) / 2.0;
             compare(
@@ -241,9 +241,9 @@ fn the_linear_model_is_the_derivative_of_navigation_while_flying() {
         for input in 0..INPUTS {
             let size = if input < 3 { 1e-4 } else { 1.0 };
             let shifted = |sign: f64| {
-                let mut errors = SVector::<f64, INPUTS>::zeros();
-                errors[input] = sign * size;
-                navigate(&truth, &errors, height).errors(&nominal)
+                let mut input_errors = SVector::<f64, INPUTS>::zeros();
+                input_errors[input] = sign * size;
+                errors(&navigate(&truth, &input_errors, height), &nominal)
             };
             let derivative = (shifted(1.0) - shifted(-1.0)) / 2.0;
             compare(
@@ -254,6 +254,24 @@ fn the_linear_model_is_the_derivative_of_navigation_while_flying() {
             );
         }
     }
+}
+
+/// The errors of a computed solution against the true one.
+fn errors(computed: &Solution, truth: &Solution) -> ErrorVector {
+    let turned = log(&(computed.attitude * truth.attitude.transpose()));
+    let velocity = computed.velocity - truth.velocity;
+    let position = [
+        computed.latitude - truth.latitude,
+        computed.longitude - truth.longitude,
+        computed.height - truth.height,
+    ];
+    ErrorVector::from_iterator(
+        (-turned)
+            .iter()
+            .chain(velocity.iter())
+            .chain(&position)
+            .copied(),
+    )
 }
 
 /// What changes in half a second is a millionth and less of the sizes in many places, so the floor is
@@ -291,8 +309,9 @@ fn covariance_of_a_calibration_gives_the_errors_that_its_parameters_cause() {
         ..standing(0.7)
     };
     let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-    let Instant { rate, force, .. } = truth.steady();
-    let sensed = SensedErrors::new(&ideal).unwrap().at(&rate, &force);
+    let at = truth.steady();
+    let Instant { rate, force, .. } = at;
+    let sensed = SensedErrors::new(&ideal).unwrap().at(&at);
     let step = ErrorModel::about(&truth, &force, HELD).over(HOUR);
     let mut sensitivity = Sensitivity::<PARAMETERS>::zeros();
     for _ in 0..10 {

@@ -67,7 +67,7 @@ fn noise_input(scale: f64, wave: &dyn Fn(usize, usize) -> f64) -> NoiseInputs {
         earth_rate: Vector3::zeros(),
         parts: vec![NoiseInput {
             duration: 0.1,
-            force: Vector3::new(0.1, -0.2, 9.8),
+            force: Vector3::new(0.01, -0.02, 0.98),
             bridged: Some(Box::new(bridged)),
             ..NoiseInput::default()
         }],
