@@ -54,7 +54,7 @@ fn standardised(samples: &[(f64, f64)]) -> Vec<f64> {
         .collect()
 }
 
-/// Place and Studentized deviate of the value that is farthest from the mean; none where all are the same.
+/// Place and Studentized deviate of the value that is farthest from the mean; `None` if all are the same.
 fn extreme(values: &[(usize, f64)]) -> Option<(usize, f64)> {
     let values = || values.iter().map(|v| v.1);
     let (mean, deviation) = (values().mean(), values().std_dev());

@@ -17,7 +17,7 @@ const OUTSIDE: f64 = 0.05;
 pub struct Spread {
     /// 1σ from unit to unit; zero where the units' own σ explain all.
     pub value: f64,
-    /// Its own 1σ; none where it is zero.
+    /// Its own 1σ; `None` if it is zero.
     pub sigma: Option<f64>,
     /// 95 % interval.
     pub interval: (f64, f64),
@@ -32,7 +32,7 @@ pub struct Scatter {
     pub mean_sigma: f64,
     /// Sample standard deviation as it stands.
     pub deviation: f64,
-    /// The scatter in units of the claimed σ alone; none where a value has no σ.
+    /// The scatter in units of the claimed σ alone; `None` if a value has no σ.
     pub chi_square: Option<ChiSquare>,
     /// The spread from unit to unit.
     pub spread: Spread,

@@ -66,7 +66,7 @@ fn days(date: &str) -> Option<f64> {
     Some(whole as f64 + seconds / DAY)
 }
 
-/// A weighted line through values: `(place, value, weight)`; none where it is within chance.
+/// A weighted line through values: `(place, value, weight)`; `None` if it is within chance.
 pub fn trend(against: Against, points: &[(f64, f64, f64)], chance: f64) -> Option<Trend> {
     let freedom = points.len().checked_sub(2).filter(|n| *n >= 2)? as f64;
     let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {

@@ -18,7 +18,7 @@ const FEWEST: usize = 256;
 pub struct Stretch {
     /// Its samples.
     pub samples: Range<usize>,
-    /// Which it is, such as `the whole record`.
+    /// Its name, such as `the whole record`.
     pub name: String,
     /// Whether the instrument stands during it, as far as it says.
     pub stands: bool,

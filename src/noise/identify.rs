@@ -1,15 +1,4 @@
-//! Which processes a curve shows, how strong they are, and what could hide in it.
-//!
-//! Generalised least squares of the Allan variance itself, at cluster times half an octave apart,
-//! with the covariance that its points have under the very mixture that is fitted. Of all combinations
-//! of processes the most likely one is taken, where each process must raise twice the logarithm of
-//! the likelihood by [`SIGNIFICANT`], and a correlation time by [`TELLS_TIME`]: a slope that is not there gives no coefficient. For the likelihood the cube
-//! roots of the variances count as normal (Wilson, Hilferty 1931), for at long cluster times they have
-//! few degrees of freedom.
-//!
-//! After El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
-//! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least
-//! squares with the covariance of the points).
+//! What a curve shows: processes with their strengths, limits of those not found, and intervals.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -70,7 +59,7 @@ pub struct Identified {
     /// them.
     pub freedom: Vec<f64>,
     /// What a filter that knows white noise and one Gauss–Markov process should use: the same as what was
-    /// found, but for the nearest Gauss–Markov process in the place of whatever else varies.
+    /// found, with the nearest Gauss–Markov process in the place of whatever else varies.
     pub for_filter: Vec<Found>,
 }
 

@@ -1,4 +1,13 @@
 //! The search for the most likely combination of processes.
+//!
+//! Generalised least squares of the Allan variance itself, at cluster times half an octave apart, with the
+//! covariance that its points have under the very mixture that is fitted. Of all combinations of processes the most
+//! likely one is taken, where each process must raise twice the logarithm of the likelihood by [`SIGNIFICANT`], and
+//! a correlation time by [`SIGNIFICANT_TIME`]: a slope that is not there gives no coefficient.
+//!
+//! After El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
+//! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least squares with the
+//! covariance of the points).
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -70,7 +79,7 @@ impl Clusters {
         };
         let mut doubtful = None;
         let mut starts = (0..=curve.tau.len() / 2).step_by(STEP);
-        let sound = starts.find_map(|first| {
+        let clear = starts.find_map(|first| {
             let (found, probability) = whole.from(first).probable()?;
             if first == 0 || probability > DOUBTFUL {
                 return Some(found);
@@ -78,11 +87,11 @@ impl Clusters {
             doubtful = doubtful.take().or(Some(found));
             None
         });
-        let Some(sound) = sound.or(doubtful) else {
+        let Some(found) = clear.or(doubtful) else {
             return whole.with_misfit();
         };
-        let further = (sound.first > 0).then(|| whole.from(sound.first + STEP).probable());
-        Some(further.flatten().map_or(sound, |(found, _)| found))
+        let further = (found.first > 0).then(|| whole.from(found.first + STEP).probable());
+        Some(further.flatten().map_or(found, |(later, _)| later))
     }
 }
 
@@ -320,12 +329,19 @@ impl<'a> Search<'a> {
 
     /// Of all combinations the most likely one by its score.
     fn most_likely(&self) -> Option<Candidate> {
-        let mut others = Process::SLOPES.to_vec();
-        others.retain(|process| *process != Process::BiasInstability);
-        let all = subsets(&Process::SLOPES).chain(self.with_markov(&others));
         // Cluster times that are left out leave a tail behind, significant or not.
         let is_whole = |of: &Vec<Process>| self.first == 0 || of.contains(&Process::Quantisation);
-        self.least(all.filter(is_whole), Candidate::score)
+        self.least(self.combinations().filter(is_whole), Candidate::score)
+    }
+
+    /// Every combination of slopes, and those without a floor with each Gauss–Markov process, which comes last.
+    fn combinations(&self) -> impl Iterator<Item = Vec<Process>> {
+        let markov = self.clusters.markov(self.tau()[0]);
+        let with_markov = markov.flat_map(|process| {
+            let others = subsets().filter(|of| !of.contains(&Process::BiasInstability));
+            others.map(move |of| [&of[..], &[process]].concat())
+        });
+        subsets().chain(with_markov)
     }
 
     /// Of some combinations, among those that fit, the one for which a figure is least.
@@ -337,17 +353,6 @@ impl<'a> Search<'a> {
         combinations
             .filter_map(|processes| self.candidate(&processes))
             .min_by(|a, b| figure(a).total_cmp(&figure(b)))
-    }
-
-    /// Some processes with Gauss–Markov processes of many correlation times.
-    fn with_markov(&self, others: &[Process]) -> impl Iterator<Item = Vec<Process>> {
-        let markov = self.clusters.markov(self.tau()[0]);
-        markov.flat_map(|process| {
-            subsets(others).map(move |mut processes| {
-                processes.push(process);
-                processes
-            })
-        })
     }
 
     /// With a correlation time between those tried, if it has one.
@@ -396,12 +401,16 @@ impl<'a> Search<'a> {
     /// With the nearest Gauss–Markov process in the place of whatever varies.
     fn for_filter(&self, best: &Candidate) -> Option<Vec<Found>> {
         let is_varying = |process: &Process| VARYING.iter().any(|of| of.same_kind(*process));
-        let (varying, others): (Vec<Process>, Vec<Process>) =
-            best.processes().into_iter().partition(is_varying);
-        let mixture = if varying.is_empty() {
+        let mut others = best.processes();
+        others.retain(|process| !is_varying(process));
+        let is_near = |of: &Vec<Process>| match of.split_last() {
+            Some((last, rest)) => last.same_kind(Process::MARKOV) && rest == others,
+            None => false,
+        };
+        let mixture = if others.len() == best.mixture.len() {
             best.mixture.clone()
         } else {
-            let nearest = self.least(self.with_markov(&others), |of| of.unlikelihood)?;
+            let nearest = self.least(self.combinations().filter(is_near), |of| of.unlikelihood)?;
             self.refined(nearest).mixture
         };
         found(&self.weighted(&mixture)?, &mixture)
@@ -431,12 +440,11 @@ fn found(weighted: &Weighted, mixture: &[(Process, f64)]) -> Option<Vec<Found>> 
     Some(mixture.iter().enumerate().filter_map(found).collect())
 }
 
-/// Every combination of some processes, none at all included.
-fn subsets(processes: &[Process]) -> impl Iterator<Item = Vec<Process>> + use<> {
-    let processes = processes.to_vec();
-    (0..1u32 << processes.len()).map(move |bits| {
-        let chosen = processes.iter().enumerate();
+/// Every combination of slopes, none at all included.
+fn subsets() -> impl Iterator<Item = Vec<Process>> {
+    (0..1 << Process::SLOPES.len()).map(|bits| {
+        let chosen = Process::SLOPES.into_iter().enumerate();
         let chosen = chosen.filter(|(i, _)| bits >> i & 1 == 1);
-        chosen.map(|(_, process)| *process).collect()
+        chosen.map(|(_, process)| process).collect()
     })
 }

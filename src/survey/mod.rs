@@ -35,7 +35,7 @@ pub struct Survey {
     pub directions: usize,
 }
 
-/// Directions nearer to each other tell no more than one, rad.
+/// Directions nearer to each other than this, rad, count as one.
 pub const APART: f64 = 15.0 * DEGREE;
 
 /// How long the instrument stands.
@@ -84,7 +84,7 @@ pub struct MethodOutlook {
 /// σ to be expected, in the general installation form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; none where all are fixed.
+    /// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; `None` if all are fixed.
     pub sigma: Vec<(Group, Option<f64>)>,
     /// Parameters that stay within half of their prior σ, or that nothing but the prior says.
     pub unobserved: Vec<String>,
