@@ -230,6 +230,7 @@ fn a_simulated_instrument_gives_back_what_the_body_did() {
         (Term::SizeEffect, Sensor::Accel, 6e-5),
         (Term::TimeOffset, Sensor::Accel, 7.2e-6),
         (Term::GSensitivity, Sensor::Gyro, 1e-12),
+        (Term::G2Sensitivity, Sensor::Gyro, 2e-11),
     ] {
         let [with, without] = errors(&[term]);
         let (with, without) = (with.get(sensor), without.get(sensor));

@@ -32,6 +32,7 @@ fn the_most_significant_error_term_is_the_one_that_is_there_and_none_where_none_
         Some(ErrorTerm::TableAxes(AxisError::Tilt)),
         gyro(Term::GyroAsymmetry),
         gyro(Term::GyroNonlinearity),
+        gyro(Term::G2Sensitivity),
         None,
     ]);
 }

@@ -76,6 +76,14 @@ fn recovered_as_well_as_sigma_says(runs: u64) {
 }
 
 #[test]
+fn the_square_of_specific_force_in_gyros_is_recovered_as_well_as_its_sigma_says() {
+    let all = [0, 1].map(|stream| nees(Term::G2Sensitivity, stream));
+    let (low, high) = mean_square_interval(6, 0.002);
+    let mean = all.iter().map(|(nees, _)| nees).sum::<f64>() / 6.0;
+    assert!((low..high).contains(&mean), "{mean}");
+}
+
+#[test]
 #[ignore = "slow: several calibrations"]
 fn each_term_is_recovered_as_well_as_its_sigma_says() {
     recovered_as_well_as_sigma_says(2);

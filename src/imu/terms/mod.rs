@@ -6,7 +6,7 @@
 //!
 //! Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
 //! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
-//! scale factor); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect, time offset).
+//! scale factor); IEEE Std 528-2019 (gyros: acceleration-squared sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect, time offset).
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,7 @@ mod accel_cross_coupling;
 mod accel_second_order;
 mod accel_third_order;
 mod asymmetry;
+mod g2_sensitivity;
 mod g_sensitivity;
 mod gyro_nonlinearity;
 mod gyro_second_order;
@@ -74,6 +75,8 @@ registry! {
     AccelThirdOrder: accel_third_order::ENTRY,
     /// Accelerometers add `q_i1 f_x f_y + q_i2 f_x f_z + q_i3 f_y f_z`; q in s²/m.
     AccelCrossCoupling: accel_cross_coupling::ENTRY,
+    /// Gyros add `q_i f_i²`, in rad/s per (m/s²)².
+    G2Sensitivity: g2_sensitivity::ENTRY,
 }
 
 /// Index of the first parameter of each term, and the number of all.

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::imu::Sensor;
+use crate::units::{DEG_PER_H, STANDARD_GRAVITY};
 
 /// With nothing special about it.
 fn any() -> Sensed {
@@ -108,5 +109,22 @@ fn an_asymmetry_adds_the_same_in_both_senses_of_turn_and_a_nonlinearity_the_oppo
             added(Term::GyroNonlinearity, 3, rate),
             sense * scaled(0.125),
         );
+    }
+}
+
+#[test]
+fn a_gyro_that_yields_under_load_drifts_by_as_much_up_as_down_and_not_across() {
+    let mut q = TermVector::zeros();
+    let [deg_per_h_per_g2, g] = [Term::G2Sensitivity.unit().1, STANDARD_GRAVITY];
+    q[Term::G2Sensitivity.parameters().start + 2] = 0.3 * deg_per_h_per_g2;
+    let drift = |force: Vector3<f64>| Sensed { force, ..any() }.added(Sensor::Gyro, &q);
+    for (force, drifts) in [
+        (Vector3::z() * g, 0.3),
+        (Vector3::z() * -g, 0.3),
+        (Vector3::x() * g, 0.0),
+        (Vector3::new(0.6, 0.0, 0.8) * g, 0.3 * 0.64),
+    ] {
+        let expected = Vector3::z() * drifts * DEG_PER_H;
+        assert!((drift(force) - expected).norm() < 1e-18, "{force}");
     }
 }
