@@ -1,3 +1,5 @@
+use nalgebra::Vector3;
+
 use super::*;
 use crate::calibration::Options;
 use crate::recording::{LabelledMotion, Segment};
