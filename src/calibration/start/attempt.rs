@@ -1,6 +1,8 @@
 //! A calibration from one start, with stated noise: with a table a pass with feedback, and Gauss–Newton iterations.
 //! Where stated noise leads nowhere, with the noise that the data show at the start.
 
+use rayon::prelude::*;
+
 use super::coarse::{CoarseStart, coarse_start};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::iterations::{Iterated, Progress, iterate, summary};
@@ -11,19 +13,42 @@ use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
 use crate::run::Aiding;
 
-/// From the coarse start; where stated noise does not converge, with the noise that the data show there.
+/// From the coarse start, with the heading in the likeliest of four quadrants where Earth rate does not tell it; where
+/// stated noise does not converge, with the noise that the data show there.
 pub fn from_coarse_start<'a>(
     problem: &Problem<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let start = coarse_start(problem)?;
-    let stated = stated(problem, &start, progress);
+    let tried = |start| (stated(problem, &start, progress), start);
+    let mut best = tried(start);
+    if best.1.hidden {
+        let others: Vec<_> = best.1.other_headings().into_par_iter().map(tried).collect();
+        best = others.into_iter().fold(best, likelier);
+    }
+    let (stated, start) = best;
     let converged = |solved: &Solved| solved.iterated.converged;
     if stated.as_ref().is_ok_and(converged) || problem.options.noise == NoisePolicy::Stated {
         return stated;
     }
     let learnt = learnt_at(problem, start, progress).ok();
     learnt.filter(converged).map_or(stated, Ok)
+}
+
+/// What came of a start.
+type Tried<'a> = (Result<Solved<'a>, CalibrationError>, CoarseStart);
+
+/// The one that converged, and if both did, the likelier one.
+fn likelier<'a>(one: Tried<'a>, other: Tried<'a>) -> Tried<'a> {
+    let rank = |solved: &Solved| {
+        let Iterated { held, converged } = &solved.iterated;
+        (!converged, held.deviance())
+    };
+    match (&one.0, &other.0) {
+        (Ok(first), Ok(second)) if rank(second) < rank(first) => other,
+        (Err(_), Ok(_)) => other,
+        _ => one,
+    }
 }
 
 /// With stated noise: with a table a pass with feedback first.

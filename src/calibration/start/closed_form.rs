@@ -62,7 +62,7 @@ pub struct ClosedForm {
     pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
-    /// Noise that was learnt; none where it is as stated.
+    /// Noise that was learnt; `None` if it is as stated.
     pub noise: Option<NoiseReport>,
     /// What a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,

@@ -1,7 +1,6 @@
 //! The coarse start: where the filter begins, not what it knows. The filter's prior stays its own.
 
 use std::f64::consts::FRAC_PI_2;
-use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -47,15 +46,15 @@ pub struct CoarseStart {
 }
 
 impl CoarseStart {
-    /// The same with the headings of these stretches in the other three quadrants.
-    pub(in crate::calibration) fn other_headings(&self, of: Range<usize>) -> [Self; 3] {
+    /// The same with the headings in the other three quadrants.
+    pub(in crate::calibration) fn other_headings(&self) -> [Self; 3] {
         [1, 2, 3].map(|quadrant| {
             let turn = exp(Vector3::z() * (FRAC_PI_2 * f64::from(quadrant)));
             let mut turned = self.clone();
-            for attitude in &mut turned.at.initial_attitudes[of.clone()] {
+            for attitude in &mut turned.at.initial_attitudes {
                 *attitude = turn * *attitude;
             }
-            for attitude in &mut turned.attitudes[of.clone()] {
+            for attitude in &mut turned.attitudes {
                 attitude.mean = turn * attitude.mean;
             }
             turned

@@ -73,17 +73,6 @@ impl<const N: usize> Rows<N> {
     }
 }
 
-/// One row of [`Rows`].
-struct Row {
-    event: usize,
-    partials: ParameterVector,
-    residual: f64,
-    weighted: f64,
-    own: f64,
-    common: Vec<(Common, Vector3<f64>)>,
-    by_hand: [f64; BY_HAND.len()],
-}
-
 /// Equations `residual = partials · δθ + error`, and what is known of δθ beforehand.
 pub struct Equations {
     /// Which of the parameters of both triads are to be found.
@@ -91,7 +80,7 @@ pub struct Equations {
     /// Their prior: mean over σ, and σ, infinite without one.
     mean: DVector<f64>,
     sigma: DVector<f64>,
-    rows: Vec<Row>,
+    rows: Vec<Rows<1>>,
     pub events: Vec<Event>,
     /// Whether rows are weighted by the inverse of their whole covariance, not each by its own variance.
     pub correlated: bool,
@@ -129,16 +118,16 @@ impl Equations {
     }
 
     pub fn add<const N: usize>(&mut self, rows: &Rows<N>) {
-        let row = |k: usize| Row {
+        let row = |k: usize| Rows {
             event: rows.event,
-            partials: rows.partials.row(k).transpose(),
-            residual: rows.residual[k],
-            weighted: rows.weighted[k],
-            own: rows.own[k],
+            partials: rows.partials.fixed_rows::<1>(k).into_owned(),
+            residual: rows.residual.fixed_rows::<1>(k).into_owned(),
+            weighted: rows.weighted.fixed_rows::<1>(k).into_owned(),
+            own: rows.own.fixed_rows::<1>(k).into_owned(),
             common: Vec::from_iter(
                 rows.common
                     .iter()
-                    .map(|(of, by)| (*of, by.row(k).transpose())),
+                    .map(|(of, by)| (*of, by.fixed_rows::<1>(k).into_owned())),
             ),
             by_hand: rows.by_hand,
         };
@@ -152,9 +141,9 @@ impl Equations {
     /// Partials by the unknowns, and residuals, each row over the σ by which it is weighted.
     pub fn scaled(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (rows, unknown) = (&self.rows, &self.unknown);
-        let sigma = |k: usize| rows[k].weighted.sqrt();
+        let sigma = |k: usize| rows[k].weighted.x.sqrt();
         let partial = |k: usize, j: usize| rows[k].partials[unknown[j]] / sigma(k);
-        let residual = |k: usize, _| rows[k].residual / sigma(k);
+        let residual = |k: usize, _| rows[k].residual.x / sigma(k);
         (
             DMatrix::from_fn(rows.len(), unknown.len(), partial),
             DVector::from_fn(rows.len(), residual),
@@ -190,13 +179,13 @@ impl Equations {
         let mut errors = DMatrix::zeros(rows.len(), rows.len());
         for (i, one) in rows.iter().enumerate() {
             for (j, other) in rows[..=i].iter().enumerate() {
-                let mut sum = if i == j { one.own } else { 0.0 };
+                let mut sum = if i == j { one.own.x } else { 0.0 };
                 for (of_one, by_one) in &one.common {
                     for (of_other, by_other) in &other.common {
                         sum += covariance(*of_one, *of_other) * by_one.dot(by_other);
                     }
                 }
-                errors[(i, j)] = sum / (one.weighted * other.weighted).sqrt();
+                errors[(i, j)] = sum / (one.weighted.x * other.weighted.x).sqrt();
                 errors[(j, i)] = errors[(i, j)];
             }
         }
@@ -290,7 +279,7 @@ impl Equations {
         for (row, mut place) in self.rows.iter().zip(by_unit.row_iter_mut()) {
             for (of, by) in &row.common {
                 if *of == Common::Unit(unit) {
-                    place += by.transpose() / row.weighted.sqrt();
+                    place += by / row.weighted.x.sqrt();
                 }
             }
         }
@@ -307,14 +296,14 @@ impl Equations {
     /// How much of each of [`BY_HAND`] is in each of the scaled rows.
     pub fn by_hand(&self) -> Parts {
         std::array::from_fn(|source| {
-            let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted;
+            let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted.x;
             DVector::from_fn(self.rows.len(), part)
         })
     }
 
     /// Residual and weight of each row.
     pub fn weighted(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.rows.iter().map(|row| (row.residual, row.weighted))
+        self.rows.iter().map(|row| (row.residual.x, row.weighted.x))
     }
 
     /// The rows of each event that has any, by its number.

@@ -26,19 +26,32 @@ const STEP: f64 = 0.02;
 #[derive(Debug, Clone)]
 pub struct Section {
     pub samples: Range<usize>,
-    motion: LabelledMotion,
+    pub motion: LabelledMotion,
     /// Mean output of each triad.
-    mean: PerSensor<MeanOutput>,
+    pub mean: PerSensor<MeanOutput>,
     /// Begin and end, s.
     times: [f64; 2],
 }
 
 impl Section {
+    pub fn new(run: &Run, samples: Range<usize>, motion: LabelledMotion) -> Self {
+        let dwell = Dwell {
+            samples: samples.clone(),
+            position: None,
+        };
+        Self {
+            samples,
+            motion,
+            mean: PerSensor::from_fn(|sensor| dwell.mean(sensor, run)),
+            times: dwell.times(run),
+        }
+    }
+
     pub fn stands(&self) -> bool {
         matches!(self.motion, LabelledMotion::Stands { .. })
     }
 
-    fn duration(&self) -> f64 {
+    pub fn duration(&self) -> f64 {
         self.times[1] - self.times[0]
     }
 }
@@ -74,18 +87,7 @@ impl Used {
                     used: used.is_some(),
                 });
             }
-            let section = used.map(|samples| {
-                let dwell = Dwell {
-                    samples: samples.clone(),
-                    position: None,
-                };
-                Section {
-                    samples,
-                    motion,
-                    mean: PerSensor::from_fn(|sensor| dwell.mean(sensor, run)),
-                    times: dwell.times(run),
-                }
-            });
+            let section = used.map(|samples| Section::new(run, samples, motion));
             found.sections.extend(section);
         }
         found
@@ -356,12 +358,15 @@ mod tests {
     use crate::imu::{InstallationForm, Noise, ParameterKind, Triad, TriadVector};
     use crate::units::DEGREE;
 
+    /// How an input follows errors, by number.
+    type Errors = Vec<(usize, Matrix3<f64>)>;
+
     /// Squared errors over variances of scale factors, installation and biases, from this many sets of
     /// positions that are each off by random tilts.
     fn mean_squares(
         sets: usize,
         tilt: f64,
-        errors: fn(usize, &Position, f64) -> Vec<(usize, Matrix3<f64>)>,
+        errors: fn(usize, &Position, f64) -> Errors,
         make: impl Fn(&mut dyn FnMut(f64) -> Vector3<f64>, &Triad) -> Vec<Position>,
     ) -> [f64; 3] {
         let form = InstallationForm::General;
@@ -405,11 +410,11 @@ mod tests {
         sums
     }
 
-    fn tilted(number: usize, position: &Position, sigma: f64) -> Vec<(usize, Matrix3<f64>)> {
+    fn tilted(number: usize, position: &Position, sigma: f64) -> Errors {
         by_tilts(position, sigma, number).to_vec()
     }
 
-    fn only_shortened(_: usize, position: &Position, sigma: f64) -> Vec<(usize, Matrix3<f64>)> {
+    fn only_shortened(_: usize, position: &Position, sigma: f64) -> Errors {
         vec![(1, shortened(position, sigma))]
     }
 

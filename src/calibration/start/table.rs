@@ -82,31 +82,27 @@ pub fn carried(
     let mut equations = Equations::of_triads(&problem.model, triads, &Sensor::ALL);
     for stretch in problem.stretches() {
         let mut before = None;
-        for dwell in &stretch.dwells {
-            let Some(position) = &dwell.position else {
-                continue;
-            };
-            add_carried(
-                &mut equations,
-                problem,
-                stretch,
-                triads,
-                (before, dwell, position.attitude),
-            )?;
-            before = Some((dwell.samples.end, position.attitude));
+        let dwells = stretch.dwells.iter();
+        for dwell in dwells.filter(|dwell| dwell.position.is_some()) {
+            add_carried(&mut equations, problem, stretch, triads, (before, dwell))?;
+            before = Some(dwell);
         }
     }
     Ok(equations)
 }
 
-/// Adds a dwell in this attitude, and the move to it from the end and the attitude of the dwell before.
+/// Adds a dwell, and the move to it from the dwell before.
 fn add_carried(
     equations: &mut Equations,
     problem: &Problem,
     stretch: &Stretch,
     triads: &PerSensor<Triad>,
-    (before, dwell, attitude): (Option<(usize, Matrix3<f64>)>, &Dwell, Matrix3<f64>),
+    (before, dwell): (Option<&Dwell>, &Dwell),
 ) -> Result<(), CalibrationError> {
+    let read = |dwell: &Dwell| dwell.position.as_ref().map(|position| position.attitude);
+    let Some(attitude) = read(dwell) else {
+        return Ok(());
+    };
     let (run, model) = (stretch.run, &problem.model);
     let imu = &run.recording.imu;
     let walk = PerSensor::from_fn(|sensor| model.noise.get(sensor).random_walk.powi(2));
@@ -117,8 +113,8 @@ fn add_carried(
     };
     // φ of a block's end against the dwell's attitude.
     let off = |block: &Block| -log(&(block.state.attitude * attitude.transpose()));
-    if let Some((end, start)) = before {
-        let turn = at_rest(start)?.advance(end..dwell.samples.start);
+    if let Some((before, start)) = before.and_then(|before| Some((before, read(before)?))) {
+        let turn = at_rest(start)?.advance(before.samples.end..dwell.samples.start);
         let variance = 2.0 * attitude_variance + walk.gyro * turn.duration;
         add(equations, &turn, 0, off(&turn), variance);
     }

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::attitude::{exp, matrix};
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::start::equations::OfTriad;
+use crate::calibration::start::labels::Section;
 use crate::calibration::start::table::sensed;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
@@ -219,36 +220,34 @@ impl Legs<'_> {
 }
 
 fn labelled(run: &Run, dwells: &[&Dwell]) -> Vec<(Sensor, Sensed)> {
-    let period = run.recording.imu.period;
     let prior = &run.instrument.prior;
     let set_by_hand = run.segment_sigma.powi(2);
     let segments = run.recording.segments.iter();
     let whole = segments.filter(|segment| !run.recording.imu.is_lost(&segment.samples));
     let labelled = whole.filter_map(|segment| {
-        let section = Dwell::of(segment.samples.clone());
-        Some(match segment.motion? {
+        let samples = &segment.samples;
+        let section = Section::new(run, samples.clone(), segment.motion?);
+        let PerSensor { gyro, accel } = section.mean;
+        Some(match section.motion {
             LabelledMotion::Stands { up } => {
-                let force = section.mean(Sensor::Accel, run);
                 let sensed = Sensed {
-                    found: (force.output - prior.accel.bias) / run.site.gravity,
+                    found: (accel.output - prior.accel.bias) / run.site.gravity,
                     known: Some(up),
-                    variance: force.variance / run.site.gravity.powi(2) + set_by_hand,
+                    variance: accel.variance / run.site.gravity.powi(2) + set_by_hand,
                 };
                 (Sensor::Accel, sensed)
             }
             LabelledMotion::Turns { axis, angle } => {
-                let samples = &segment.samples;
                 let apart = |dwell: &&&Dwell| {
                     let Range { start, end } = dwell.samples;
                     let before = samples.start.saturating_sub(end);
                     start.saturating_sub(samples.end).max(before)
                 };
                 let nearest = dwells.iter().min_by_key(apart);
-                let zero =
-                    nearest.map_or(prior.gyro.bias, |rest| rest.mean(Sensor::Gyro, run).output);
-                let output = section.mean(Sensor::Gyro, run).output;
+                let at_rest = nearest.map(|rest| rest.mean(Sensor::Gyro, run).output);
+                let zero = at_rest.unwrap_or(prior.gyro.bias);
                 let sensed = Sensed {
-                    found: (output - zero) * (samples.len() as f64 * period),
+                    found: (gyro.output - zero) * section.duration(),
                     known: Some(axis * angle),
                     variance: angle_variance(run, samples) + set_by_hand,
                 };
