@@ -6,13 +6,14 @@
 
 mod dense_filter;
 
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use dense_filter::DenseFilter;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use turncal::calibration::{
-    NoisePolicy, Options, Outcome, Problem, bound, estimate, test_error_terms,
+    Method, NoisePolicy, Options, Outcome, Problem, bound, estimate, test_error_terms,
 };
 use turncal::formats::write_run;
 use turncal::imu::{InstallationForm, PerSensor, Triad};
@@ -131,16 +132,46 @@ fn error_terms(bencher: Bencher) {
         .bench(|| test_error_terms(problem, outcome));
 }
 
+/// All that `calibrate` works out of a recorded run, if it is there.
+#[divan::bench(sample_count = 5, args = ["three-axis-counts", "real-mems-lot-0", "nineteen-position-velocity"])]
+fn calibrate(bencher: Bencher, name: &str) {
+    let data = std::env::var_os("TURNCAL_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let Ok(run) = Run::read(&data.join(name).join("run.toml")) else {
+        return;
+    };
+    let problem = Problem::new(&run, &Options::default());
+    bencher
+        .counter(ItemsCount::new(run.recording.imu.len()))
+        .bench(|| {
+            let mut solution = problem.solve(Method::Ekf, &|_| {})?;
+            solution.assess(&problem)
+        });
+}
+
+/// Simulation, both methods and the bound, a hundred times.
+#[divan::bench(sample_count = 1)]
+fn hundred_monte_carlo_runs(bencher: Bencher) {
+    let study = study(100);
+    bencher.bench(|| study.run(&|| {}).expect("a sound study"));
+}
+
 /// Simulation, both methods and the bound.
 #[divan::bench(sample_count = 5)]
 fn one_monte_carlo_run(bencher: Bencher) {
-    let study = AccuracyStudy {
+    let study = study(1);
+    bencher.bench(|| study.run(&|| {}).expect("a sound study"));
+}
+
+fn study(runs: u64) -> AccuracyStudy {
+    AccuracyStudy {
         scenario: Scenario::load("demo").expect("embedded"),
         form: InstallationForm::General,
         unmodelled: Vec::new(),
         noise: Default::default(),
-        runs: 1,
+        runs,
         seed: 1,
-    };
-    bencher.bench(|| study.run(&|| {}).expect("a sound study"));
+    }
 }
