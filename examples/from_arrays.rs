@@ -3,7 +3,7 @@
 //! Run it with `cargo run --release --example from_arrays`.
 
 use nalgebra::Vector3;
-use turncal::calibration::{Method, Options, Problem};
+use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 use turncal::earth::Site;
 use turncal::imu::{Instrument, Noise, PerSensor, Prior};
 use turncal::recording::Recording;
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let run = Run::new(recording, instrument, site);
 
     let problem = Problem::new(&run, &Options::default().aiding(Aiding::Velocity));
-    let mut solution = problem.solve(Method::Ekf, &|_| {})?;
+    let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
     let assessment = solution.assess(&problem)?;
     let calibration = solution.calibration(&problem, &assessment);
     for name in ["gyro.bias.x", "accel.scale.z"] {

@@ -3,7 +3,7 @@
 //!
 //! Run it with `cargo run --release --example simulate_and_compare`.
 
-use turncal::calibration::{Group, Method, Options, Problem, nees, to_vector};
+use turncal::calibration::{Group, Method, Options, Problem, UNWATCHED, nees, to_vector};
 use turncal::simulation::Scenario;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let problem = Problem::new(&simulated.run, &Options::default());
     let truth = to_vector(&simulated.truth);
     for method in [Method::SixPosition, Method::Ekf] {
-        let solution = problem.solve(method, &|_| {})?;
+        let solution = problem.solve(method, UNWATCHED)?;
         let estimate = solution.estimate();
         let error = estimate.vector() - truth;
         println!("{method:?}: RMS error over RMS σ of each group");

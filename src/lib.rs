@@ -8,14 +8,14 @@
 //!
 //! # Calibrate
 //! ```
-//! use turncal::calibration::{Method, Options, Problem};
+//! use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 //! use turncal::simulation::Scenario;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A simulated run; `Run::read("run.toml".as_ref())` reads a recorded one.
 //! let run = Scenario::load("single-axis")?.simulate(1, 0)?.run;
 //! let problem = Problem::new(&run, &Options::default());
-//! let mut solution = problem.solve(Method::Ekf, &|_| {})?;
+//! let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
 //! let assessment = solution.assess(&problem)?;
 //! let calibration = solution.calibration(&problem, &assessment);
 //! assert!(solution.converged());

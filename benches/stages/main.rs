@@ -13,7 +13,7 @@ use dense_filter::DenseFilter;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use turncal::calibration::{
-    Method, NoisePolicy, Options, Outcome, Problem, bound, estimate, test_error_terms,
+    Method, NoisePolicy, Options, Outcome, Problem, UNWATCHED, bound, estimate, test_error_terms,
 };
 use turncal::formats::write_run;
 use turncal::imu::{InstallationForm, PerSensor, Triad};
@@ -116,7 +116,7 @@ fn estimator(bencher: Bencher, noise: NoisePolicy) {
     let problem = Problem::new(run(), &Options::default().noise(noise));
     bencher
         .counter(samples())
-        .bench(|| estimate(&problem, &|_| {}));
+        .bench(|| estimate(&problem, UNWATCHED));
 }
 
 #[divan::bench]
@@ -124,7 +124,7 @@ fn error_terms(bencher: Bencher) {
     static SOLVED: OnceLock<(Problem, Outcome)> = OnceLock::new();
     let (problem, outcome) = SOLVED.get_or_init(|| {
         let problem = Problem::new(run(), &Options::default());
-        let outcome = estimate(&problem, &|_| {}).expect("a sound run");
+        let outcome = estimate(&problem, UNWATCHED).expect("a sound run");
         (problem, outcome)
     });
     bencher
@@ -146,7 +146,7 @@ fn calibrate(bencher: Bencher, name: &str) {
     bencher
         .counter(ItemsCount::new(run.recording.imu.len()))
         .bench(|| {
-            let mut solution = problem.solve(Method::Ekf, &|_| {})?;
+            let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
             solution.assess(&problem)
         });
 }

@@ -76,6 +76,9 @@ pub enum CalibrationError {
         /// All of them.
         contradicted: Vec<ContradictedLabel>,
     },
+    /// Progress said so.
+    #[error("stopped before the iterations ended; nothing was written")]
+    Stopped,
     /// Axes that are swapped, reversed or left-handed.
     #[error("{0}")]
     Mounting(Box<Mounting>),

@@ -1,5 +1,7 @@
 //! Gauss–Newton iterations: passes with the linearisation held until nothing moves.
 
+use std::ops::ControlFlow;
+
 use super::error::CalibrationError;
 use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
 use super::outcome::Pass;
@@ -21,8 +23,19 @@ const MOST_OUTLIERS: f64 = 0.05;
 /// A step that leads where no pass can be made is shortened by half so many times at most: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
-/// Told after each pass; the command line draws it.
-pub type Progress<'a> = &'a (dyn Fn(&Pass) + Sync);
+/// Told after each pass, may stop the work; the command line draws it.
+pub type Progress<'a> = &'a (dyn Fn(&Pass) -> ControlFlow<()> + Sync);
+
+/// Progress that nobody follows.
+pub const UNWATCHED: Progress<'static> = &|_| ControlFlow::Continue(());
+
+/// Tells of a pass.
+pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
+    match progress(pass) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(CalibrationError::Stopped),
+    }
+}
 
 /// The last pass, and whether it moved nothing.
 #[derive(Clone)]
@@ -68,7 +81,7 @@ pub fn iterate(
             }
         };
         let summary = summary(&result, &at, false);
-        progress(&summary);
+        tell(progress, &summary)?;
         passes.push(summary);
         let same_data = before.as_ref().is_some_and(|last| same_data(last, &result));
         let settled = summary.largest_step <= problem.options.converged_sigma

@@ -50,7 +50,7 @@ pub use error_term::ErrorTerm;
 pub use estimate::Estimate;
 pub use gauss_newton::estimate;
 pub use group::Group;
-pub use iterations::Progress;
+pub use iterations::{Progress, UNWATCHED};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};

@@ -377,6 +377,7 @@ fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'
 
 #[cfg(test)]
 mod tests {
+    use crate::calibration::UNWATCHED;
     use approx::assert_relative_eq;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -388,7 +389,7 @@ mod tests {
     fn one_sound_record_in_a_thousand_loses_an_observation() {
         let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
         let problem = Problem::new(&simulated.run, &Options::default());
-        let solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         let observations = solution.outcome().unwrap().innovations.len();
         let of_each = ChiSquared::new(3.0).unwrap().sf(problem.gate());
         assert_relative_eq!(observations as f64 * of_each, 1e-3, max_relative = 1e-6);

@@ -1,5 +1,6 @@
 //! `turncal calibrate`
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -247,6 +248,9 @@ pub fn solve(
 ) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));
-    let solution = problem.solve(method, &|pass| activity.pass(pass));
+    let solution = problem.solve(method, &|pass| {
+        activity.pass(pass);
+        ControlFlow::Continue(())
+    });
     solution.with_context(|| name.clone())
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use turncal::calibration::UNWATCHED;
 
 use anyhow::bail;
 use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
@@ -133,7 +134,7 @@ impl Request<'_> {
         let run = Run::read(path)?;
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
-        let mut solution = problem.solve(method.into(), &|_| {})?;
+        let mut solution = problem.solve(method.into(), UNWATCHED)?;
         let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path);
         let document =
             calibrated.document((&problem, &run.recording.name), &solution, method, None);

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::accuracy::StudyError;
 use super::ratio::Ratio;
 use crate::calibration::{
-    CalibrationError, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate,
-    mean_square_interval, thermal_bound, to_vector,
+    CalibrationError, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem, UNWATCHED,
+    estimate, mean_square_interval, thermal_bound, to_vector,
 };
 use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients, Triad};
 use crate::run::Run;
@@ -106,7 +106,7 @@ impl CampaignStudy {
             source,
         };
         let problem = Problem::together(&runs, &options, &together).map_err(at_bound)?;
-        let Ok(outcome) = estimate(&problem, &|_| {}) else {
+        let Ok(outcome) = estimate(&problem, UNWATCHED) else {
             return Ok(None);
         };
         if !outcome.converged {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::Value;
 use turncal::calibration::{
-    Finding, Options, Problem, Reference, estimate, parameter_name, six_position,
+    Finding, Options, Problem, Reference, UNWATCHED, estimate, parameter_name, six_position,
 };
 use turncal::imu::{InstallationForm, PerSensor};
 use turncal::simulation::Scenario;
@@ -68,7 +68,7 @@ fn static_sections_laid_end_to_end_show_accelerometers_and_name_what_gyros_hide(
     let mut run = read(&directory);
     assert!(!run.recording.imu.continuous);
     let problem = Problem::new(&run, &Options::default());
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     assert!(outcome.converged);
     // Six static sections, each a stretch of its own; the turns between them cannot be navigated.
     assert_eq!(problem.dwells().count(), 6);
@@ -110,7 +110,7 @@ fn a_record_turned_by_hand_is_explained_better_than_by_labels() {
     };
     let run = read(&directory);
     let problem = Problem::new(&run, &Options::default());
-    let filtered = estimate(&problem, &|_| {}).unwrap();
+    let filtered = estimate(&problem, UNWATCHED).unwrap();
     assert!(filtered.converged);
     let by_filter = filtered.quality(&problem).unwrap();
     let mut unlabelled = run.clone();
@@ -139,7 +139,7 @@ fn errors_of_scale_show_in_gravity_and_in_turns_by_their_size() {
     let simulated = Scenario::load("demo").unwrap().simulate(6, 0).unwrap();
     let run = simulated.run;
     let problem = Problem::new(&run, &Options::default());
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     let quality = outcome.quality(&problem).unwrap();
     // 5 µg/√Hz over 15 s and a bias instability; arc seconds of table and walk.
     assert!(quality.all.gravity.rms < 3.0 * MICRO_G);

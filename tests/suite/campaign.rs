@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use turncal::calibration::{
     AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, RecordingDifference,
-    estimate, parameter,
+    UNWATCHED, estimate, parameter,
 };
 use turncal::formats::Campaign;
 use turncal::imu::Sensor;
@@ -214,7 +214,7 @@ fn estimated(campaign: &Path) -> Outcome {
     let campaign = Campaign::read(campaign).unwrap();
     let runs: Vec<&Run> = campaign.runs.iter().collect();
     let problem = Problem::together(&runs, &Options::default(), &campaign.together).unwrap();
-    estimate(&problem, &|_| {}).unwrap()
+    estimate(&problem, UNWATCHED).unwrap()
 }
 
 #[test]
@@ -462,7 +462,7 @@ fn parts_of_a_record_whose_noise_is_stated_too_small_do_not_differ_for_that() {
     let together = estimated(&path);
     assert!(together.noise.learnt);
     let run = read(&whole);
-    let alone = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
+    let alone = estimate(&Problem::new(&run, &Options::default()), UNWATCHED).unwrap();
     let change = (together.estimate.vector() - alone.estimate.vector())
         .component_div(&alone.estimate.sigma());
     // Both are of the same rows; with stated noise the accelerometers' K alone were 100 σ apart.

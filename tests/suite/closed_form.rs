@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use turncal::attitude::{exp, log};
 use turncal::calibration::{
-    ClosedForm, Finding, Method, Options, Problem, Solution, in_body_frame, in_general_form,
-    mean_square_interval, nees, six_position, to_vector,
+    ClosedForm, Finding, Method, Options, Problem, Solution, UNWATCHED, in_body_frame,
+    in_general_form, mean_square_interval, nees, six_position, to_vector,
 };
 use turncal::imu::{GaussMarkov, PerSensor};
 use turncal::recording::{LabelledMotion, Segment};
@@ -64,7 +64,7 @@ fn tried(runs: u64, make: impl Fn(u64) -> Simulated) -> Tried {
     for seed in 0..runs {
         let made = make(seed);
         let problem = Problem::new(&made.run, &Options::default());
-        let Ok(Solution::ClosedForm(closed_form)) = problem.solve(Method::SixPosition, &|_| {})
+        let Ok(Solution::ClosedForm(closed_form)) = problem.solve(Method::SixPosition, UNWATCHED)
         else {
             all.refused += 1;
             continue;
@@ -343,7 +343,7 @@ fn the_closed_form_is_as_wrong_as_its_sigma_say_or_says_what_is_wrong() {
 fn one_position_that_is_off_costs_no_more_than_that_position() {
     let solved = |run: &Run| {
         let problem = Problem::new(run, &Options::default());
-        match problem.solve(Method::SixPosition, &|_| {}).unwrap() {
+        match problem.solve(Method::SixPosition, UNWATCHED).unwrap() {
             Solution::ClosedForm(closed_form) => *closed_form,
             Solution::Filter(_) => unreachable!("the closed form was asked for"),
         }

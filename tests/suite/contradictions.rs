@@ -1,14 +1,14 @@
 //! What no noise explains is no calibration by the closed form either, and a prior that data contradict is said
 //! where it holds the estimate.
 
-use turncal::calibration::{ClosedForm, Finding, Method, Options, Problem, Solution};
+use turncal::calibration::{ClosedForm, Finding, Method, Options, Problem, Solution, UNWATCHED};
 use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::units::{ARCSEC, PPM};
 
 fn solved(run: &Run) -> (bool, ClosedForm) {
     let problem = Problem::new(run, &Options::default());
-    let solution = problem.solve(Method::SixPosition, &|_| {}).unwrap();
+    let solution = problem.solve(Method::SixPosition, UNWATCHED).unwrap();
     let usable = solution.is_usable();
     match solution {
         Solution::ClosedForm(closed_form) => (usable, *closed_form),

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use turncal::calibration::{
     ErrorTerm, ErrorTermTest, Estimate, Method, NoisePolicy, Options, Outcome, PARAMETERS, Problem,
-    Role, Solution, estimate, nees, test_error_terms, to_vector,
+    Role, Solution, UNWATCHED, estimate, nees, test_error_terms, to_vector,
 };
 use turncal::imu::Term;
 use turncal::simulation::Scenario;
@@ -19,7 +19,7 @@ const SEED: u64 = 23;
 const ORDER: ErrorTerm = ErrorTerm::Instrument(Term::AccelSecondOrder);
 
 fn calibrated(problem: &Problem) -> (Outcome, Vec<ErrorTermTest>) {
-    let outcome = estimate(problem, &|_| {}).unwrap();
+    let outcome = estimate(problem, UNWATCHED).unwrap();
     let (tests, _) = test_error_terms(problem, &outcome).unwrap();
     (outcome, tests)
 }
@@ -93,7 +93,7 @@ fn a_calibration_warns_of_the_error_term_that_is_not_estimated() {
     let mut run = scenario.simulate(SEED, 0).unwrap().run;
     run.instrument.term_sigma.fill(0.0);
     let problem = Problem::new(&run, &stated());
-    let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+    let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
     let assessment = solution.assess(&problem).unwrap();
     let record = solution.calibration(&problem, &assessment);
     let words = "accel-second-order";
@@ -125,7 +125,7 @@ fn sigma_hold_what_an_error_term_does_that_the_data_show_and_that_is_left_off() 
         let mut simulated = scenario.simulate(SEED, stream).unwrap();
         simulated.run.instrument.term_sigma.fill(0.0);
         let problem = Problem::new(&simulated.run, &stated());
-        let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         let all: Vec<usize> = (0..PARAMETERS).collect();
         let mean_square = |solution: &Solution| {
             let Estimate { triads, covariance } = solution.estimate();
@@ -153,7 +153,7 @@ fn sound_runs_raise_no_alarm() {
     let kinds = (0..RUNS).into_par_iter().flat_map_iter(|stream| {
         let run = scenario.simulate(SEED, stream).unwrap().run;
         let problem = Problem::new(&run, &stated());
-        let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         let assessment = solution.assess(&problem).unwrap();
         let findings = solution.findings(&assessment);
         findings.into_iter().map(move |finding| {

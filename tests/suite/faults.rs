@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use turncal::calibration::{Finding, Options, Outcome, Problem, estimate};
+use turncal::calibration::{Finding, Options, Outcome, Problem, UNWATCHED, estimate};
 use turncal::formats::write_run;
 use turncal::imu::{Output, PARAMETERS as PER_TRIAD, Sensor};
 use turncal::recording::FaultKind;
@@ -90,7 +90,7 @@ impl Log {
 }
 
 fn calibrated(run: &Run) -> Outcome {
-    let outcome = estimate(&Problem::new(run, &Options::default()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(run, &Options::default()), UNWATCHED).unwrap();
     assert!(outcome.converged);
     outcome
 }
@@ -301,7 +301,7 @@ fn a_record_whose_fast_turns_are_cut_off_agrees_with_the_whole() {
     std::fs::write(here.path().join("imu.log"), rows.collect::<String>()).unwrap();
     let calibrated = |directory: &Path| {
         let run = read(directory);
-        estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap()
+        estimate(&Problem::new(&run, &Options::default()), UNWATCHED).unwrap()
     };
     let outcome = calibrated(here.path());
     assert!(outcome.converged);

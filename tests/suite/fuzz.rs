@@ -12,7 +12,7 @@ use proptest::sample::{Index, select};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use tempfile::TempDir;
 use turncal::calibration::result::Calibration;
-use turncal::calibration::{Correction, Options, Problem, estimate, six_position};
+use turncal::calibration::{Correction, Options, Problem, UNWATCHED, estimate, six_position};
 use turncal::formats::draft::Draft;
 use turncal::formats::write_run;
 use turncal::imu::Output;
@@ -306,7 +306,7 @@ fn runs_whose_figures_make_no_sense_are_calibrated_or_refused() {
                 run.recording.table = None;
             }
             let problem = Problem::new(&run, &Options::default());
-            if let Ok(outcome) = estimate(&problem, &|_| {}) {
+            if let Ok(outcome) = estimate(&problem, UNWATCHED) {
                 let _ = outcome.quality(&problem);
             }
         }
@@ -362,7 +362,7 @@ fn spoilt_calibrations() {
     let run = small_run();
     let read = Run::read(&run.path().join("run.toml")).unwrap();
     let problem = Problem::new(&read, &Options::default());
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     let record = outcome.record(&problem, &[], &outcome.quality(&problem).unwrap());
     let path = run.path().join("calibration.json");
     record.write(&path, false).unwrap();

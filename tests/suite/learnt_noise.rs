@@ -4,7 +4,9 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
 use toml::{Table, Value};
-use turncal::calibration::{NoisePolicy, Options, Outcome, Problem, estimate, six_position};
+use turncal::calibration::{
+    NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate, six_position,
+};
 use turncal::formats::write_run;
 use turncal::imu::Output;
 use turncal::run::Run;
@@ -14,7 +16,7 @@ use crate::shared::{read, shared};
 
 fn estimated(run: &Run, noise: NoisePolicy) -> Outcome {
     let problem = Problem::new(run, &Options::default().noise(noise));
-    estimate(&problem, &|_| {}).unwrap()
+    estimate(&problem, UNWATCHED).unwrap()
 }
 
 /// Puts every field of one table into another, table by table.
@@ -82,7 +84,7 @@ fn a_short_part_of_a_hand_turned_record_agrees_with_the_whole() {
         let Some(whole) = shared(record) else { return };
         let calibrated = |directory: &Path| {
             let run = read(directory);
-            estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap()
+            estimate(&Problem::new(&run, &Options::default()), UNWATCHED).unwrap()
         };
         let of_whole = calibrated(&whole).estimate;
         let log = std::fs::read_to_string(whole.join("imu.log")).unwrap();

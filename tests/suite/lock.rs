@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use turncal::calibration::{
-    Calibration, Method, NoisePolicy, Options, Problem, Solution, Together,
+    Calibration, Method, NoisePolicy, Options, Problem, Solution, Together, UNWATCHED,
 };
 use turncal::run::Run;
 use turncal::simulation::{Scenario, SimulatedCampaign};
@@ -60,7 +60,7 @@ fn rounded(value: f64) -> f64 {
 
 impl Figures {
     fn of(problem: &Problem, method: Method) -> Self {
-        let solved = problem.solve(method, &|_| {}).and_then(|mut solution| {
+        let solved = problem.solve(method, UNWATCHED).and_then(|mut solution| {
             let assessment = solution.assess(problem)?;
             let record = solution.calibration(problem, &assessment);
             Ok((solution, record))

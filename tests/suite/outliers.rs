@@ -7,7 +7,7 @@ use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use turncal::calibration::{
     Finding, Method, NoisePolicy, Observation, Options, Outcome, PARAMETERS, ParameterVector,
-    Problem, estimate, to_vector,
+    Problem, UNWATCHED, estimate, to_vector,
 };
 use turncal::imu::Sensor;
 use turncal::run::Run;
@@ -47,7 +47,7 @@ fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
-    let outcome = estimate(&Problem::new(&simulated.run, &stated()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&simulated.run, &stated()), UNWATCHED).unwrap();
     assert!(outcome.converged);
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
@@ -188,7 +188,7 @@ fn a_prior_that_is_wrong_is_neither_noise_nor_an_error_term() {
         let mut run = Scenario::load(scenario).unwrap().simulate(SEED, 0).unwrap();
         spoil(&mut run.run);
         let problem = Problem::new(&run.run, &Options::default());
-        let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         let assessment = solution.assess(&problem).unwrap();
         assert!(solution.converged());
         solution.findings(&assessment)

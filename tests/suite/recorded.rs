@@ -2,7 +2,7 @@
 
 use turncal::calibration::result::Calibration;
 use turncal::calibration::{
-    NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate, to_vector, triads_of,
+    NoisePolicy, Options, Outcome, PARAMETERS, Problem, UNWATCHED, estimate, to_vector, triads_of,
 };
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
@@ -19,7 +19,7 @@ fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
     let truth = Calibration::read(&directory.join("truth.json")).unwrap();
-    let outcome = estimate(&Problem::new(&run, &stated()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
     let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);
     let mut largest = [0f64; 6];
@@ -51,7 +51,7 @@ fn a_record_without_noise_is_calibrated_whatever_is_learnt_of_its_noise() {
         return;
     };
     let run = read(&directory);
-    let outcome = estimate(&Problem::new(&run, &Options::default()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &Options::default()), UNWATCHED).unwrap();
     assert!(outcome.converged);
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use turncal::calibration::{
-    Finding, NoisePolicy, Options, Outcome, ParameterVector, Problem, estimate,
+    Finding, NoisePolicy, Options, Outcome, ParameterVector, Problem, UNWATCHED, estimate,
     mean_square_interval, to_vector,
 };
 use turncal::imu::{InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, Triad};
@@ -29,7 +29,7 @@ pub struct Trial {
 
 impl Trial {
     pub fn new(simulated: &Simulated) -> Self {
-        let outcome = estimate(&Problem::new(&simulated.run, &stated()), &|_| {}).unwrap();
+        let outcome = estimate(&Problem::new(&simulated.run, &stated()), UNWATCHED).unwrap();
         let error = outcome.estimate.vector() - to_vector(&simulated.truth);
         let sigma = outcome.estimate.sigma();
         let estimated: Vec<usize> = outcome.estimate.estimated().collect();
@@ -102,7 +102,7 @@ fn claimed_accuracy_is_true_on_a_table_out_of_level_north_and_square() {
     // Not modelled, the same errors are several σ.
     let mut run = scenario.simulate(SEED, 0).unwrap();
     run.run.table.geometry = Default::default();
-    let outcome = estimate(&Problem::new(&run.run, &stated()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run.run, &stated()), UNWATCHED).unwrap();
     let error = outcome.estimate.vector() - to_vector(&run.truth);
     let worst = error.component_div(&outcome.estimate.sigma()).amax();
     println!(
@@ -204,7 +204,7 @@ fn the_filter_knows_the_form_of_an_instrument_that_has_it() {
         let simulated = scenario.simulate(SEED, 0).unwrap();
         let outcome = estimate(
             &Problem::new(&simulated.run, &stated().installation(form)),
-            &|_| {},
+            UNWATCHED,
         )
         .unwrap();
         let error = outcome.estimate.vector() - to_vector(&simulated.truth);
@@ -225,7 +225,7 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations_not_g
             &simulated.run,
             &stated().installation(InstallationForm::ThreeAngle),
         ),
-        &|_| {},
+        UNWATCHED,
     )
     .unwrap();
     assert!(outcome.converged);

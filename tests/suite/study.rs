@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use serde_json::Value;
 use turncal::calibration::{
-    Options, ParameterVector, Problem, bound, estimate, six_position, to_vector,
+    Options, ParameterVector, Problem, UNWATCHED, bound, estimate, six_position, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::simulation::Scenario;
@@ -45,7 +45,7 @@ fn by_hand() -> [Vec<ParameterVector>; 4] {
     for stream in 0..RUNS {
         let made = scenario.simulate(SEED, stream).unwrap();
         let problem = Problem::new(&made.run, &Options::default());
-        let filtered = estimate(&problem, &|_| {}).unwrap().estimate;
+        let filtered = estimate(&problem, UNWATCHED).unwrap().estimate;
         let truth = to_vector(&made.truth);
         let bound = bound(&problem, &made.truth, &made.terms).unwrap();
         let at_rest = positions.simulate(SEED, stream).unwrap();

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector, SMatrix};
 use rayon::prelude::*;
 use turncal::calibration::result::{Calibration, EQUATION, EQUATION_WITH_TERMS};
 use turncal::calibration::{
-    ErrorTerm, NoisePolicy, Options, Outcome, Problem, estimate, mean_square_interval, to_vector,
+    ErrorTerm, NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate, mean_square_interval,
+    to_vector,
 };
 use turncal::imu::{InstallationForm, TERM_PARAMETERS, Term, TermVector};
 use turncal::simulation::{Scenario, Simulated};
@@ -43,7 +44,7 @@ fn sigma(outcome: &Outcome) -> TermVector {
 /// NEES of a term's parameters in one run, and how many they are.
 fn nees(term: Term, stream: u64) -> (f64, usize) {
     let Simulated { run, terms, .. } = scenario(term).simulate(SEED, stream).unwrap();
-    let outcome = estimate(&Problem::new(&run, &stated()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
     assert!(outcome.converged, "{}: {stream}", term.name());
     assert!(outcome.auxiliary.unobserved().next().is_none());
     let error = outcome.auxiliary.terms() - terms;
@@ -134,7 +135,7 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
         .run;
     let equation = |options: &Options| {
         let problem = Problem::new(&run, options);
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
         let quality = outcome.quality(&problem).unwrap();
         outcome.record(&problem, &[], &quality).equation.unwrap()
     };
@@ -147,7 +148,7 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
     run.instrument.term_sigma = TermVector::zeros();
-    let outcome = estimate(&Problem::new(&run, &stated()), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
     let sigma = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
     let normalised = error.component_div(&sigma);
@@ -181,7 +182,7 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
     let terms = [Term::AccelSecondOrder, Term::SizeEffect, Term::TimeOffset];
     let terms = terms.map(ErrorTerm::Instrument);
     let options = terms.into_iter().fold(stated(), Options::with);
-    let outcome = estimate(&Problem::new(&run, &options), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &options), UNWATCHED).unwrap();
     let truth = Calibration::read(&directory.join("truth.json")).unwrap();
     let truth = turncal::calibration::triads_of(&truth, &run.instrument.nominal, FORM);
     let error = outcome.estimate.vector() - to_vector(&truth);

@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use turncal::calibration::{
-    ErrorTerm, NoisePolicy, Options, Problem, estimate, mean_square_interval, to_vector,
+    ErrorTerm, NoisePolicy, Options, Problem, UNWATCHED, estimate, mean_square_interval, to_vector,
 };
 use turncal::formats::write_run;
 use turncal::imu::{Sensor, Term};
@@ -84,7 +84,7 @@ fn trial(stream: u64) -> (f64, usize, f64, f64) {
     let options = Options::default()
         .noise(NoisePolicy::Stated)
         .with(ErrorTerm::Instrument(Term::TimeOffset));
-    let outcome = estimate(&Problem::new(&run, &options), &|_| {}).unwrap();
+    let outcome = estimate(&Problem::new(&run, &options), UNWATCHED).unwrap();
     assert!(outcome.converged, "{stream}");
     let error = outcome.estimate.vector() - to_vector(&made.truth);
     let sigma = outcome.estimate.sigma();

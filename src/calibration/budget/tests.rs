@@ -1,5 +1,6 @@
 use super::*;
 use crate::calibration::checks::innovation::Innovation;
+use crate::calibration::iterations::UNWATCHED;
 use crate::calibration::model::Model;
 use crate::calibration::pass::{Gate, Mode, PassResult, pass};
 use crate::calibration::{ErrorTerm, NoisePolicy, Options, estimate};
@@ -35,7 +36,7 @@ fn parts_add_to_the_covariance_of_the_estimate() {
     for aiding in [Aiding::Table, Aiding::Velocity] {
         let run = simulated("demo");
         let problem = Problem::new(&run, &Options::default().aiding(aiding));
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
         let budget = Budget::new(&problem, &outcome).unwrap();
         let off = difference(&budget.covariance(), &outcome.estimate.covariance);
         println!("{aiding:?}: {off:.1e}");
@@ -85,7 +86,7 @@ const CHANGES: [(BudgetSource, Change); 11] = [
 fn held_against_passes(run: &Run, options: &Options) -> usize {
     const STEP: f64 = 0.02;
     let problem = Problem::new(run, &options.clone().noise(NoisePolicy::Stated));
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     let budget = Budget::new(&problem, &outcome).unwrap();
     let mut model = outcome.model.clone();
     let at_rest = problem.stretches()[0].stillness(&model, Sensor::Accel);
@@ -146,7 +147,7 @@ fn each_part_is_what_passes_lose_of_records_without_a_table() {
         };
         assert!(held_against_passes(&run, &Options::default()) >= 4);
         let problem = Problem::new(&run, &Options::default());
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
         let budget = Budget::new(&problem, &outcome).unwrap();
         let off = difference(&budget.covariance(), &outcome.estimate.covariance);
         println!("{name}: {off:.1e}");

@@ -136,6 +136,7 @@ impl DwellScores {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::UNWATCHED;
     use crate::calibration::{Finding, NoisePolicy, Options, Outcome, Problem, estimate};
     use crate::run::Run;
     use crate::simulation::Scenario;
@@ -154,7 +155,7 @@ mod tests {
 
     fn estimated(run: &Run) -> Outcome {
         let options = Options::default().noise(NoisePolicy::Stated);
-        estimate(&Problem::new(run, &options), &|_| {}).unwrap()
+        estimate(&Problem::new(run, &options), UNWATCHED).unwrap()
     }
 
     #[test]

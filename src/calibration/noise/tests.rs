@@ -1,3 +1,4 @@
+use crate::calibration::iterations::UNWATCHED;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +16,7 @@ fn run() -> Run {
 
 fn estimated(run: &Run, noise: NoisePolicy) -> Outcome {
     let problem = Problem::new(run, &Options::default().noise(noise));
-    estimate(&problem, &|_| {}).unwrap()
+    estimate(&problem, UNWATCHED).unwrap()
 }
 
 fn figures(outcome: &Outcome, source: Source) -> &SourceFigures {

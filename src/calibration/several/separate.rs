@@ -7,7 +7,7 @@ use super::alone::Alone;
 use super::day_to_day::{DayToDay, Difference};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
-use crate::calibration::iterations::{Iterated, iterate};
+use crate::calibration::iterations::{Iterated, UNWATCHED, iterate};
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::noise::learn;
@@ -85,9 +85,9 @@ fn noise_of_all(problem: &Problem, alone: &[Alone]) -> Option<Model> {
         .collect();
     let passes = &mut Vec::new();
     let gate = Gate::Innovations;
-    let iterated = iterate(&problem, &priors, at, gate, passes, &|_| {}).ok()?;
+    let iterated = iterate(&problem, &priors, at, gate, passes, UNWATCHED).ok()?;
     let stated = Solved::stated(&problem, priors, iterated, Vec::new());
-    let learnt = learn(stated, &|_| {}).ok()?;
+    let learnt = learn(stated, UNWATCHED).ok()?;
     let of_all = || plain(&problem, &learnt.problem.model).model;
     learnt.noise.learnt.then(of_all)
 }
@@ -125,10 +125,10 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
         span(&range.gyro).max(span(&range.accel))
     });
     let stands = span < PART_OF_RANGE * whole;
-    let solved = stands.then(|| from_coarse_start(plain, &|_| {}));
+    let solved = stands.then(|| from_coarse_start(plain, UNWATCHED));
     Ok(match solved {
         Some(Ok(solved)) => {
-            let solved = learn(solved.clone(), &|_| {}).unwrap_or(solved);
+            let solved = learn(solved.clone(), UNWATCHED).unwrap_or(solved);
             let (contradicted, iterated) = (solved.noise.learnt, solved.iterated);
             let at = &iterated.held.estimate;
             let alone = alone(
@@ -175,7 +175,7 @@ fn with_noise(alone: &Alone, recording: &Problem) -> Option<Estimate> {
         alone.initial_attitudes.clone(),
     );
     let (gate, passes) = (Gate::Innovations, &mut Vec::new());
-    let iterated = iterate(recording, &alone.priors, at, gate, passes, &|_| {}).ok()?;
+    let iterated = iterate(recording, &alone.priors, at, gate, passes, UNWATCHED).ok()?;
     estimate(iterated)
 }
 

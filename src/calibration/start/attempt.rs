@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::coarse::{CoarseStart, coarse_start};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::iterations::{Iterated, Progress, iterate, summary};
+use crate::calibration::iterations::{Iterated, Progress, iterate, summary, tell};
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::noise::{NoisePolicy, learn};
 use crate::calibration::pass::{Gate, Mode, pass};
@@ -28,11 +28,16 @@ pub fn from_coarse_start<'a>(
     }
     let (stated, start) = best;
     let converged = |solved: &Solved| solved.iterated.converged;
-    if stated.as_ref().is_ok_and(converged) || problem.options.noise == NoisePolicy::Stated {
+    let stopped = matches!(stated, Err(CalibrationError::Stopped));
+    let ended = stopped || stated.as_ref().is_ok_and(converged);
+    if ended || problem.options.noise == NoisePolicy::Stated {
         return stated;
     }
-    let learnt = learnt_at(problem, start, progress).ok();
-    learnt.filter(converged).map_or(stated, Ok)
+    match learnt_at(problem, start, progress) {
+        Ok(learnt) if converged(&learnt) => Ok(learnt),
+        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
+        _ => stated,
+    }
 }
 
 /// What came of a start.
@@ -67,7 +72,7 @@ fn stated<'a>(
     };
     if let Some(feedback) = &feedback {
         passes.push(summary(feedback, &start.at, true));
-        passes.iter().for_each(progress);
+        tell(progress, &passes[0])?;
     }
     let mut from = |at: Linearisation| {
         iterate(
@@ -132,10 +137,14 @@ fn learnt_at<'a>(
 }
 
 /// With the noise that the data show, where they contradict what is stated.
-pub fn learnt_or_stated<'a>(stated: Solved<'a>, progress: Progress) -> Solved<'a> {
+pub fn learnt_or_stated<'a>(
+    stated: Solved<'a>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
     match learn(stated.clone(), progress) {
-        Ok(learnt) if learnt.iterated.converged || !stated.iterated.converged => learnt,
+        Ok(learnt) if learnt.iterated.converged || !stated.iterated.converged => Ok(learnt),
+        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
         // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
-        _ => stated,
+        _ => Ok(stated),
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::{AccuracyStudy, Baseline, StudyError};
-use crate::calibration::{AUXILIARY, AuxiliaryVector, auxiliary_vector};
+use crate::calibration::{AUXILIARY, AuxiliaryVector, UNWATCHED, auxiliary_vector};
 use crate::calibration::{Epoch, Nis, from_vector, to_vector};
 use crate::calibration::{
     ErrorTermTest, Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
@@ -104,7 +104,7 @@ impl AccuracyStudy {
         for &term in &self.unmodelled {
             problem.model.switch_off(term);
         }
-        let outcome = estimate(&problem, &|_| {});
+        let outcome = estimate(&problem, UNWATCHED);
         let effects = match &outcome {
             Ok(outcome) if run == 0 => {
                 let (tests, _) = test_error_terms(&problem, outcome).unwrap_or_default();

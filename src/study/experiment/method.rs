@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ExperimentError, HOUR_PATH, POSITIONS};
 use crate::calibration::to_vector;
-use crate::calibration::{Estimate, estimate, in_general_form, six_position};
+use crate::calibration::{Estimate, UNWATCHED, estimate, in_general_form, six_position};
 use crate::calibration::{NoisePolicy, Options, Problem};
 use crate::calibration::{ParameterMatrix, ParameterVector};
 use crate::imu::InstallationForm;
@@ -139,7 +139,7 @@ fn calibrated(
             Ok(against_truth(&closed_form.estimate, true, false))
         }
         Estimator::Filter | Estimator::LongFilter => {
-            let outcome = estimate(&problem, &|_| {}).map_err(|error| error.to_string())?;
+            let outcome = estimate(&problem, UNWATCHED).map_err(|error| error.to_string())?;
             let rejects = outcome.form_test.is_some_and(|test| test.rejects());
             Ok(against_truth(&outcome.estimate, outcome.converged, rejects))
         }

@@ -344,6 +344,7 @@ impl Tested {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::UNWATCHED;
     use crate::calibration::{Options, estimate};
     use crate::imu::Term;
     use crate::simulation::Scenario;
@@ -356,7 +357,7 @@ mod tests {
         let scenario = Scenario::load("real-table").unwrap().with_error_term(order);
         let run = scenario.simulate(23, 0).unwrap().run;
         let problem = Problem::new(&run, &Options::default());
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
         let (tests, _) = test_error_terms(&problem, &outcome).unwrap();
         let with = Fit::of(&last_pass(&problem, &outcome, &[]).unwrap());
         for term in [
@@ -384,7 +385,7 @@ mod tests {
         let scenario = Scenario::load("demo").unwrap();
         let run = scenario.simulate(23, 0).unwrap().run;
         let problem = Problem::new(&run, &Options::default());
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
         for term in [
             ErrorTerm::Instrument(Term::SizeEffect),
             ErrorTerm::Instrument(Term::GyroNonlinearity),

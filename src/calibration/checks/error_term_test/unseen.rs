@@ -115,6 +115,7 @@ fn of_one(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::UNWATCHED;
     use crate::calibration::parameters::parameter;
     use crate::calibration::{BudgetSource, Method, NoisePolicy, Options};
     use crate::run::Run;
@@ -126,7 +127,7 @@ mod tests {
     fn solved(run: &Run, aiding: Aiding, noise: NoisePolicy) -> Outcome {
         let options = Options::default().aiding(aiding).noise(noise);
         let problem = Problem::new(run, &options);
-        let mut solution = problem.solve(Method::Ekf, &|_| {}).unwrap();
+        let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         solution.assess(&problem).unwrap();
         solution.outcome().unwrap().clone()
     }

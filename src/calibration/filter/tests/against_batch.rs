@@ -1,6 +1,7 @@
 //! The filter against batch least squares on the same linear problem.
 
 use super::batch::batch_estimate;
+use crate::calibration::iterations::UNWATCHED;
 use crate::calibration::{NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate};
 use crate::imu::InstallationForm;
 use crate::run::Run;
@@ -35,7 +36,7 @@ fn difference(problem: &Problem, outcome: &Outcome) -> (f64, f64) {
 fn batch_least_squares_gives_the_filters_estimate_and_covariance() {
     let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
     let problem = Problem::new(&simulated.run, &stated());
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     assert!(outcome.converged);
     let (estimate, covariance) = difference(&problem, &outcome);
     assert!(estimate < 1e-6 && covariance < 1e-6);
@@ -66,7 +67,7 @@ fn it_agrees_on_what_the_gate_leaves_out() {
         table.attitude[300] = outlier * table.attitude[300];
     }
     let problem = Problem::new(&run, &stated().installation(InstallationForm::SixAngle));
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     assert!(outcome.innovations.iter().any(|i| !i.accepted));
     let (estimate, covariance) = difference(&problem, &outcome);
     assert!(estimate < 1e-6 && covariance < 1e-6);
@@ -80,7 +81,7 @@ fn it_agrees_where_gyros_or_table_have_no_error_and_the_problem_fewer_unknowns()
     exact.table.position_sigma = 0.0;
     for run in [quiet, exact] {
         let problem = Problem::new(&run, &stated());
-        let outcome = estimate(&problem, &|_| {}).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
         let (estimate, covariance) = difference(&problem, &outcome);
         assert!(estimate < 1e-6 && covariance < 1e-6);
     }
@@ -93,13 +94,13 @@ fn two_recordings_together_are_both_stacked() {
     let other = scenario.simulate_recording(1, 0, 1, &Default::default());
     let other = shortened(other.unwrap().run);
     let problem = Problem::new(&one, &stated()).and(&other);
-    let outcome = estimate(&problem, &|_| {}).unwrap();
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
     assert!(outcome.converged);
     let (together, covariance) = difference(&problem, &outcome);
     assert!(together < 1e-6 && covariance < 1e-6);
     // The order of recordings does not matter.
     let turned = Problem::new(&other, &stated()).and(&one);
-    let turned = estimate(&turned, &|_| {}).unwrap();
+    let turned = estimate(&turned, UNWATCHED).unwrap();
     let sigma = outcome.estimate.sigma();
     for i in (0..PARAMETERS).filter(|&i| sigma[i] > 0.0) {
         let apart = turned.estimate.vector()[i] - outcome.estimate.vector()[i];
