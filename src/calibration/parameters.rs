@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
 /// Number of parameters of both triads.
 pub const PARAMETERS: usize = 2 * PER_TRIAD;
@@ -59,6 +59,12 @@ pub fn parameter_name(form: InstallationForm, index: usize) -> Option<String> {
 /// The index of a parameter by its name in files; `None` if the form does not have it.
 pub fn parameter_index(form: InstallationForm, name: &str) -> Option<usize> {
     (0..PARAMETERS).find(|&index| parameter_name(form, index).as_deref() == Some(name))
+}
+
+/// The factor from a normalised parameter to the file's quantity, by nominal scales.
+pub fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    nominal.get(sensor).factor(of_triad)
 }
 
 /// A run has observed a parameter if it leaves less than this part of its prior σ.

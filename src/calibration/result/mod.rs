@@ -24,7 +24,6 @@ use super::noise::NoiseReport;
 use crate::calibration::checks::dwell_scatter::DwellScatter;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::quality::Quality;
-use crate::calibration::parameters::sensor_and_parameter;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
@@ -402,12 +401,6 @@ impl TriadRecord {
 /// A matrix row by row.
 pub fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     m.transpose().data.0
-}
-
-/// What brings a parameter to the file's unit.
-fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
-    let (sensor, of_triad) = sensor_and_parameter(index);
-    nominal.get(sensor).factor(of_triad)
 }
 
 /// Both triads of a record, normalised by these nominal scales and split in a form.

@@ -9,7 +9,7 @@ use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
     BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
     FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
-    TestVector, TriadRecord, factor, rows,
+    TestVector, TriadRecord, rows,
 };
 use crate::calibration::auxiliary::{Auxiliary, auxiliary_name};
 use crate::calibration::budget::Budget;
@@ -19,7 +19,9 @@ use crate::calibration::checks::innovation::Nis;
 use crate::calibration::checks::quality::Quality;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, parameter, parameter_name};
+use crate::calibration::parameters::{
+    PARAMETERS, ParameterMatrix, factor, parameter, parameter_name,
+};
 use crate::calibration::problem::Problem;
 use crate::calibration::start::closed_form::ClosedForm;
 use crate::imu::{

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::factor;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{
-    PARAMETERS, ParameterVector, parameter_index, parameter_name, sensor_and_parameter,
+    PARAMETERS, ParameterVector, factor, parameter_index, parameter_name, sensor_and_parameter,
 };
 use crate::calibration::pass::Own;
 use crate::calibration::several::thermal::Thermal;

@@ -1,6 +1,15 @@
 //! What error terms that are not estimated leave in an estimate.
 
-use crate::calibration::parameters::ParameterMatrix;
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
+
+/// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOff {
+    /// Where its own parameters have their usual σ around zero.
+    pub usual: ParameterVector,
+    /// RMS where they are also as the record shows them.
+    pub shown: ParameterVector,
+}
 
 /// A term as an explanation of what a record shows.
 pub struct Explanation {

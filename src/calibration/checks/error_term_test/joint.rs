@@ -2,9 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::LeftOff;
 use super::evidence::Evidence;
-use super::explanation::Explanation;
+use super::explanation::{Explanation, LeftOff};
 use crate::calibration::auxiliary::{AUXILIARY, AuxiliaryKind, auxiliary_vector};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::error_term::ErrorTerm;

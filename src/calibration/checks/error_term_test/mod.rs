@@ -17,11 +17,12 @@ use crate::calibration::error::CalibrationError;
 use crate::calibration::error_term::ErrorTerm;
 use crate::calibration::group::Group;
 use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
+use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
 use crate::calibration::pass::PassResult;
 use crate::calibration::problem::Problem;
 use crate::statistics::FALSE_ALARM;
 use evidence::ln_survival;
+pub use explanation::LeftOff;
 use explanation::{Explanation, seen_and_left_off};
 use joint::{Fit, Joint, last_pass};
 pub use unseen::{biases_may_vary, unseen_variation};
@@ -54,15 +55,6 @@ pub struct ErrorTermTest {
     /// What leaving it off may have done to the estimate; absent if it is on, or not constant.
     #[serde(skip)]
     pub left_off: Option<LeftOff>,
-}
-
-/// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeftOff {
-    /// Where its own parameters have their usual σ around zero.
-    pub usual: ParameterVector,
-    /// RMS where they are also as the record shows them.
-    pub shown: ParameterVector,
 }
 
 /// Test result for an error term that is off.

@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Calibration, TermRecord, factor, triads_of};
+use super::{Calibration, TermRecord, triads_of};
 use crate::attitude::skew;
 use crate::calibration::error::ComparisonError;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, in_general_form, parameter, parameter_index,
-    parameter_name, sensor_and_parameter, to_vector,
+    PARAMETERS, ParameterMatrix, ParameterVector, factor, in_general_form, parameter,
+    parameter_index, parameter_name, sensor_and_parameter, to_vector,
 };
 use crate::imu::{
     AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad, TriadVector,
