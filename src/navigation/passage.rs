@@ -37,6 +37,8 @@ struct TermErrors {
     input: Vector3<f64>,
     /// ∫[f_n×] (∫C_b_n ∂t/∂q dt) dt over the part.
     tilt: Vector3<f64>,
+    /// C_b_n ∂t/∂q dt of the last sample.
+    last: Option<Vector3<f64>>,
     errors: Rows<STATES, 1>,
 }
 
@@ -65,6 +67,7 @@ impl Passage {
                 sensor: Term::of(parameter)?.entry().sensor,
                 input: Vector3::zeros(),
                 tilt: Vector3::zeros(),
+                last: None,
                 errors: Rows::<STATES, 1>::zeros(),
             })
         };
@@ -128,8 +131,11 @@ impl Passage {
         for term in &mut self.terms {
             let response = responses.get(term.sensor).column(term.parameter);
             let step = attitude * response * period;
-            term.tilt += force.cross(&(term.input + step * 0.5));
+            // A rate that changes evenly from sample to sample tilts by a twelfth of the change less.
+            let change = step - term.last.unwrap_or(step);
+            term.tilt += force.cross(&(term.input + step * 0.5 - change / 12.0));
             term.input += step;
+            term.last = Some(step);
         }
     }
 

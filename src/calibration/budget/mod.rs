@@ -52,8 +52,9 @@ pub struct BudgetPart {
     pub degrees_of_freedom: f64,
 }
 
-/// By which part of itself the variance of a source becomes larger: as small as rounding lets it be.
-const STEP: f64 = 2e-4;
+/// By which part of itself the variance of a source becomes larger and smaller: the difference is exact to its square,
+/// and rounding of covariances that fall by ten orders of magnitude stays below that.
+const STEP: f64 = 0.02;
 
 impl Budget {
     /// The budget of an outcome's estimate.
@@ -64,19 +65,19 @@ impl Budget {
         let problem = &outcome.as_calibrated(problem);
         let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
         let script = Script::new(problem, &outcome.prior_attitudes, &outcome.linearised_at)?;
-        let covariance = |varied: Option<(BudgetSource, f64)>| {
+        let covariance = |source, factor| {
             let mut model = problem.model.clone();
-            model.varied = varied;
+            model.varied = Some((source, factor));
             let replay = script.replay(&problem.with_model(model), &accepted)?;
             Ok::<_, CalibrationError>(replay.covariance)
         };
-        let filter = covariance(None)?;
         let part = |source: BudgetSource| {
-            let larger = covariance(Some((source, 1.0 + STEP)))?;
-            Ok::<_, CalibrationError>((source, (larger - filter) / STEP))
+            let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|factor| covariance(source, factor));
+            Ok::<_, CalibrationError>((source, (more? - less?) / (2.0 * STEP)))
         };
         let sources = problem.sources().into_par_iter();
         let by_source = sources.map(part).collect::<Result<Vec<_>, _>>()?;
+        let filter: ParameterMatrix = by_source.iter().map(|(_, part)| part).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
         let beside = outcome.beside.iter().map(|(&source, &part)| (source, part));
         let parts = by_source

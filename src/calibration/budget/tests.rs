@@ -8,7 +8,7 @@ use crate::imu::{Sensor, Term};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
 
-/// Of a difference of first order in the step, and rounding of covariances that fall by ten orders of magnitude.
+/// A fourth of the square of the step of the differences.
 const EXACT: f64 = 1e-4;
 
 fn simulated(scenario: &str) -> Run {
