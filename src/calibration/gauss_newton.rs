@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 
 use super::budget::BudgetSource;
 use super::error::CalibrationError;
-use super::iterations::{Iterated, Progress};
+use super::iterations::{Iterated, Progress, iterate};
 use super::layout::Layout;
 use super::linearisation::not_invertible;
 use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::ParameterMatrix;
-use super::pass::PassResult;
+use super::pass::{Gate, PassResult};
 use super::problem::Problem;
 use super::several;
 use super::solved::Solved;
@@ -20,6 +20,7 @@ use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
 use crate::calibration::checks::form::{FormTest, form_test};
 use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::Observability;
+use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::rounding::by_rounding;
 use crate::calibration::start::attempt::{from_coarse_start, learnt_or_stated};
 use crate::imu::Sensor;
@@ -42,6 +43,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         true => problem.clone(),
         false => solved.problem.clone(),
     };
+    let solved = with_wide_prior(solved, progress)?;
     let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated.held)?;
     // Noise that makes up for angles that are missing is no noise.
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
@@ -50,6 +52,34 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         false => learnt_or_stated(solved, progress)?,
     };
     outcome(&as_stated, solved, form_test)
+}
+
+/// Iterations with a prior that its estimate does not contradict: a wrong one would make outliers of correct
+/// observations, and noise of itself.
+fn with_wide_prior<'a>(
+    mut solved: Solved<'a>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
+    let held = &solved.iterated.held;
+    let Some(model) = widened(&solved.problem.model, &held.both_triads()) else {
+        return Ok(solved);
+    };
+    let (problem, from) = (solved.problem.with_model(model), held.estimate.clone());
+    let gate = Gate::Innovations;
+    match iterate(
+        &problem,
+        &solved.priors,
+        from,
+        gate,
+        &mut solved.passes,
+        progress,
+    ) {
+        Ok(iterated) => (solved.iterated, solved.problem) = (iterated, problem),
+        Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
+        // A prior that is too tight is better than none.
+        Err(_) => {}
+    }
+    Ok(solved)
 }
 
 /// What was found with its covariance, to which errors that no pass knows of are added.
@@ -108,6 +138,7 @@ fn outcome(
         passes: solved.passes,
         findings: Vec::new(),
     };
+    outcome.set_part(BudgetSource::Headings, solved.by_headings);
     if let Some(scattered) = scattered {
         outcome.set_part(BudgetSource::DwellScatter, scattered);
     }
@@ -145,7 +176,7 @@ mod tests {
     use super::super::Options;
     use super::super::linearisation::Linearisation;
     use super::super::parameters::{from_vector, to_vector};
-    use super::super::pass::{Gate, Mode, pass};
+    use super::super::pass::{Mode, pass};
     use super::*;
     use crate::attitude::exp;
     use crate::imu::TermVector;

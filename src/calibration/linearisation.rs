@@ -137,11 +137,10 @@ const LEVEL_SIGMAS: f64 = 10.0;
 const HEADING: f64 = 15.0 * DEGREE;
 /// … so many times what Earth rate leaves of it.
 const HEADING_SIGMAS: f64 = 3.0;
-/// A heading less known than this, rad, is hidden, and may be any: the mean square by which Earth's level rate then
-/// differs from that along a chosen heading is twice its square …
+/// A heading less known than this, rad, is hidden: it may be in any quadrant, and …
 const HIDDEN: f64 = 45.0 * DEGREE;
-/// … as by this 1σ of the heading where that is linear, rad.
-const ANY_HEADING: f64 = std::f64::consts::SQRT_2;
+/// … within one, has the standard deviation of a uniform distribution, rad.
+const IN_QUADRANT: f64 = 90.0 * DEGREE / 3.464_101_615_137_754_6;
 
 impl AttitudePrior {
     /// From a reading of a table.
@@ -166,7 +165,7 @@ impl AttitudePrior {
         let level = LEVEL_SIGMAS * known_level(model, gravity);
         let heading = (HEADING_SIGMAS * heading_sigma).max(HEADING);
         let heading = if heading > HIDDEN {
-            ANY_HEADING
+            IN_QUADRANT
         } else {
             heading
         };

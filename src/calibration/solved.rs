@@ -3,6 +3,7 @@
 use super::iterations::Iterated;
 use super::linearisation::AttitudePrior;
 use super::outcome::Pass;
+use super::parameters::ParameterMatrix;
 use super::pass::Epoch;
 use super::problem::Problem;
 use crate::calibration::checks::finding::Finding;
@@ -19,6 +20,8 @@ pub struct Solved<'a> {
     /// Of the pass with feedback, where there was one.
     pub feedback_history: Vec<Epoch>,
     pub iterated: Iterated,
+    /// Mean square by which the parameters differ from those of other headings, where Earth rate does not tell them.
+    pub by_headings: ParameterMatrix,
     pub noise: NoiseReport,
     /// Each recording calibrated alone, where there are several.
     pub alone: Vec<Alone>,
@@ -40,6 +43,7 @@ impl<'a> Solved<'a> {
             passes,
             feedback_history: Vec::new(),
             iterated,
+            by_headings: ParameterMatrix::zeros(),
             alone: Vec::new(),
             findings: Vec::new(),
         }

@@ -83,7 +83,10 @@ fn a_wrong_label_is_said_by_name() {
     .unwrap();
     let document = document(&place.path().join("run.toml"));
     let said = findings(&document).join("\n");
-    assert!(said.contains("Section `y_down` at 10.2 s is 178"), "{said}");
+    assert!(
+        said.contains("Section `y_down` at 10.2 s has another axis up, 178°"),
+        "{said}"
+    );
     assert!(
         said.contains("Section `rot_z-360` at 39.0 s turns by +356"),
         "{said}"

@@ -12,7 +12,14 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// Where circles are not allowed: a circle is one of theirs if a module of it is.
-const ROOMS: [&str; 2] = ["calibration", "report"];
+const ROOMS: [&str; 6] = [
+    "calibration",
+    "certificate",
+    "imu",
+    "noise",
+    "report",
+    "turntable",
+];
 
 /// Names from the crate's root on.
 type Names = Vec<String>;
@@ -410,21 +417,15 @@ fn no_module_imports_one_that_imports_it() {
     let modules = Crate::read(&root);
     for room in ROOMS {
         let of_room = |path: &&Names| path.first().is_some_and(|first| first == room);
-        assert!(modules.0.keys().filter(of_room).count() > 10, "{room}");
+        assert!(modules.0.keys().filter(of_room).count() > 5, "{room}");
     }
-    let of_rooms = |circle: &Circle| {
-        let mut members = circle.members.iter();
-        members.any(|path| {
-            path.first()
-                .is_some_and(|room| ROOMS.contains(&room.as_str()))
-        })
+    let of_rooms = |circle: &&Circle| {
+        let mut members = circle.members.iter().filter_map(|path| path.first());
+        members.any(|room| ROOMS.contains(&room.as_str()))
     };
-    let circles: Vec<String> = modules
-        .circles()
-        .iter()
-        .filter(|circle| of_rooms(circle))
-        .map(Circle::words)
-        .collect();
+    let circles = modules.circles();
+    let circles = circles.iter().filter(of_rooms).map(Circle::words);
+    let circles: Vec<String> = circles.collect();
     assert!(circles.is_empty(), "{}", circles.join("\n\n"));
 }
 

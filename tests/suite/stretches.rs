@@ -5,8 +5,8 @@ use std::ops::Range;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, Vector3};
 use turncal::calibration::{
-    Estimate, Finding, Options, Outcome, PARAMETERS, ParameterVector, Problem, Together, UNWATCHED,
-    bound, estimate, mean_square_interval, nees, to_vector,
+    BudgetSource, Estimate, Finding, Options, Outcome, PARAMETERS, ParameterVector, Problem,
+    Together, UNWATCHED, bound, estimate, mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
 use turncal::recording::{Bridge, Recording, SampleError, Segment, Series, Stretch, TableLog};
@@ -179,6 +179,7 @@ fn one_dwell_leaves_the_bias_of_a_gyro_to_where_north_is() {
     // Between two points of a circle the mean square is twice that of its radius, in both axes together.
     let apart = sigma[bias_x].hypot(sigma[bias_y]) / level;
     assert!((1.2..1.6).contains(&apart), "{apart}");
+    assert!(outcome.part(BudgetSource::Headings)[(bias_x, bias_x)] > 0.0);
 }
 
 #[test]

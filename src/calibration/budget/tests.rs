@@ -42,8 +42,10 @@ fn parts_add_to_the_covariance_of_the_estimate() {
         println!("{aiding:?}: {off:.1e}");
         assert!(off < EXACT, "{off}");
         for part in &budget.parts {
-            let own = part.covariance.symmetric_eigenvalues();
-            assert!(own.min() > -1e-9 * own.max(), "{:?}", part.source);
+            for i in outcome.estimate.estimated() {
+                let share = part.covariance[(i, i)] / outcome.estimate.covariance[(i, i)];
+                assert!(share > -EXACT, "{:?}: {share}", part.source);
+            }
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::calibration::iterations::{Iterated, UNWATCHED, iterate};
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::noise::learn;
-use crate::calibration::parameters::{from_vector, parameter, to_vector};
+use crate::calibration::parameters::{ParameterMatrix, from_vector, parameter, to_vector};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
@@ -108,11 +108,12 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
-    let alone = |start, priors, initial_attitudes, estimate| Alone {
+    let alone = |(start, by_headings), priors, initial_attitudes, estimate| Alone {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
         estimate,
+        by_headings,
         state,
         start,
         priors,
@@ -132,17 +133,17 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
             let (contradicted, iterated) = (solved.noise.learnt, solved.iterated);
             let at = &iterated.held.estimate;
             let alone = alone(
-                to_vector(&at.triads),
+                (to_vector(&at.triads), solved.by_headings),
                 solved.priors,
                 at.initial_attitudes.clone(),
-                estimate(iterated),
+                estimate(iterated, solved.by_headings),
             );
             (alone, contradicted)
         }
         _ => {
             let start = coarse_start(plain)?;
             let alone = alone(
-                to_vector(&start.at.triads),
+                (to_vector(&start.at.triads), ParameterMatrix::zeros()),
                 start.attitudes,
                 start.at.initial_attitudes,
                 None,
@@ -176,13 +177,13 @@ fn with_noise(alone: &Alone, recording: &Problem) -> Option<Estimate> {
     );
     let (gate, passes) = (Gate::Innovations, &mut Vec::new());
     let iterated = iterate(recording, &alone.priors, at, gate, passes, UNWATCHED).ok()?;
-    estimate(iterated)
+    estimate(iterated, alone.by_headings)
 }
 
-fn estimate(iterated: Iterated) -> Option<Estimate> {
+fn estimate(iterated: Iterated, by_headings: ParameterMatrix) -> Option<Estimate> {
     iterated.converged.then_some(Estimate {
         triads: iterated.held.estimate.triads,
-        covariance: iterated.held.covariance,
+        covariance: iterated.held.covariance + by_headings,
     })
 }
 

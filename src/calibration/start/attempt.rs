@@ -4,10 +4,12 @@
 use rayon::prelude::*;
 
 use super::coarse::{CoarseStart, coarse_start};
+use crate::attitude::log;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::iterations::{Iterated, Progress, iterate, summary, tell};
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::noise::{NoisePolicy, learn};
+use crate::calibration::parameters::{ParameterMatrix, ParameterVector, to_vector};
 use crate::calibration::pass::{Gate, Mode, pass};
 use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
@@ -22,11 +24,16 @@ pub fn from_coarse_start<'a>(
     let start = coarse_start(problem)?;
     let tried = |start| (stated(problem, &start, progress), start);
     let mut best = tried(start);
+    let mut headings: Vec<Heading> = Heading::of(&best.0).into_iter().collect();
     if best.1.hidden {
         let others: Vec<_> = best.1.other_headings().into_par_iter().map(tried).collect();
+        headings.extend(others.iter().filter_map(|(solved, _)| Heading::of(solved)));
         best = others.into_iter().fold(best, likelier);
     }
-    let (stated, start) = best;
+    let (mut stated, start) = best;
+    if let (Some(chosen), Ok(stated)) = (Heading::of(&stated), &mut stated) {
+        stated.by_headings = chosen.mean_square_to(&headings);
+    }
     let converged = |solved: &Solved| solved.iterated.converged;
     let stopped = matches!(stated, Err(CalibrationError::Stopped));
     let ended = stopped || stated.as_ref().is_ok_and(converged);
@@ -53,6 +60,43 @@ fn likelier<'a>(one: Tried<'a>, other: Tried<'a>) -> Tried<'a> {
         (Ok(first), Ok(second)) if rank(second) < rank(first) => other,
         (Err(_), Ok(_)) => other,
         _ => one,
+    }
+}
+
+/// What came of one heading, where it converged.
+struct Heading {
+    /// −2 ln of its likelihood, except a constant. Within its quadrant one heading is as likely as another.
+    deviance: f64,
+    parameters: ParameterVector,
+}
+
+impl Heading {
+    fn of(solved: &Result<Solved, CalibrationError>) -> Option<Self> {
+        let solved = solved.as_ref().ok()?;
+        let held = &solved.iterated.held;
+        let attitudes = held.estimate.initial_attitudes.iter();
+        let off = attitudes.zip(&solved.priors).map(|(attitude, prior)| {
+            let off = log(&(attitude * prior.mean.transpose()));
+            (off.z / prior.sigma.z).powi(2)
+        });
+        solved.iterated.converged.then(|| Self {
+            deviance: held.deviance() - off.sum::<f64>(),
+            parameters: to_vector(&held.estimate.triads),
+        })
+    }
+
+    /// Mean square by which the parameters differ from those of all headings, each weighted by its likelihood.
+    ///
+    /// Source: Hoeting, Madigan, Raftery and Volinsky 1999, "Bayesian model averaging: a tutorial", Statistical
+    /// Science 14(4), for the weights.
+    fn mean_square_to(&self, all: &[Self]) -> ParameterMatrix {
+        let weight = |of: &Self| (0.5 * (self.deviance - of.deviance)).min(0.0).exp();
+        let sum: f64 = all.iter().map(weight).sum();
+        let each = all.iter().map(|of| {
+            let apart = of.parameters - self.parameters;
+            apart * apart.transpose() * (weight(of) / sum)
+        });
+        each.sum()
     }
 }
 

@@ -1,9 +1,10 @@
 //! Rows by Earth rate without a table: what the gyros sense at rest, and which way is north.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::equations::{Common, Equations, Rows, of};
+use super::equations::{Equations, Rows, of};
 use super::gravity::{AtRest, Chain, ROUNDING, input_errors, of_noise};
+use super::heading::Heading;
 use crate::attitude::exp;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
@@ -12,34 +13,6 @@ use crate::calibration::noise::{BY_HAND, Source};
 use crate::calibration::problem::Stretch;
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
-
-/// The heading common to all attitudes of a stretch.
-#[derive(Debug, Clone, Copy)]
-pub struct Heading {
-    /// Number of the stretch.
-    stretch: usize,
-    /// Turn about Up that brings the attitudes to East-North-Up, rad.
-    pub turn: Matrix3<f64>,
-    /// 1σ of its angle, rad; above one nothing is known of it.
-    pub sigma: f64,
-}
-
-impl Heading {
-    /// Its σ as it is used, rad.
-    pub fn known(&self) -> f64 {
-        self.sigma.clamp(1e-3, 1.0)
-    }
-
-    /// How some rows follow its error, by their change with an angle of one.
-    pub fn error<const N: usize>(
-        &self,
-        by_angle: &SVector<f64, N>,
-    ) -> (Common, SMatrix<f64, N, 3>) {
-        let mut error = SMatrix::<f64, N, 3>::zeros();
-        error.set_column(2, &(by_angle * self.known()));
-        (Common::Unit(self.stretch), error)
-    }
-}
 
 /// The headings of all stretches, and the error of the rates.
 pub struct Gyrocompass {

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, SMatrix, Vector1, Vector2, Vector3};
 
-use super::earth_rate::Heading;
 use super::equations::{Common, Equations, Event, OfTriad, Rows, of, of_parameters};
+use super::heading::Heading;
 use crate::attitude::{exp, skew, tilt};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;

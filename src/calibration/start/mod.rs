@@ -9,6 +9,7 @@ pub mod coarse;
 mod earth_rate;
 pub mod equations;
 mod gravity;
+mod heading;
 mod judged;
 mod labels;
 pub mod mounting;
