@@ -2,11 +2,11 @@
 
 use nalgebra::DVector;
 
-use super::auxiliary::Auxiliary;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::linearisation::Linearisation;
 use super::parameters::PARAMETERS;
+use super::parameters::auxiliary::Auxiliary;
 use super::pass::{Epoch, Gate, Mode, pass};
 use super::problem::Problem;
 use crate::calibration::start::coarse::initial_attitudes;

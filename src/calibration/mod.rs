@@ -10,14 +10,11 @@ mod record;
 mod several;
 mod start;
 
-mod auxiliary;
 mod bound;
 mod budget;
 mod error;
-mod error_term;
 mod estimate;
 mod gauss_newton;
-mod group;
 mod iterations;
 mod layout;
 mod linearisation;
@@ -32,9 +29,6 @@ pub mod result;
 mod solution;
 mod solved;
 
-pub use auxiliary::{
-    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
-};
 pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::dwell_scatter::DwellScatter;
@@ -46,16 +40,19 @@ pub use checks::observability::{AttitudePart, Direction, Observability, Part};
 pub use checks::quality::{Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
 pub use error::{CalibrationError, ComparisonError};
-pub use error_term::ErrorTerm;
 pub use estimate::Estimate;
 pub use gauss_newton::estimate;
-pub use group::Group;
 pub use iterations::{Progress, UNWATCHED};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use options::Options;
 pub use outcome::{Outcome, Pass};
+pub use parameters::auxiliary::{
+    AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
+};
+pub use parameters::error_term::ErrorTerm;
+pub use parameters::group::Group;
 pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
     parameter, parameter_index, parameter_name, sensor_and_parameter, to_vector,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::budget::source::BudgetSource;
-use super::error_term::ErrorTerm;
 use super::options::Options;
+use super::parameters::error_term::ErrorTerm;
 use super::parameters::{ParameterVector, parameter, to_vector};
 use crate::calibration::record::standstill::FLOOR;
 use crate::calibration::several::day_to_day::DayToDay;

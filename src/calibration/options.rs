@@ -1,7 +1,7 @@
 //! What is to be estimated, and how.
 
-use super::error_term::ErrorTerm;
 use super::noise::NoisePolicy;
+use super::parameters::error_term::ErrorTerm;
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
 use crate::statistics::FALSE_ALARM;

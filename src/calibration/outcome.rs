@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::auxiliary::Auxiliary;
 use super::budget::BudgetSource;
 use super::estimate::{Estimate, largest_growth};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::model::Model;
 use super::noise::NoiseReport;
+use super::parameters::auxiliary::Auxiliary;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::pass::{Epoch, Own};
 use super::problem::Problem;

@@ -18,6 +18,8 @@ use super::shared::shared;
 
 /// By how much a parameter may move in units of its σ, and any other figure in parts of itself.
 const SAME: f64 = 1e-9;
+/// What twelve digits leave open of a value.
+const LAST_DIGIT: f64 = 1.5e-11;
 /// Seeds of each scenario: all, and those of the fast tier.
 const SEEDS: u64 = 40;
 const FAST_SEEDS: u64 = 2;
@@ -137,7 +139,8 @@ impl Figures {
         };
         let moved = pairs().map(|(name, now, was)| {
             let off = now.0 - was.0;
-            (name, if off == 0.0 { 0.0 } else { off / was.1 })
+            let digits = off.abs() <= LAST_DIGIT * was.0.abs();
+            (name, if digits { 0.0 } else { off / was.1 })
         });
         let grown = pairs().map(|(name, now, was)| (name, part(now.1, was.1)));
         let others = self

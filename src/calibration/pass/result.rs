@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::earlier::Earlier;
 use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
-use crate::calibration::auxiliary::{Auxiliary, auxiliary_vector};
 use crate::calibration::budget::curvature::curvature;
 use crate::calibration::checks::dwell_scatter::Posterior;
 use crate::calibration::checks::innovation::Innovation;
@@ -15,6 +14,7 @@ use crate::calibration::filter::{Dwells, Filter};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::model::Model;
+use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_vector};
 use crate::calibration::parameters::{
     PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };

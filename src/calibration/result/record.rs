@@ -11,7 +11,6 @@ use super::{
     FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
     TestVector, TriadRecord, rows,
 };
-use crate::calibration::auxiliary::{Auxiliary, auxiliary_name};
 use crate::calibration::budget::Budget;
 use crate::calibration::checks::error_term_test::ErrorTermTest;
 use crate::calibration::checks::finding::Finding;
@@ -19,6 +18,7 @@ use crate::calibration::checks::innovation::Nis;
 use crate::calibration::checks::quality::Quality;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_name};
 use crate::calibration::parameters::{
     PARAMETERS, ParameterMatrix, factor, parameter, parameter_name,
 };

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, Vector3};
 
 use crate::attitude::exp;
-use crate::calibration::group::Group;
+use crate::calibration::parameters::group::Group;
 use crate::calibration::parameters::{
     PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };

@@ -4,11 +4,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::evidence::Evidence;
 use super::explanation::{Explanation, LeftOff};
-use crate::calibration::auxiliary::{AUXILIARY, AuxiliaryKind, auxiliary_vector};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::error_term::ErrorTerm;
 use crate::calibration::model::Model;
 use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::auxiliary::{AUXILIARY, AuxiliaryKind, auxiliary_vector};
+use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::calibration::pass::{Gate, Mode, PassResult, Tried, pass_trying};
 use crate::calibration::problem::Problem;

@@ -14,9 +14,9 @@ use serde_json::json;
 
 use super::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::error_term::ErrorTerm;
-use crate::calibration::group::Group;
 use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::error_term::ErrorTerm;
+use crate::calibration::parameters::group::Group;
 use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
 use crate::calibration::pass::PassResult;
 use crate::calibration::problem::Problem;

@@ -2,9 +2,9 @@
 
 use serde_json::json;
 
-use crate::calibration::auxiliary::auxiliary_name;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::outcome::Outcome;
+use crate::calibration::parameters::auxiliary::auxiliary_name;
 use crate::calibration::parameters::parameter_name;
 use crate::units::DEGREE;
 

@@ -1,6 +1,10 @@
 //! The parameters of both triads as one vector: gyros, then accelerometers, each in the order of
 //! [`crate::imu::TriadVector`]. Parameter errors δθ are true − estimated.
 
+pub mod auxiliary;
+pub mod error_term;
+pub mod group;
+
 use nalgebra::{SMatrix, SVector};
 
 use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};

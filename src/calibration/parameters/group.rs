@@ -1,8 +1,8 @@
 //! The six groups in which an engineer reads a calibration.
 
-use super::estimate::Estimate;
-use super::parameters::parameter_name;
-use super::parameters::{PARAMETERS, sensor_and_parameter};
+use super::parameter_name;
+use super::{PARAMETERS, sensor_and_parameter};
+use crate::calibration::estimate::Estimate;
 use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
 
 /// Parameters of one triad and kind.

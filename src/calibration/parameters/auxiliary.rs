@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, SVector};
 
 use super::error_term::ErrorTerm;
-use super::parameters::{OBSERVED_BELOW, PARAMETERS};
+use super::{OBSERVED_BELOW, PARAMETERS};
 use crate::imu::{TERM_PARAMETERS, Term, TermVector};
 use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY, table_geometry_name};
 
