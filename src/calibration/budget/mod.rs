@@ -54,7 +54,7 @@ pub struct BudgetPart {
 
 /// By which part of itself the variance of a source becomes larger and smaller: the difference is exact to its square,
 /// and rounding of covariances that fall by ten orders of magnitude stays below that.
-const STEP: f64 = 0.02;
+const STEP: f64 = 0.01;
 
 impl Budget {
     /// The budget of an outcome's estimate.

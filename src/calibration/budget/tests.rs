@@ -8,7 +8,7 @@ use crate::imu::{Sensor, Term};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
 
-/// A fourth of the square of the step of the differences.
+/// The square of the step of the differences.
 const EXACT: f64 = 1e-4;
 
 fn simulated(scenario: &str) -> Run {
