@@ -8,7 +8,8 @@ use std::fmt::Write;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    Certificate, Condition, Contact, Decided, Measured, temperature_words, to_twelve_digits,
+    Certificate, Condition, Contact, Decided, Equipment, Laboratory, Measured, temperature_words,
+    to_twelve_digits,
 };
 
 /// Coverage probability of every uncertainty.
@@ -182,24 +183,7 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
         xml.leaf("dcc:performanceLocation", laboratory.place.code());
         xml.leaf("dcc:issueDate", &laboratory.issued.to_string());
     });
-    xml.element("dcc:items", |xml| {
-        xml.element("dcc:item", |xml| {
-            xml.words("dcc:name", &laboratory.item);
-            xml.words(
-                "dcc:description",
-                &format!("State when received: {}", laboratory.state),
-            );
-            if let Some(manufacturer) = &laboratory.manufacturer {
-                xml.element("dcc:manufacturer", |xml| {
-                    xml.words("dcc:name", manufacturer)
-                });
-            }
-            xml.leaf("dcc:model", &laboratory.model);
-            xml.element("dcc:identifications", |xml| {
-                xml.identification("manufacturer", &laboratory.serial, "serial number");
-            });
-        });
-    });
+    item(xml, laboratory);
     xml.element("dcc:calibrationLaboratory", |xml| {
         xml.contact("dcc:contact", &laboratory.contact);
     });
@@ -222,6 +206,28 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
                 statement(xml, limit, conformity.rule.words());
             }
         }
+    });
+}
+
+/// What was calibrated.
+fn item(xml: &mut Xml, laboratory: &Laboratory) {
+    xml.element("dcc:items", |xml| {
+        xml.element("dcc:item", |xml| {
+            xml.words("dcc:name", &laboratory.item);
+            xml.words(
+                "dcc:description",
+                &format!("State when received: {}", laboratory.state),
+            );
+            if let Some(manufacturer) = &laboratory.manufacturer {
+                xml.element("dcc:manufacturer", |xml| {
+                    xml.words("dcc:name", manufacturer)
+                });
+            }
+            xml.leaf("dcc:model", &laboratory.model);
+            xml.element("dcc:identifications", |xml| {
+                xml.identification("manufacturer", &laboratory.serial, "serial number");
+            });
+        });
     });
 }
 
@@ -266,18 +272,7 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
         });
     });
     if !laboratory.equipment.is_empty() {
-        xml.element("dcc:measuringEquipments", |xml| {
-            for equipment in &laboratory.equipment {
-                xml.element("dcc:measuringEquipment", |xml| {
-                    xml.words("dcc:name", &equipment.name);
-                    let text = format!("Certificate {}", equipment.certificate);
-                    xml.words("dcc:description", &text);
-                    xml.element("dcc:identifications", |xml| {
-                        xml.identification("manufacturer", &equipment.serial, "serial number");
-                    });
-                });
-            }
-        });
+        equipments(xml, &laboratory.equipment);
     }
     xml.element("dcc:influenceConditions", |xml| {
         xml.condition(
@@ -301,6 +296,21 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
                 }
             });
         });
+    });
+}
+
+fn equipments(xml: &mut Xml, equipments: &[Equipment]) {
+    xml.element("dcc:measuringEquipments", |xml| {
+        for equipment in equipments {
+            xml.element("dcc:measuringEquipment", |xml| {
+                xml.words("dcc:name", &equipment.name);
+                let text = format!("Certificate {}", equipment.certificate);
+                xml.words("dcc:description", &text);
+                xml.element("dcc:identifications", |xml| {
+                    xml.identification("manufacturer", &equipment.serial, "serial number");
+                });
+            });
+        }
     });
 }
 

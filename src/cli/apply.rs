@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::error::ErrorKind;
 use turncal::calibration::result::Calibration;
-use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE};
+use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
 use turncal::formats::export::{sample_rows, write_samples};
 use turncal::imu::{Sensor, Term};
 use turncal::report::terminal::printable;
@@ -114,30 +114,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         }
     }
     if let Some(thermal) = &record.temperature {
-        match &run.recording.imu.temperature {
-            None => notes.push(format!(
-                "the run has no temperature, the calibration changes with it: all rows are corrected as at {} °C and \
-                 have 0 in in_range",
-                thermal.range.gyro.reference
-            )),
-            Some(temperature) => {
-                for sensor in Sensor::ALL {
-                    let ([lowest, highest], range) =
-                        (temperature.range(sensor), thermal.range.get(sensor));
-                    if lowest < range.lowest - TEMPERATURE_TOLERANCE
-                        || highest > range.highest + TEMPERATURE_TOLERANCE
-                    {
-                        notes.push(format!(
-                            "{}: the run is at {lowest:.1} to {highest:.1} °C, the calibration holds for {:.1} to \
-                             {:.1} °C; rows beyond have 0 in in_range",
-                            sensor.name(),
-                            range.lowest,
-                            range.highest
-                        ));
-                    }
-                }
-            }
-        }
+        notes.extend(of_temperature(thermal, run));
     }
     if correction.has(Term::TimeOffset) {
         notes.push("the time offset of the accelerometers neglects Earth rate".to_owned());
@@ -150,4 +127,30 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         );
     }
     notes
+}
+
+/// Where the run's temperature is unknown, or beyond that of the calibration.
+fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
+    let Some(temperature) = &run.recording.imu.temperature else {
+        return vec![format!(
+            "the run has no temperature, the calibration changes with it: all rows are corrected as at {} °C and \
+             have 0 in in_range",
+            thermal.range.gyro.reference
+        )];
+    };
+    let beyond = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let ([lowest, highest], range) = (temperature.range(sensor), thermal.range.get(sensor));
+        let is_beyond = lowest < range.lowest - TEMPERATURE_TOLERANCE
+            || highest > range.highest + TEMPERATURE_TOLERANCE;
+        is_beyond.then(|| {
+            format!(
+                "{}: the run is at {lowest:.1} to {highest:.1} °C, the calibration holds for {:.1} to \
+                 {:.1} °C; rows beyond have 0 in in_range",
+                sensor.name(),
+                range.lowest,
+                range.highest
+            )
+        })
+    });
+    beyond.collect()
 }

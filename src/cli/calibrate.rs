@@ -135,11 +135,7 @@ impl Calibrate {
     fn at_rest(&self, at_rest: &AtRest, run: &Run, path: &Path) -> anyhow::Result<()> {
         let calibration = at_rest.record(run);
         let document = report::at_rest::document(at_rest, run, &calibration);
-        let target = match (&self.output, self.json) {
-            (Some(directory), _) => Some(directory.clone()),
-            (None, true) => None,
-            (None, false) => Some(PathBuf::from(format!("{}-calibration", run.recording.name))),
-        };
+        let target = self.target(|| format!("{}-calibration", run.recording.name));
         if let Some(target) = &target {
             let directory = self.overwrite.directory(target, &[path])?;
             calibration.write(&directory.path().join("calibration.json"), false)?;
@@ -166,6 +162,12 @@ impl Calibrate {
         self.solved(&problem, &campaign.name, path, activity)
     }
 
+    /// The directory to write, if any; by default of this name.
+    fn target(&self, default: impl FnOnce() -> String) -> Option<PathBuf> {
+        let default = || (!self.json).then(|| PathBuf::from(default()));
+        self.output.clone().or_else(default)
+    }
+
     /// Solves a problem, writes and shows what came of it.
     fn solved(
         &self,
@@ -180,14 +182,10 @@ impl Calibrate {
             .as_deref()
             .map(|path| read_truth(path, run, problem.model.aiding.body_frame()))
             .transpose()?;
-        let target = match (&self.output, self.json) {
-            (Some(directory), _) => Some(directory.clone()),
-            (None, true) => None,
-            (None, false) => Some(PathBuf::from(match self.estimation.method {
-                Method::Ekf => format!("{name}-calibration"),
-                Method::SixPosition => format!("{name}-calibration-six-position"),
-            })),
-        };
+        let target = self.target(|| match self.estimation.method {
+            Method::Ekf => format!("{name}-calibration"),
+            Method::SixPosition => format!("{name}-calibration-six-position"),
+        });
         let directory = target
             .as_deref()
             .map(|target| {

@@ -7,12 +7,13 @@ use super::number::{count, or_dash, sigma, value};
 use super::pdf::{Attached, Frame, PdfError};
 use super::{document::Block, pdf};
 use crate::calibration::Group;
-use crate::calibration::result::EQUATION;
+use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
     AsFound, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
     temperature_words,
 };
 use crate::imu::ParameterKind;
+use crate::run::Aiding;
 use results::{name, results};
 
 /// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
@@ -140,16 +141,7 @@ fn method(certificate: &Certificate) -> Facts {
         "deviations",
         deviations.unwrap_or_else(|| "none".to_owned()),
     );
-    let how = match calibration.aiding {
-        Some(crate::run::Aiding::Table) => {
-            "error-state Kalman filter with Gauss–Newton iterations, observing standstill and the attitude of the \
-             turntable"
-        }
-        Some(crate::run::Aiding::Velocity) => {
-            "error-state Kalman filter with Gauss–Newton iterations, observing standstill"
-        }
-        None => "closed form from static positions",
-    };
+    let how = evaluation(calibration.aiding);
     facts.push("evaluation", format!("{}: {how}", provenance.program));
     facts.push(
         "data",
@@ -177,15 +169,7 @@ fn method(certificate: &Certificate) -> Facts {
     }
     facts.push("body frame", calibration.body_frame.words());
     if let Some(gravity) = calibration.gravity {
-        let accuracy = match gravity.sigma_m_s2 > 0.0 {
-            true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
-            false => "taken as exact".to_owned(),
-        };
-        let digits = gravity.sigma_m_s2.max(1e-6);
-        facts.push(
-            "gravity",
-            format!("{} m/s², {accuracy}", value(gravity.m_s2, digits)),
-        );
+        facts.push("gravity", of_gravity(gravity));
     }
     for input in &provenance.inputs {
         facts.push(
@@ -198,6 +182,28 @@ fn method(certificate: &Certificate) -> Facts {
         format!("attached, SHA-256 {}", certificate.sha256),
     );
     facts
+}
+
+fn evaluation(aiding: Option<Aiding>) -> &'static str {
+    match aiding {
+        Some(Aiding::Table) => {
+            "error-state Kalman filter with Gauss–Newton iterations, observing standstill and the attitude of the \
+             turntable"
+        }
+        Some(Aiding::Velocity) => {
+            "error-state Kalman filter with Gauss–Newton iterations, observing standstill"
+        }
+        None => "closed form from static positions",
+    }
+}
+
+fn of_gravity(gravity: GravityRecord) -> String {
+    let accuracy = match gravity.sigma_m_s2 > 0.0 {
+        true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
+        false => "taken as exact".to_owned(),
+    };
+    let digits = gravity.sigma_m_s2.max(1e-6);
+    format!("{} m/s², {accuracy}", value(gravity.m_s2, digits))
 }
 
 fn conditions(certificate: &Certificate) -> Facts {

@@ -15,7 +15,7 @@ use crate::calibration::{AttitudePrior, Direction, Linearisation, Observability,
 use crate::calibration::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::*;
 use crate::run::Run;
-use crate::simulation::Scenario;
+use crate::simulation::{Scenario, Simulated};
 use crate::study::navigation::Mission;
 use crate::units::ARCSEC;
 
@@ -77,25 +77,23 @@ fn estimate(
     }
 }
 
-/// σ that fall to a thousandth of the prior's, and errors of that size.
-pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
-    let rng = &mut ChaCha8Rng::seed_from_u64(7);
+/// A recording of the demonstration on a coarse clock.
+fn simulated() -> Simulated {
     let mut scenario = Scenario::load("demo").unwrap();
     scenario.integrator.period = 0.1;
-    let simulated = scenario.simulate(7, 0).unwrap();
-    let mut run = simulated.run;
-    run.recording.name = "three-axis-made-up".to_owned();
+    let mut simulated = scenario.simulate(7, 0).unwrap();
+    let recording = &mut simulated.run.recording;
+    recording.name = "three-axis-made-up".to_owned();
     let instrument = (
         "instrument".to_owned(),
         "navigation-grade FOG <IMU> & co".to_owned(),
     );
-    run.recording.meta.extend([instrument]);
-    let seconds = |dwell: crate::run::Dwell| {
-        run.recording.imu.time(dwell.samples.start)..run.recording.imu.time(dwell.samples.end)
-    };
-    let dwells: Vec<Range<f64>> = run.dwells(run.aiding()).into_iter().map(seconds).collect();
-    let truth = PerSensor::from_fn(|sensor| simulated.truth.get(sensor).in_form(form));
-    let prior_sigma = ParameterVector::from_fn(|i, _| {
+    recording.meta.extend([instrument]);
+    simulated
+}
+
+fn prior_sigma(run: &Run, form: InstallationForm) -> ParameterVector {
+    ParameterVector::from_fn(|i, _| {
         let (sensor, p) = sensor_and_parameter(i);
         let sigma = run.instrument.prior.get(sensor).sigma(form)[p];
         if Triad::has_parameter(form, p) {
@@ -103,23 +101,10 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         } else {
             0.0
         }
-    });
-    let final_sigma = prior_sigma * 1e-3;
-    let (drawn, length) = (vector(rng), run.recording.imu.duration());
-    let history = |gain: f64| {
-        let moment = |k: u32| {
-            let time = length * f64::from(k) / 400.0;
-            let sigma = final_sigma * (length / time).min(1e3);
-            let error = sigma.component_mul(&drawn) * (1.0 + gain * (time / 40.0).sin());
-            let estimate = to_vector(&truth) + error;
-            Epoch {
-                time,
-                estimate,
-                sigma,
-            }
-        };
-        (1..=400).map(moment).collect()
-    };
+    })
+}
+
+fn innovations(dwells: &[Range<f64>], rng: &mut ChaCha8Rng) -> Vec<Innovation> {
     let mut innovations = Vec::new();
     for (number, dwell) in dwells.iter().enumerate() {
         for k in 1..20u32 {
@@ -136,6 +121,26 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             }));
         }
     }
+    innovations
+}
+
+/// One direction that the observations hardly tell of.
+fn observability() -> Observability {
+    let part = |parameter, component| Part {
+        parameter,
+        component,
+    };
+    Observability {
+        directions: vec![Direction {
+            remaining: 0.002,
+            parts: vec![part(2, 0.8), part(11, -0.6)],
+            others: false,
+            attitude: Vec::new(),
+        }],
+    }
+}
+
+fn passes() -> Vec<Pass> {
     let pass = |feedback, largest_step, cost, rejected| Pass {
         feedback,
         largest_step,
@@ -143,25 +148,66 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         observations: 7200,
         rejected,
     };
+    vec![
+        pass(true, 812.0, 9.1e5, 4),
+        pass(false, 3.1, 7310.0, 9),
+        pass(false, 0.004, 7195.2, 9),
+    ]
+}
+
+fn consistency() -> Consistency {
     let nis = |mean, count| Nis {
         mean,
         count,
         interval: (0.964, 1.036),
         lag_one: -0.013,
     };
-    let part = |parameter, component| Part {
-        parameter,
-        component,
+    Consistency {
+        all: nis(1.01, 7182),
+        velocity: nis(1.002, 5985),
+        table: nis(1.051, 1197),
+        attitude: nis(f64::NAN, 0),
+    }
+}
+
+/// Estimates whose σ fall with time, and whose errors, of `drawn` σ, swing by `gain`.
+fn history(
+    truth: &ParameterVector,
+    final_sigma: &ParameterVector,
+    drawn: &ParameterVector,
+    length: f64,
+    gain: f64,
+) -> Vec<Epoch> {
+    let moment = |k: u32| {
+        let time = length * f64::from(k) / 400.0;
+        let sigma = final_sigma * (length / time).min(1e3);
+        let error = sigma.component_mul(drawn) * (1.0 + gain * (time / 40.0).sin());
+        Epoch {
+            time,
+            estimate: truth + error,
+            sigma,
+        }
     };
-    let prior_mean = to_vector(&PerSensor::from_fn(|s| {
-        run.instrument.prior.get(s).mean(form)
-    }));
-    let outcome = Outcome {
+    (1..=400).map(moment).collect()
+}
+
+/// A result whose σ fall from `prior_sigma` to `final_sigma`, and errors of `drawn` σ.
+fn outcome(
+    run: &Run,
+    truth: PerSensor<Triad>,
+    [prior_sigma, final_sigma, drawn]: [ParameterVector; 3],
+    innovations: Vec<Innovation>,
+) -> Outcome {
+    let form = truth.gyro.form;
+    let length = run.recording.imu.duration();
+    let history = |gain: f64| history(&to_vector(&truth), &final_sigma, &drawn, length, gain);
+    let prior_mean = PerSensor::from_fn(|s| run.instrument.prior.get(s).mean(form));
+    Outcome {
         form_test: None,
         dwell_scatter: None,
         covariance_by_noise: ParameterMatrix::zeros(),
         beside: BTreeMap::new(),
-        model: Model::new(&run, &Options::default().installation(form)),
+        model: Model::new(run, &Options::default().installation(form)),
         noise: NoiseReport {
             policy: Default::default(),
             learnt: false,
@@ -170,7 +216,7 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
         },
         estimate: estimate(&truth, &final_sigma, &drawn),
         prior_sigma,
-        prior_mean,
+        prior_mean: to_vector(&prior_mean),
         auxiliary: Default::default(),
         thermal: None,
         own: Vec::new(),
@@ -183,37 +229,38 @@ pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
             sigma: Vector3::repeat(60.0 * ARCSEC),
         }],
         attitude_sigma: Vector3::repeat(ARCSEC),
-        observability: Observability {
-            directions: vec![Direction {
-                remaining: 0.002,
-                parts: vec![part(2, 0.8), part(11, -0.6)],
-                others: false,
-                attitude: Vec::new(),
-            }],
-        },
+        observability: observability(),
         linearised_at: Linearisation::new(truth, TermVector::zeros(), vec![Matrix3::identity()]),
-        passes: vec![
-            pass(true, 812.0, 9.1e5, 4),
-            pass(false, 3.1, 7310.0, 9),
-            pass(false, 0.004, 7195.2, 9),
-        ],
+        passes: passes(),
         converged: true,
         log_determinant: 0.0,
         feedback_history: history(0.8),
         history: history(0.3),
         innovations,
-        consistency: Consistency {
-            all: nis(1.01, 7182),
-            velocity: nis(1.002, 5985),
-            table: nis(1.051, 1197),
-            attitude: nis(f64::NAN, 0),
-        },
+        consistency: consistency(),
         velocity_sigma: 1.2e-5,
         findings: vec![Finding::of_recording(
             "The path turns about z by less than a full turn; gyro K z rests on one move."
                 .to_owned(),
         )],
+    }
+}
+
+/// σ that fall to a thousandth of the prior's, and errors of that size.
+pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
+    let rng = &mut ChaCha8Rng::seed_from_u64(7);
+    let Simulated { run, truth, .. } = simulated();
+    let seconds = |dwell: crate::run::Dwell| {
+        run.recording.imu.time(dwell.samples.start)..run.recording.imu.time(dwell.samples.end)
     };
+    let dwells: Vec<Range<f64>> = run.dwells(run.aiding()).into_iter().map(seconds).collect();
+    let truth = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
+    let prior_sigma = prior_sigma(&run, form);
+    let final_sigma = prior_sigma * 1e-3;
+    let drawn = vector(rng);
+    let innovations = innovations(&dwells, rng);
+    let sizes = [prior_sigma, final_sigma, drawn];
+    let outcome = outcome(&run, truth, sizes, innovations);
     let closed = estimate(&truth, &(final_sigma * 40.0), &vector(rng));
     let mission = Mission::standing_level(&run.site, 600);
     let navigation = [("closed form", &closed), ("EKF", &outcome.estimate)]

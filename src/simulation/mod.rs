@@ -21,6 +21,7 @@ use drive::Drive;
 pub use drive::Runs;
 pub use increments::{Integrator, true_increments};
 pub use scenario::{Given, Scenario};
+use thermal::Warming;
 pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::{exp, quaternion};
@@ -150,98 +151,94 @@ impl Scenario {
             Some(drive) => Cow::Borrowed(drive),
             None => Cow::Owned(Drive::new(self, imperfection, terms)?),
         };
-        let ideal = &drive.ideal;
-
-        let truth = PerSensor::from_fn(|sensor| {
+        let draw = |sensor: Sensor| {
             let draws = match sensor {
                 Sensor::Gyro => Draws::GyroTruth,
                 Sensor::Accel => Draws::AccelTruth,
             };
             self.draw_truth(sensor, &mut draws.generator(seed, instrument))
-        });
-        let common = truth;
-        let truth = own.applied(&truth);
+        };
+        let common = PerSensor::from_fn(draw);
+        let truth = own.applied(&common);
         let thermal = self.instrument.thermal.as_ref().map(|variation| {
             let mut rng = Draws::thermal(seed, instrument);
             let form = self.installation.form;
             ThermalTruth::draw(variation, form, self.reference_temperature(), &mut rng)
         });
-        let warming = self
-            .chamber
-            .as_ref()
-            .map(|chamber| chamber.instrument(drive.duration));
-        let nominal = PerSensor::from_fn(|sensor| {
-            let per_unit = match self.output {
-                Output::Pulse => 1.0 / self.instrument.pulse.get(sensor),
-                Output::Increment | Output::Rate => 1.0,
-            };
-            Nominal(Vector3::repeat(per_unit))
-        });
-        let pulse = match self.output {
-            Output::Pulse => self.instrument.pulse,
-            Output::Increment | Output::Rate => PerSensor::default(),
-        };
-        let unit = PerSensor::from_fn(|sensor| {
-            match (self.output, sensor) {
-                (Output::Pulse, _) => "count",
-                (Output::Increment, Sensor::Gyro) => "rad",
-                (Output::Increment, Sensor::Accel) => "m/s",
-                (Output::Rate, Sensor::Gyro) => "rad/s",
-                (Output::Rate, Sensor::Accel) => "m/s^2",
+        let chamber = self.chamber.as_ref();
+        let warming = chamber.map(|chamber| chamber.instrument(drive.duration));
+        let triad_at = |sensor: Sensor, time: f64| match (&thermal, &warming) {
+            (Some(thermal), Some(warming)) => {
+                let (temperature, rate) = warming.at(time);
+                *thermal.at(&truth, temperature, rate).get(sensor)
             }
-            .to_owned()
-        });
-        let sensed = |sensor: Sensor, draws: Draws, ideal: &[Vector3<f64>]| {
-            let at = |time: f64| match (&thermal, &warming) {
-                (Some(thermal), Some(warming)) => {
-                    let (temperature, rate) = warming.at(time);
-                    *thermal.at(&truth, temperature, rate).get(sensor)
-                }
-                _ => *truth.get(sensor),
-            };
+            _ => *truth.get(sensor),
+        };
+        let imu = self.samples(&drive, &triad_at, warming.as_ref(), seed, stream);
+        Ok(Simulated {
+            run: self.recorded(imu, self.readings(&drive, seed, stream)),
+            truth,
+            common,
+            terms,
+            geometry,
+            thermal,
+            output: self.output,
+        })
+    }
+
+    /// What an instrument puts out on a drive, and the temperature that is recorded with it.
+    fn samples(
+        &self,
+        drive: &Drive,
+        triad_at: &dyn Fn(Sensor, f64) -> Triad,
+        warming: Option<&Warming>,
+        seed: u64,
+        stream: u64,
+    ) -> ImuSamples {
+        let sensed = |sensor: Sensor, draws: Draws| {
+            let at = |time: f64| triad_at(sensor, time);
+            let ideal = drive.ideal.get(sensor);
             self.sensed(&at, sensor, ideal, draws.generator(seed, stream))
         };
-        let temperature = self.chamber.as_ref().zip(warming.as_ref());
+        let temperature = self.chamber.as_ref().zip(warming);
         let temperature = temperature.and_then(|(chamber, warming)| {
             let mut rng = Draws::thermal(seed, !stream);
             warming.recorded(drive.duration, chamber.sensor_noise, &mut rng)
         });
-        let imu = ImuSamples {
-            pulse,
+        ImuSamples {
+            pulse: match self.output {
+                Output::Pulse => self.instrument.pulse,
+                Output::Increment | Output::Rate => PerSensor::default(),
+            },
             temperature,
             ..ImuSamples::made(
                 0.0,
                 self.integrator.period,
-                sensed(Sensor::Gyro, Draws::GyroNoise, &ideal.gyro),
-                sensed(Sensor::Accel, Draws::AccelNoise, &ideal.accel),
+                sensed(Sensor::Gyro, Draws::GyroNoise),
+                sensed(Sensor::Accel, Draws::AccelNoise),
             )
-        };
+        }
+    }
+
+    /// The run that these samples and the table's log are of.
+    fn recorded(&self, imu: ImuSamples, table: TableLog) -> Run {
         let meta = [
             ("instrument", &self.instrument.name),
             ("table", &self.table_name),
         ];
-        let run = Run {
+        Run {
             recording: Recording {
                 name: self.name.clone(),
                 meta: meta
                     .map(|(key, value)| (key.to_owned(), value.clone()))
                     .into(),
                 imu,
-                table: Some(self.readings(&drive, seed, stream)),
+                table: Some(table),
                 segments: Vec::new(),
                 files: Vec::new(),
                 notes: Vec::new(),
             },
-            instrument: Instrument {
-                nominal,
-                unit,
-                prior: PerSensor::from_fn(|sensor| {
-                    self.instrument.prior(sensor, &self.installation)
-                }),
-                noise: self.instrument.noise,
-                motion_noise: PerSensor::default(),
-                term_sigma: self.instrument.term_sigma,
-            },
+            instrument: self.known_instrument(),
             site: self.site,
             table: self.table_accuracy(),
             standstill: Standstill {
@@ -251,16 +248,33 @@ impl Scenario {
                 ..Standstill::default()
             },
             segment_sigma: SET_BY_HAND,
+        }
+    }
+
+    /// What is known of the instrument before it is calibrated.
+    fn known_instrument(&self) -> Instrument {
+        let nominal = |sensor: Sensor| {
+            let per_unit = match self.output {
+                Output::Pulse => 1.0 / self.instrument.pulse.get(sensor),
+                Output::Increment | Output::Rate => 1.0,
+            };
+            Nominal(Vector3::repeat(per_unit))
         };
-        Ok(Simulated {
-            run,
-            truth,
-            common,
-            terms,
-            geometry,
-            thermal,
-            output: self.output,
-        })
+        let unit = |sensor: Sensor| match (self.output, sensor) {
+            (Output::Pulse, _) => "count",
+            (Output::Increment, Sensor::Gyro) => "rad",
+            (Output::Increment, Sensor::Accel) => "m/s",
+            (Output::Rate, Sensor::Gyro) => "rad/s",
+            (Output::Rate, Sensor::Accel) => "m/s^2",
+        };
+        Instrument {
+            nominal: PerSensor::from_fn(nominal),
+            unit: PerSensor::from_fn(|sensor| unit(sensor).to_owned()),
+            prior: PerSensor::from_fn(|sensor| self.instrument.prior(sensor, &self.installation)),
+            noise: self.instrument.noise,
+            motion_noise: PerSensor::default(),
+            term_sigma: self.instrument.term_sigma,
+        }
     }
 
     fn geometry(&self, imperfection: &Imperfection) -> SVector<f64, TABLE_GEOMETRY> {

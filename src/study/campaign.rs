@@ -180,7 +180,6 @@ fn compare(
     simulated: &[Simulated],
     bound: &DVector<f64>,
 ) -> Option<CampaignTrial> {
-    let form = outcome.estimate.form();
     let estimated: Vec<usize> = outcome.estimate.estimated().collect();
     let empty = DMatrix::zeros(PARAMETERS, 0);
     let thermal = outcome.thermal.as_ref();
@@ -207,12 +206,7 @@ fn compare(
             (Some(k), Some(l)) => thermal.map_or(0.0, |t| t.covariance[(k, l)]),
         }
     });
-    let sigma = covariance.diagonal().map(f64::sqrt);
-    let correlation = DMatrix::from_fn(m + n, m + n, |i, j| {
-        covariance[(i, j)] / (sigma[i] * sigma[j])
-    });
-    let whitened = error.component_div(&sigma);
-    let nees = whitened.dot(&correlation.cholesky()?.solve(&whitened));
+    let nees = squared_error(&error, &covariance)?;
     let errors = (0..m + n).map(|k| {
         let (index, function) = match k.checked_sub(m) {
             None => (estimated[k], None),
@@ -232,8 +226,29 @@ fn compare(
             ],
         }
     });
+    Some(CampaignTrial {
+        nees: (nees, m + n),
+        errors: errors.collect(),
+        orders: orders(outcome, simulated),
+    })
+}
+
+/// Squared error by its covariance; none if that is not positive definite.
+fn squared_error(error: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
+    let sigma = covariance.diagonal().map(f64::sqrt);
+    let correlation = DMatrix::from_fn(sigma.len(), sigma.len(), |i, j| {
+        covariance[(i, j)] / (sigma[i] * sigma[j])
+    });
+    let whitened = error.component_div(&sigma);
+    Some(whitened.dot(&correlation.cholesky()?.solve(&whitened)))
+}
+
+/// The order of each group that was chosen, and the true one.
+fn orders(outcome: &Outcome, simulated: &[Simulated]) -> [OrderChosen; 6] {
+    let form = outcome.estimate.form();
+    let thermal = outcome.thermal.as_ref();
     let groups: Vec<Group> = Group::all().collect();
-    let orders = std::array::from_fn(|g| {
+    std::array::from_fn(|g| {
         let first = groups[g].parameters(form).first().copied().unwrap_or(0);
         OrderChosen {
             chosen: thermal.map_or((0, false), |t| t.order(first)),
@@ -242,11 +257,6 @@ fn compare(
                 .and_then(|one| one.thermal.as_ref())
                 .map_or((0, false), |t| true_order(t, groups[g])),
         }
-    });
-    Some(CampaignTrial {
-        nees: (nees, m + n),
-        errors: errors.collect(),
-        orders,
     })
 }
 

@@ -69,92 +69,14 @@ fn sensor(column: usize) -> Sensor {
 
 impl Rows<'_> {
     /// Looks for faults and bridges them.
-    pub fn repair(self) -> Repaired {
+    pub fn repair(mut self) -> Repaired {
         let impossible = Impossible::find(&self);
         let found = self.find_beside(&impossible);
-        let mut faults = self.missing();
-        faults.extend(impossible.zero.iter().map(|rows| Fault {
-            kind: FaultKind::Zero,
-            axis: None,
-            samples: self.samples(rows),
-            line: self.lines[rows.start],
-            bridged: true,
-        }));
-        faults.extend(self.duplicates.iter().map(|&(row, line)| Fault {
-            kind: FaultKind::Duplicate,
-            axis: None,
-            samples: self.samples(&(row - 1..row)),
-            line,
-            bridged: true,
-        }));
-        faults.extend(found.iter().map(|Found { kind, column, rows }| Fault {
-            kind: *kind,
-            axis: Some((sensor(*column), self.body_axes[*column])),
-            samples: self.samples(rows),
-            line: self.lines[rows.start],
-            bridged: true,
-        }));
-        faults.sort_by_key(|fault| {
-            let axis = fault.axis.map(|(sensor, axis)| (sensor as usize, axis));
-            (fault.kind as usize, axis, fault.samples.start)
-        });
-
-        let Self {
-            columns,
-            numbers,
-            period,
-            body_axes,
-            units,
-            facts,
-            pulses,
-            ..
-        } = self;
-        let mut columns = columns.map(|rows| placed(rows, &numbers));
+        let mut faults = self.faults(&impossible, &found);
+        let mut columns = std::mem::take(&mut self.columns).map(|rows| placed(rows, &self.numbers));
         let mut bridges = Vec::new();
-        let longest = (LONGEST / period) as usize;
-        // Rounding stays within a step: of the sum where what is left over is carried, else of each sample.
-        let rounding = |facts: &ColumnFacts, samples: usize| {
-            let step = facts.step.unwrap_or(0.0);
-            step * step * if pulses { 1.0 } else { samples as f64 }
-        };
-        for Holes { of, mut sound } in holes_of_columns(&faults, &body_axes, columns[0].len()) {
-            let mut holes = ranges(sound.len(), |k| !sound.is(k));
-            holes.sort_by_key(Range::len);
-            let mut filled = 0;
-            for (number, samples) in holes.iter().enumerate() {
-                // Beside a long hole short ones, once filled, are as good as sound.
-                while filled < number && SHORT * holes[filled].len() <= samples.len() {
-                    sound.set(holes[filled].clone(), true);
-                    filled += 1;
-                }
-                let hole = Hole::new(&sound, samples.clone(), longest);
-                let mut bridge = Bridge::new(samples.clone());
-                for &k in &of {
-                    let (sensor, axis) = (sensor(k), body_axes[k]);
-                    let rounding = rounding(&facts[k], samples.len());
-                    let variance = hole.fill(&mut columns[k], rounding);
-                    let variance = variance.map(|variance| variance * units[k].powi(2));
-                    let linear =
-                        |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
-                    match variance.filter(linear) {
-                        Some(variance) => bridge = bridge.with(sensor, axis, variance),
-                        None => {
-                            let within = |fault: &&mut Fault| {
-                                fault.concerns(sensor, axis)
-                                    && fault.samples.start < samples.end
-                                    && samples.start < fault.samples.end
-                            };
-                            faults
-                                .iter_mut()
-                                .filter(within)
-                                .for_each(|fault| fault.bridged = false);
-                        }
-                    }
-                }
-                if bridge.each().next().is_some() {
-                    bridges.push(bridge);
-                }
-            }
+        for holes in holes_of_columns(&faults, &self.body_axes, columns[0].len()) {
+            bridges.extend(self.fill(holes, &mut columns, &mut faults));
         }
         Bridge::sort(&mut bridges);
         Repaired {
@@ -162,6 +84,89 @@ impl Rows<'_> {
             faults,
             bridges,
         }
+    }
+
+    /// Every fault, in order of kind, axis and time.
+    fn faults(&self, impossible: &Impossible, found: &[Found]) -> Vec<Fault> {
+        let fault = |kind, axis, rows: &Range<usize>| Fault {
+            kind,
+            axis,
+            samples: self.samples(rows),
+            line: self.lines[rows.start],
+            bridged: true,
+        };
+        let zero = impossible.zero.iter();
+        let zero = zero.map(|rows| fault(FaultKind::Zero, None, rows));
+        let duplicates = self.duplicates.iter().map(|&(row, line)| Fault {
+            line,
+            ..fault(FaultKind::Duplicate, None, &(row - 1..row))
+        });
+        let of_columns = found.iter().map(|Found { kind, column, rows }| {
+            let axis = (sensor(*column), self.body_axes[*column]);
+            fault(*kind, Some(axis), rows)
+        });
+        let mut faults = self.missing();
+        faults.extend(zero.chain(duplicates).chain(of_columns));
+        faults.sort_by_key(|fault| {
+            let axis = fault.axis.map(|(sensor, axis)| (sensor as usize, axis));
+            (fault.kind as usize, axis, fault.samples.start)
+        });
+        faults
+    }
+
+    /// Bridges the holes that columns share, short ones first; what cannot be bridged stays a fault that is not.
+    fn fill(
+        &self,
+        Holes { of, mut sound }: Holes,
+        columns: &mut [Vec<f64>; 6],
+        faults: &mut [Fault],
+    ) -> Vec<Bridge> {
+        let longest = (LONGEST / self.period) as usize;
+        let mut holes = ranges(sound.len(), |k| !sound.is(k));
+        holes.sort_by_key(Range::len);
+        let mut filled = 0;
+        let mut bridges = Vec::new();
+        for (number, samples) in holes.iter().enumerate() {
+            // Beside a long hole short ones, once filled, are as good as sound.
+            while filled < number && SHORT * holes[filled].len() <= samples.len() {
+                sound.set(holes[filled].clone(), true);
+                filled += 1;
+            }
+            let hole = Hole::new(&sound, samples.clone(), longest);
+            let mut bridge = Bridge::new(samples.clone());
+            for &k in &of {
+                let (sensor, axis) = (sensor(k), self.body_axes[k]);
+                let variance = hole.fill(&mut columns[k], self.rounding(k, samples.len()));
+                let variance = variance.map(|variance| variance * self.units[k].powi(2));
+                let linear =
+                    |variance: &f64| sensor == Sensor::Accel || variance.sqrt() <= WORST_ANGLE;
+                match variance.filter(linear) {
+                    Some(variance) => bridge = bridge.with(sensor, axis, variance),
+                    None => {
+                        let within = |fault: &&mut Fault| {
+                            fault.concerns(sensor, axis)
+                                && fault.samples.start < samples.end
+                                && samples.start < fault.samples.end
+                        };
+                        faults
+                            .iter_mut()
+                            .filter(within)
+                            .for_each(|fault| fault.bridged = false);
+                    }
+                }
+            }
+            if bridge.each().next().is_some() {
+                bridges.push(bridge);
+            }
+        }
+        bridges
+    }
+
+    /// Variance of the rounding of so many samples' sum. It stays within a step: of the sum where what is left over
+    /// is carried, else of each sample.
+    fn rounding(&self, column: usize, samples: usize) -> f64 {
+        let step = self.facts[column].step.unwrap_or(0.0);
+        step * step * if self.pulses { 1.0 } else { samples as f64 }
     }
 
     /// The faults of columns: what is impossible, and what the other values show.

@@ -54,28 +54,37 @@ pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         let minimum = axis.minimum().filter(|_| !axis.is_constant);
         or_dash(minimum.map(|(tau, _)| tau), three_digits)
     }));
-    let name = match sensor {
-        Sensor::Gyro => "Gyros",
-        Sensor::Accel => "Accelerometers",
-    };
     let axes = AXES.map(String::from);
     let headings = cells!["", "unit"]
         .into_iter()
         .chain(axes)
         .chain(["triad".to_owned()]);
-    let table = Table::new(name, headings).section(rows).note(
+    let table = Table::new(title(sensor), headings).section(rows).note(
         "± 1σ. <: its slope is not detected; 95 % upper limit. triad: the mean of the three variances.",
     );
-    let pulse = *analysis.pulse.get(sensor);
-    if pulse <= 0.0 {
-        return table;
+    match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
+        Some(note) => table.note(note),
+        None => table,
     }
+}
+
+fn title(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "Gyros",
+        Sensor::Accel => "Accelerometers",
+    }
+}
+
+/// What the quantisation by pulses makes.
+fn of_a_pulse(pulse: f64, sensor: Sensor) -> Option<String> {
     let of = quantity(Process::Quantisation, sensor);
-    table.note(format!(
-        "One pulse makes Q = {} {}, where noise is more than a pulse.",
-        three_digits(pulse / 12f64.sqrt() / of.value),
-        of.unit
-    ))
+    (pulse > 0.0).then(|| {
+        format!(
+            "One pulse makes Q = {} {}, where noise is more than a pulse.",
+            three_digits(pulse / 12f64.sqrt() / of.value),
+            of.unit
+        )
+    })
 }
 
 fn correlation_time(found: Found) -> String {

@@ -180,18 +180,6 @@ impl Report<'_> {
                 true => Series::marks(Mark::Dot, accepted),
                 false => Series::line(self.interrupted_by_turns(&accepted)),
             };
-            let bound = |y: f64| {
-                let series = Series::level(y).label(format!(
-                    "{}{}σ",
-                    if y < 0.0 { '−' } else { '+' },
-                    y.abs()
-                ));
-                if y.abs() > 1.0 {
-                    series.dashed()
-                } else {
-                    series.color(Color::Quiet).width(1.0)
-                }
-            };
             let title = format!("{name}, {}, σ", ["east", "north", "up"][direction]);
             Panel::new(
                 title,
@@ -226,6 +214,17 @@ impl Report<'_> {
         let pieces = points.chunk_by(|a, b| dwell(a.0) == dwell(b.0));
         let pieces = pieces.flat_map(|piece| piece.iter().copied().chain([(f64::NAN, f64::NAN)]));
         pieces.collect()
+    }
+}
+
+/// A level of so many σ, dashed beyond one.
+fn bound(y: f64) -> Series {
+    let sign = if y < 0.0 { '−' } else { '+' };
+    let series = Series::level(y).label(format!("{sign}{}σ", y.abs()));
+    if y.abs() > 1.0 {
+        series.dashed()
+    } else {
+        series.color(Color::Quiet).width(1.0)
     }
 }
 

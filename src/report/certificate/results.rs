@@ -46,21 +46,6 @@ pub(super) fn results(certificate: &Certificate) -> Table {
         let of_term = all.filter(move |of| of.quantity == Quantity::Term(term));
         of_term.map(row).collect::<Vec<_>>()
     });
-    let provenance = &certificate.provenance;
-    let unit = certificate.calibration.unit.as_ref();
-    let nominal = |sensor: Sensor, input: &str| {
-        let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
-        let of = provenance
-            .nominal
-            .get(sensor)
-            .map(|scale| plain(to_twelve_digits(scale)));
-        // What is no rate is told per second.
-        let per = match unit.contains('/') || unit == "g" {
-            true => "",
-            false => " per second",
-        };
-        format!("{} {unit}{per} for 1 {input}", of.join(", "))
-    };
     let budget = match has_budget {
         true => ", their uncertainty budget in calibration.json",
         false => "",
@@ -71,8 +56,8 @@ pub(super) fn results(certificate: &Certificate) -> Table {
         .note(format!(
             "K: scale factors, departure from nominal: gyros {}; accelerometers {}. E: entries of the installation \
              matrix in row and column. D: biases.",
-            nominal(Sensor::Gyro, "rad/s"),
-            nominal(Sensor::Accel, "m/s²"),
+            nominal(certificate, Sensor::Gyro, "rad/s"),
+            nominal(certificate, Sensor::Accel, "m/s²"),
         ))
         .note(format!(
             "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
@@ -83,6 +68,20 @@ pub(super) fn results(certificate: &Certificate) -> Table {
         true => table,
         false => table.note(of_terms(certificate)),
     }
+}
+
+/// The nominal scale factors of a triad, with their unit.
+fn nominal(certificate: &Certificate, sensor: Sensor, input: &str) -> String {
+    let unit = certificate.calibration.unit.as_ref();
+    let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
+    let nominal = certificate.provenance.nominal.get(sensor);
+    let of = nominal.map(|scale| plain(to_twelve_digits(scale)));
+    // What is no rate is told per second.
+    let per = match unit.contains('/') || unit == "g" {
+        true => "",
+        false => " per second",
+    };
+    format!("{} {unit}{per} for 1 {input}", of.join(", "))
 }
 
 /// What the error terms that have results add to the model's input.

@@ -31,25 +31,7 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
             (side.calibration.name.as_str(), points.collect())
         })
         .collect();
-    let reaches = sides.iter().map(|(_, points)| {
-        let reaches = points
-            .iter()
-            .map(|(difference, sigma)| difference.abs() + sigma);
-        reaches.fold(0.0, f64::max)
-    });
-    let reaches: Vec<f64> = reaches.collect();
-    let most = reaches.iter().copied().fold(0.0, f64::max);
-    let least = reaches
-        .into_iter()
-        .filter(|r| *r > 0.0)
-        .fold(most, f64::min);
-    let (y, kind) = match most > APART * least {
-        true => (
-            Axis::symlog(0.3 * least).between(-1.5 * most, 1.5 * most),
-            ", logarithmic",
-        ),
-        false => (Axis::linear("").between(-1.15 * most, 1.15 * most), ""),
-    };
+    let (y, kind) = axis(sides.iter().map(|(_, points)| reach(points)).collect());
     let spacing = 0.6 / sides.len().max(1) as f64;
     let series = sides.iter().enumerate().flat_map(|(n, (name, points))| {
         let x =
@@ -78,4 +60,28 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
     )
     .with(Series::zero())
     .with_all(series)
+}
+
+/// How far points reach from zero with their σ.
+fn reach(points: &[(f64, f64)]) -> f64 {
+    let reaches = points
+        .iter()
+        .map(|(difference, sigma)| difference.abs() + sigma);
+    reaches.fold(0.0, f64::max)
+}
+
+/// The axis of calibrations that reach as far as this, and what its title says of it.
+fn axis(reaches: Vec<f64>) -> (Axis, &'static str) {
+    let most = reaches.iter().copied().fold(0.0, f64::max);
+    let least = reaches
+        .into_iter()
+        .filter(|r| *r > 0.0)
+        .fold(most, f64::min);
+    match most > APART * least {
+        true => (
+            Axis::symlog(0.3 * least).between(-1.5 * most, 1.5 * most),
+            ", logarithmic",
+        ),
+        false => (Axis::linear("").between(-1.15 * most, 1.15 * most), ""),
+    }
 }

@@ -192,15 +192,7 @@ fn budget(experiment: &Experiment) -> Plot {
                     .clone()
                     .into_iter()
                     .filter(|top| top.1 >= 0.7 * low.max(1e-3 * high))
-                    .map(|top| {
-                        // Three digits of a small number would not fit above its bar.
-                        let number = if top.1 < 1.0 {
-                            sigma(top.1)
-                        } else {
-                            three_digits(top.1)
-                        };
-                        Series::words(top, (0.0, -3.0), Anchor::Above, number)
-                    });
+                    .map(height_in_words);
                 let bars = Shape::Bars {
                     tops,
                     half: 0.12,
@@ -220,6 +212,17 @@ fn budget(experiment: &Experiment) -> Plot {
          for both. Bars from left to right: {}; one without a number is less than the axis shows.",
         names.join(", ")
     ))
+}
+
+/// The height of a bar above it.
+fn height_in_words(top: Point) -> Series {
+    // Three digits of a small number would not fit above its bar.
+    let number = if top.1 < 1.0 {
+        sigma(top.1)
+    } else {
+        three_digits(top.1)
+    };
+    Series::words(top, (0.0, -3.0), Anchor::Above, number)
 }
 
 /// Of each group alone, of all as claimed and as they were, nmile.

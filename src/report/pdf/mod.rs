@@ -13,6 +13,7 @@ use krilla::geom::{PathBuilder, Point};
 use krilla::metadata::{DateTime, Metadata};
 use krilla::page::PageSettings;
 use krilla::paint::{Fill, Stroke};
+use krilla::surface::Surface;
 
 use super::document::Document;
 use font::Fonts;
@@ -43,9 +44,6 @@ pub fn write(
     frame: &Frame,
     files: Vec<Attached>,
 ) -> Result<Vec<u8>, PdfError> {
-    let standard = |reason: &str| PdfError::Standard {
-        reason: reason.to_owned(),
-    };
     let fonts = Fonts::new().ok_or_else(|| standard("its fonts cannot be read"))?;
     let pages = Layout::new(&fonts, frame).pages(document)?;
     let configuration = ConfigurationBuilder::new()
@@ -56,76 +54,21 @@ pub fn write(
         configuration,
         ..SerializeSettings::default()
     });
-    let (year, month, day) = frame.day;
-    let day = DateTime::new(year)
-        .month(month)
-        .day(day)
-        .hour(0)
-        .minute(0)
-        .second(0);
-    let day = day.utc_offset_hour(0).utc_offset_minute(0);
     for page in &pages {
         let size = PageSettings::from_wh(WIDTH, HEIGHT).ok_or_else(|| standard("no page"))?;
         let mut on = pdf.start_page_with(size);
         let mut surface = on.surface();
         for drawn in page {
-            match drawn {
-                Drawn::Text {
-                    at: (x, y),
-                    text,
-                    size,
-                    bold,
-                    grey,
-                } => {
-                    let typeface = fonts.get(*bold);
-                    let color = rgb::Color::new(*grey, *grey, *grey);
-                    surface.set_stroke(None);
-                    surface.set_fill(Some(Fill {
-                        paint: color.into(),
-                        ..Fill::default()
-                    }));
-                    let (at, glyphs) = (Point::from_xy(*x, *y), typeface.glyphs(text));
-                    surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, *size, false);
-                }
-                Drawn::Rule {
-                    from: (x, y),
-                    to,
-                    width,
-                } => {
-                    let mut path = PathBuilder::new();
-                    path.move_to(*x, *y);
-                    path.line_to(*to, *y);
-                    surface.set_fill(None);
-                    surface.set_stroke(Some(Stroke {
-                        paint: rgb::Color::new(90, 90, 90).into(),
-                        width: *width,
-                        ..Stroke::default()
-                    }));
-                    if let Some(path) = path.finish() {
-                        surface.draw_path(&path);
-                    }
-                }
-            }
+            draw(&mut surface, &fonts, drawn);
         }
         surface.finish();
         on.finish();
     }
+    let day = midnight(frame.day);
     for file in files {
-        let embedded = EmbeddedFile {
-            path: file.name.clone(),
-            mime_type: MimeType::new(file.mime),
-            description: Some(file.description),
-            association_kind: match file.alternative {
-                true => AssociationKind::Alternative,
-                false => AssociationKind::Data,
-            },
-            data: file.bytes.into(),
-            modification_date: Some(day),
-            compress: Some(true),
-            location: None,
-        };
-        pdf.embed_file(embedded)
-            .ok_or_else(|| standard(&format!("two attached files are named {}", file.name)))?;
+        let name = file.name.clone();
+        pdf.embed_file(embedded(file, day))
+            .ok_or_else(|| standard(&format!("two attached files are named {name}")))?;
     }
     pdf.set_metadata(
         Metadata::new()
@@ -137,4 +80,77 @@ pub fn write(
     );
     pdf.finish()
         .map_err(|error| standard(&format!("{error:?}")))
+}
+
+fn standard(reason: &str) -> PdfError {
+    PdfError::Standard {
+        reason: reason.to_owned(),
+    }
+}
+
+/// When a day begins in UTC.
+fn midnight((year, month, day): (u16, u8, u8)) -> DateTime {
+    let day = DateTime::new(year)
+        .month(month)
+        .day(day)
+        .hour(0)
+        .minute(0)
+        .second(0);
+    day.utc_offset_hour(0).utc_offset_minute(0)
+}
+
+fn draw(surface: &mut Surface, fonts: &Fonts, drawn: &Drawn) {
+    match drawn {
+        Drawn::Text {
+            at: (x, y),
+            text,
+            size,
+            bold,
+            grey,
+        } => {
+            let typeface = fonts.get(*bold);
+            let color = rgb::Color::new(*grey, *grey, *grey);
+            surface.set_stroke(None);
+            surface.set_fill(Some(Fill {
+                paint: color.into(),
+                ..Fill::default()
+            }));
+            let (at, glyphs) = (Point::from_xy(*x, *y), typeface.glyphs(text));
+            surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, *size, false);
+        }
+        Drawn::Rule {
+            from: (x, y),
+            to,
+            width,
+        } => {
+            let mut path = PathBuilder::new();
+            path.move_to(*x, *y);
+            path.line_to(*to, *y);
+            surface.set_fill(None);
+            surface.set_stroke(Some(Stroke {
+                paint: rgb::Color::new(90, 90, 90).into(),
+                width: *width,
+                ..Stroke::default()
+            }));
+            if let Some(path) = path.finish() {
+                surface.draw_path(&path);
+            }
+        }
+    }
+}
+
+fn embedded(file: Attached, day: DateTime) -> EmbeddedFile {
+    EmbeddedFile {
+        path: file.name,
+        mime_type: MimeType::new(file.mime),
+        description: Some(file.description),
+        association_kind: match file.alternative {
+            true => AssociationKind::Alternative,
+            false => AssociationKind::Data,
+        },
+        data: file.bytes.into(),
+        modification_date: Some(day),
+        compress: Some(true),
+        location: None,
+    }
 }

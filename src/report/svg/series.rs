@@ -16,16 +16,7 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
     let ((left, right), (top, bottom)) = (frame.across, frame.down);
     match &series.shape {
         Shape::Line(points) => line(on, frame, points, pen),
-        Shape::Band(lower, upper) => {
-            let limit = (POINTS * (right - left)) as usize;
-            let lower = thinned(&visible(frame, lower), limit);
-            let mut outline = thinned(&visible(frame, upper), limit);
-            outline.extend(lower.into_iter().rev());
-            match outline.len() {
-                0..=2 => Ok(()),
-                _ => on.area(&placed(frame, &outline), BAND),
-            }
-        }
+        Shape::Band(lower, upper) => band(on, frame, lower, upper),
         Shape::Marks(mark, points) => {
             let points = placed(frame, &visible(frame, points));
             points
@@ -35,13 +26,7 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
         Shape::Intervals(of) => of
             .iter()
             .filter(|(_, low, high)| low.is_finite() && high.is_finite())
-            .try_for_each(|&(x, low, high)| {
-                let ends = [frame.at((x, low)), frame.at((x, high))];
-                on.stroke(&ends, color, pen.width)?;
-                ends.into_iter().try_for_each(|(x, y)| {
-                    on.stroke(&[(x - CAP, y), (x + CAP, y)], color, pen.width)
-                })
-            }),
+            .try_for_each(|&of| interval(on, frame, of, pen)),
         Shape::Bars {
             tops,
             half,
@@ -52,13 +37,7 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
             .filter(|top| top.1.is_finite())
             .try_for_each(|&(x, top)| {
                 let foot = base.unwrap_or(frame.y.low);
-                let corners = [
-                    (x - half, foot),
-                    (x - half, top),
-                    (x + half, top),
-                    (x + half, foot),
-                ];
-                let corners = corners.map(|corner| frame.at(corner));
+                let corners = corners(frame, x, *half, (foot, top));
                 if *filled {
                     on.area(&corners, BAND)?;
                 }
@@ -67,15 +46,7 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
         Shape::Blocks(half, of) => of
             .iter()
             .filter(|(_, low, high)| low.is_finite() && high > low)
-            .try_for_each(|&(x, low, high)| {
-                let corners = [
-                    (x - half, low),
-                    (x - half, high),
-                    (x + half, high),
-                    (x + half, low),
-                ];
-                on.area(&corners.map(|corner| frame.at(corner)), color)
-            }),
+            .try_for_each(|&(x, low, high)| on.area(&corners(frame, x, *half, (low, high)), color)),
         Shape::Level(y) => {
             let y = frame.at_y(*y);
             on.line(&[(left, y), (right, y)], pen)
@@ -99,6 +70,42 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
             on.text(text, (x + shift.0, y + shift.1), anchor, color, SMALL)
         }
     }
+}
+
+fn band(on: &Canvas, frame: &Frame, lower: &[Point], upper: &[Point]) -> Result<(), DrawError> {
+    let limit = (POINTS * (frame.across.1 - frame.across.0)) as usize;
+    let lower = thinned(&visible(frame, lower), limit);
+    let mut outline = thinned(&visible(frame, upper), limit);
+    outline.extend(lower.into_iter().rev());
+    match outline.len() {
+        0..=2 => Ok(()),
+        _ => on.area(&placed(frame, &outline), BAND),
+    }
+}
+
+/// An upright line from low to high with a cap at each end.
+fn interval(
+    on: &Canvas,
+    frame: &Frame,
+    (x, low, high): (f64, f64, f64),
+    pen: Pen,
+) -> Result<(), DrawError> {
+    let color = rgb(pen.color);
+    let ends = [frame.at((x, low)), frame.at((x, high))];
+    on.stroke(&ends, color, pen.width)?;
+    ends.into_iter()
+        .try_for_each(|(x, y)| on.stroke(&[(x - CAP, y), (x + CAP, y)], color, pen.width))
+}
+
+/// Corners of a bar about `x`: up on its left, across, and down on its right.
+fn corners(frame: &Frame, x: f64, half: f64, (foot, top): (f64, f64)) -> [Point; 4] {
+    let corners = [
+        (x - half, foot),
+        (x - half, top),
+        (x + half, top),
+        (x + half, foot),
+    ];
+    corners.map(|corner| frame.at(corner))
 }
 
 /// Points joined between those that are no numbers; a point alone is a dot.
