@@ -92,65 +92,74 @@ impl<'a> InstrumentFields<'a> {
         check_time(top, &columns, clock)?;
         let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
 
-        let priors = fields.need_table(
-            "prior",
-            &["gyro", "accel"],
-            "what is known of the instrument before calibration",
-        )?;
-        let gyro = triad(&fields, &priors, Sensor::Gyro, output, axes)?;
-        let accel = triad(&fields, &priors, Sensor::Accel, output, axes)?;
-        let (noise, motion_noise) = noise(&fields, notes)?;
-        let nominal = PerSensor {
-            gyro: gyro.nominal,
-            accel: accel.nominal,
-        };
+        let mut known = knowledge(&fields, output, axes, notes)?;
         let three = |name| -> Result<[&'a str; 3], FileError> {
             columns
                 .need(name, "the names of three columns")?
                 .three_texts()
         };
-        Ok(Self {
-            log: ImuLog {
-                source,
-                clock,
-                accel_from,
-                instance,
-                triads: PerSensor {
-                    gyro: three("gyro")?,
-                    accel: three("accel")?,
-                },
-                temperature,
-                output,
-                axes,
-                stamp: fields
-                    .need("time_stamp", "which moment of a sample its time names")?
-                    .choice(&TimeStamp::WORDS)?,
-                continuous: match fields.get("continuous") {
-                    Some(field) => field.flag()?,
-                    None => true,
-                },
-                nominal,
-                full_scale: PerSensor {
-                    gyro: full_scale("gyro_full_scale")?,
-                    accel: full_scale("accel_full_scale")?,
-                },
+        let log = ImuLog {
+            source,
+            clock,
+            accel_from,
+            instance,
+            triads: PerSensor {
+                gyro: three("gyro")?,
+                accel: three("accel")?,
             },
-            known: Instrument {
-                nominal,
-                unit: PerSensor {
-                    gyro: gyro.unit,
-                    accel: accel.unit,
-                },
-                prior: PerSensor {
-                    gyro: gyro.prior,
-                    accel: accel.prior,
-                },
-                noise,
-                motion_noise,
-                term_sigma: term_sigma(&fields)?,
+            temperature,
+            output,
+            axes,
+            stamp: fields
+                .need("time_stamp", "which moment of a sample its time names")?
+                .choice(&TimeStamp::WORDS)?,
+            continuous: match fields.get("continuous") {
+                Some(field) => field.flag()?,
+                None => true,
             },
-        })
+            nominal: known.nominal,
+            full_scale: PerSensor {
+                gyro: full_scale("gyro_full_scale")?,
+                accel: full_scale("accel_full_scale")?,
+            },
+        };
+        known.term_sigma = term_sigma(&fields)?;
+        Ok(Self { log, known })
     }
+}
+
+/// Units, nominal scales, priors and noise of both triads, with every error term off.
+fn knowledge(
+    imu: &Fields,
+    output: Output,
+    axes: BodyAxes,
+    notes: &mut Vec<String>,
+) -> Result<Instrument, FileError> {
+    let priors = imu.need_table(
+        "prior",
+        &["gyro", "accel"],
+        "what is known of the instrument before calibration",
+    )?;
+    let gyro = triad(imu, &priors, Sensor::Gyro, output, axes)?;
+    let accel = triad(imu, &priors, Sensor::Accel, output, axes)?;
+    let (noise, motion_noise) = noise(imu, notes)?;
+    Ok(Instrument {
+        nominal: PerSensor {
+            gyro: gyro.nominal,
+            accel: accel.nominal,
+        },
+        unit: PerSensor {
+            gyro: gyro.unit,
+            accel: accel.unit,
+        },
+        prior: PerSensor {
+            gyro: gyro.prior,
+            accel: accel.prior,
+        },
+        noise,
+        motion_noise,
+        term_sigma: TermVector::zeros(),
+    })
 }
 
 /// The column that tells instruments apart, and what it says of the one that is meant.
