@@ -64,13 +64,7 @@ impl<'a> InstrumentFields<'a> {
         notes: &mut Vec<String>,
     ) -> Result<Self, FileError> {
         let fields = top.need_table("imu", &KEYS, "the instrument and its record")?;
-        let output = fields
-            .need("output", "what a row holds: pulse, increment or rate")?
-            .choice(&OUTPUTS)?;
-        let axes = match fields.get("body_axes") {
-            Some(field) => field.choice(&BodyAxes::WORDS)?,
-            None => BodyAxes::Rfu,
-        };
+        let (output, axes) = output_and_axes(&fields)?;
         let columns = fields.need_table(
             "columns",
             &["time", "gyro", "accel", "temperature"],
@@ -82,12 +76,7 @@ impl<'a> InstrumentFields<'a> {
         let mut clock = Clock::of_fields(&fields, &columns)?;
         let source = Source::of_fields(&fields, directory, None)?;
         let accel_from = accel_from(&fields, directory, &source, clock)?;
-        if let (Some(_), Some((column, _))) = (&accel_from, instance) {
-            return Err(fields.missing(
-                "stream",
-                &format!("one instrument without `{column}`, as accel_from needs"),
-            ));
-        }
+        check_instance(&fields, accel_from.is_some(), instance)?;
         clock.breaks = allowed_breaks(top, accel_from.is_some());
         check_time(top, &columns, clock)?;
         let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
@@ -173,6 +162,33 @@ fn instance<'a>(imu: &Fields<'a>) -> Result<Option<(&'a str, f64)>, FileError> {
         of.need("number", "what it says of the one that is meant")?
             .number()?,
     )))
+}
+
+/// Rows of several instruments cannot be one of two streams.
+fn check_instance(
+    imu: &Fields,
+    has_accel_from: bool,
+    instance: Option<(&str, f64)>,
+) -> Result<(), FileError> {
+    match instance {
+        Some((column, _)) if has_accel_from => Err(imu.missing(
+            "stream",
+            &format!("one instrument without `{column}`, as accel_from needs"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// What a row holds, and along which axes.
+fn output_and_axes(imu: &Fields) -> Result<(Output, BodyAxes), FileError> {
+    let output = imu
+        .need("output", "what a row holds: pulse, increment or rate")?
+        .choice(&OUTPUTS)?;
+    let axes = match imu.get("body_axes") {
+        Some(field) => field.choice(&BodyAxes::WORDS)?,
+        None => BodyAxes::Rfu,
+    };
+    Ok((output, axes))
 }
 
 /// What times may do, by the other records that are put beside the instrument's.
