@@ -60,61 +60,8 @@ enum Cut {
 impl CsvFile {
     /// Opens a file and reads its header.
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        let name = path.to_string_lossy().to_lowercase();
-        let plain = name.strip_suffix(".gz");
-        if !ENDINGS
-            .iter()
-            .any(|end| plain.unwrap_or(&name).ends_with(end))
-        {
-            return Err(FileError::new(
-                path,
-                Place::File,
-                "a file of another kind",
-                format_args!(
-                    "a name that ends in {}, or in one of them and .gz",
-                    ENDINGS.join(", ")
-                ),
-                "Rename or convert the file.",
-            ));
-        }
-        let refused = |error| {
-            FileError::io(
-                path,
-                "open the file",
-                &error,
-                "Names in run.toml are relative to run.toml; correct the name or add the file.",
-            )
-        };
-        // To open a pipe would wait for whoever writes into it.
-        let kind = fs::metadata(path).map_err(refused)?;
-        if !kind.is_file() {
-            return Err(FileError::new(
-                path,
-                Place::File,
-                match kind.is_dir() {
-                    true => "a directory",
-                    false => "a device or pipe",
-                },
-                "a regular file, for a log may be read more than once",
-                "Copy what it gives into a file and name that.",
-            ));
-        }
-        let opened = || {
-            let file = File::open(path).map_err(refused)?;
-            Ok(BufReader::with_capacity(1 << 16, file))
-        };
-        let source: Box<dyn BufRead> = if plain.is_some() {
-            match Ahead::of(MultiGzDecoder::new(opened()?)) {
-                Ok(ahead) => Box::new(ahead),
-                // The system lets no thread be started.
-                Err(_) => {
-                    let decoder = MultiGzDecoder::new(opened()?);
-                    Box::new(BufReader::with_capacity(1 << 16, decoder))
-                }
-            }
-        } else {
-            Box::new(opened()?)
-        };
+        let is_gzipped = is_gzipped_by_name(path)?;
+        let source = source(path, is_gzipped)?;
         let (lines, heading) = Lines::open(source).map_err(|stop| stopped(path, &stop))?;
         let heading = heading.ok_or_else(|| {
             FileError::new(
@@ -315,6 +262,70 @@ impl CsvFile {
     ) -> FileError {
         FileError::new(&self.file, Place::Line(self.line), found, expected, advice)
     }
+}
+
+/// Whether the name says that the file is gzipped; an error if it is none of a file of rows.
+fn is_gzipped_by_name(path: &Path) -> Result<bool, FileError> {
+    let name = path.to_string_lossy().to_lowercase();
+    let plain = name.strip_suffix(".gz");
+    if !ENDINGS
+        .iter()
+        .any(|end| plain.unwrap_or(&name).ends_with(end))
+    {
+        return Err(FileError::new(
+            path,
+            Place::File,
+            "a file of another kind",
+            format_args!(
+                "a name that ends in {}, or in one of them and .gz",
+                ENDINGS.join(", ")
+            ),
+            "Rename or convert the file.",
+        ));
+    }
+    Ok(plain.is_some())
+}
+
+/// The bytes of a regular file, unzipped.
+fn source(path: &Path, is_gzipped: bool) -> Result<Box<dyn BufRead>, FileError> {
+    let refused = |error| {
+        FileError::io(
+            path,
+            "open the file",
+            &error,
+            "Names in run.toml are relative to run.toml; correct the name or add the file.",
+        )
+    };
+    // To open a pipe would wait for whoever writes into it.
+    let kind = fs::metadata(path).map_err(refused)?;
+    if !kind.is_file() {
+        return Err(FileError::new(
+            path,
+            Place::File,
+            match kind.is_dir() {
+                true => "a directory",
+                false => "a device or pipe",
+            },
+            "a regular file, for a log may be read more than once",
+            "Copy what it gives into a file and name that.",
+        ));
+    }
+    let opened = || {
+        let file = File::open(path).map_err(refused)?;
+        Ok(BufReader::with_capacity(1 << 16, file))
+    };
+    Ok(if is_gzipped {
+        match Ahead::of(MultiGzDecoder::new(opened()?)) {
+            Ok(ahead) => Box::new(ahead),
+            // The system lets no thread be started.
+            Err(_) => {
+                let decoder = MultiGzDecoder::new(opened()?);
+                Box::new(BufReader::with_capacity(1 << 16, decoder))
+            }
+        }
+    } else {
+        Box::new(opened()?)
+    })
 }
 
 fn stopped(file: &Path, stop: &Stop) -> FileError {

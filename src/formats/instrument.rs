@@ -26,6 +26,30 @@ const WIDEST_BIAS: f64 = 1e6;
 /// Beyond any error of an angle, ″.
 pub(super) const HALF_TURN: f64 = 648_000.0;
 
+/// Keys of `[imu]`.
+const KEYS: [&str; 20] = [
+    "file",
+    "stream",
+    "salvage",
+    "accel_from",
+    "output",
+    "gyro_unit",
+    "accel_unit",
+    "gyro_full_scale",
+    "accel_full_scale",
+    "time_unit",
+    "sample_period_s",
+    "time_stamp",
+    "continuous",
+    "instance",
+    "temperature_unit",
+    "body_axes",
+    "columns",
+    "noise",
+    "prior",
+    "terms",
+];
+
 /// What `[imu]` and the tables below it say.
 pub(super) struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
@@ -39,39 +63,8 @@ impl<'a> InstrumentFields<'a> {
         directory: &Path,
         notes: &mut Vec<String>,
     ) -> Result<Self, FileError> {
-        let fields = top.need_table(
-            "imu",
-            &[
-                "file",
-                "stream",
-                "salvage",
-                "accel_from",
-                "output",
-                "gyro_unit",
-                "accel_unit",
-                "gyro_full_scale",
-                "accel_full_scale",
-                "time_unit",
-                "sample_period_s",
-                "time_stamp",
-                "continuous",
-                "instance",
-                "temperature_unit",
-                "body_axes",
-                "columns",
-                "noise",
-                "prior",
-                "terms",
-            ],
-            "the instrument and its record",
-        )?;
-        let output = fields
-            .need("output", "what a row holds: pulse, increment or rate")?
-            .choice(&OUTPUTS)?;
-        let axes = match fields.get("body_axes") {
-            Some(field) => field.choice(&BodyAxes::WORDS)?,
-            None => BodyAxes::Rfu,
-        };
+        let fields = top.need_table("imu", &KEYS, "the instrument and its record")?;
+        let (output, axes) = output_and_axes(&fields)?;
         let columns = fields.need_table(
             "columns",
             &["time", "gyro", "accel", "temperature"],
@@ -79,101 +72,146 @@ impl<'a> InstrumentFields<'a> {
         )?;
         let temperature = TemperatureColumns::of_fields(&fields, &columns)?;
 
-        let instance = match fields.table("instance", &["column", "number"])? {
-            Some(of) => Some((
-                of.need("column", "the column that tells instruments apart")?
-                    .text()?,
-                of.need("number", "what it says of the one that is meant")?
-                    .number()?,
-            )),
-            None => None,
-        };
-        let clock = Clock::of_fields(&fields, &columns)?;
+        let instance = instance(&fields)?;
+        let mut clock = Clock::of_fields(&fields, &columns)?;
         let source = Source::of_fields(&fields, directory, None)?;
         let accel_from = accel_from(&fields, directory, &source, clock)?;
-        if let (Some(_), Some((column, _))) = (&accel_from, instance) {
-            return Err(fields.missing(
-                "stream",
-                &format!("one instrument without `{column}`, as accel_from needs"),
-            ));
-        }
-        let told = ["turntable", "segments"];
-        let breaks = match told.iter().any(|name| top.get(name).is_some()) {
-            _ if accel_from.is_some() => Breaks::None,
-            true => Breaks::Pauses,
-            false => Breaks::Settings,
-        };
-        let clock = Clock { breaks, ..clock };
-        let follow = clock.period.is_some() && top.get("turntable").is_none();
-        if clock.column.is_none() && !follow {
-            return Err(columns.missing(
-                "time",
-                "the name of a column; rows may follow one another without it if sample_period_s is \
-                 given and there is no [turntable]",
-            ));
-        }
+        check_instance(&fields, accel_from.is_some(), instance)?;
+        clock.breaks = allowed_breaks(top, accel_from.is_some());
+        check_time(top, &columns, clock)?;
         let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
 
-        let priors = fields.need_table(
-            "prior",
-            &["gyro", "accel"],
-            "what is known of the instrument before calibration",
-        )?;
-        let gyro = triad(&fields, &priors, Sensor::Gyro, output, axes)?;
-        let accel = triad(&fields, &priors, Sensor::Accel, output, axes)?;
-        let (noise, motion_noise) = noise(&fields, notes)?;
-        Ok(Self {
-            log: ImuLog {
-                source,
-                clock,
-                accel_from,
-                instance,
-                triads: PerSensor {
-                    gyro: columns
-                        .need("gyro", "the names of three columns")?
-                        .three_texts()?,
-                    accel: columns
-                        .need("accel", "the names of three columns")?
-                        .three_texts()?,
-                },
-                temperature,
-                output,
-                axes,
-                stamp: fields
-                    .need("time_stamp", "which moment of a sample its time names")?
-                    .choice(&TimeStamp::WORDS)?,
-                continuous: match fields.get("continuous") {
-                    Some(field) => field.flag()?,
-                    None => true,
-                },
-                nominal: PerSensor {
-                    gyro: gyro.nominal,
-                    accel: accel.nominal,
-                },
-                full_scale: PerSensor {
-                    gyro: full_scale("gyro_full_scale")?,
-                    accel: full_scale("accel_full_scale")?,
-                },
+        let mut known = knowledge(&fields, output, axes, notes)?;
+        let three = |name| -> Result<[&'a str; 3], FileError> {
+            columns
+                .need(name, "the names of three columns")?
+                .three_texts()
+        };
+        let log = ImuLog {
+            source,
+            clock,
+            accel_from,
+            instance,
+            triads: PerSensor {
+                gyro: three("gyro")?,
+                accel: three("accel")?,
             },
-            known: Instrument {
-                nominal: PerSensor {
-                    gyro: gyro.nominal,
-                    accel: accel.nominal,
-                },
-                unit: PerSensor {
-                    gyro: gyro.unit,
-                    accel: accel.unit,
-                },
-                prior: PerSensor {
-                    gyro: gyro.prior,
-                    accel: accel.prior,
-                },
-                noise,
-                motion_noise,
-                term_sigma: term_sigma(&fields)?,
+            temperature,
+            output,
+            axes,
+            stamp: fields
+                .need("time_stamp", "which moment of a sample its time names")?
+                .choice(&TimeStamp::WORDS)?,
+            continuous: match fields.get("continuous") {
+                Some(field) => field.flag()?,
+                None => true,
             },
-        })
+            nominal: known.nominal,
+            full_scale: PerSensor {
+                gyro: full_scale("gyro_full_scale")?,
+                accel: full_scale("accel_full_scale")?,
+            },
+        };
+        known.term_sigma = term_sigma(&fields)?;
+        Ok(Self { log, known })
     }
+}
+
+/// Units, nominal scales, priors and noise of both triads, with every error term off.
+fn knowledge(
+    imu: &Fields,
+    output: Output,
+    axes: BodyAxes,
+    notes: &mut Vec<String>,
+) -> Result<Instrument, FileError> {
+    let priors = imu.need_table(
+        "prior",
+        &["gyro", "accel"],
+        "what is known of the instrument before calibration",
+    )?;
+    let gyro = triad(imu, &priors, Sensor::Gyro, output, axes)?;
+    let accel = triad(imu, &priors, Sensor::Accel, output, axes)?;
+    let (noise, motion_noise) = noise(imu, notes)?;
+    Ok(Instrument {
+        nominal: PerSensor {
+            gyro: gyro.nominal,
+            accel: accel.nominal,
+        },
+        unit: PerSensor {
+            gyro: gyro.unit,
+            accel: accel.unit,
+        },
+        prior: PerSensor {
+            gyro: gyro.prior,
+            accel: accel.prior,
+        },
+        noise,
+        motion_noise,
+        term_sigma: TermVector::zeros(),
+    })
+}
+
+/// The column that tells instruments apart, and what it says of the one that is meant.
+fn instance<'a>(imu: &Fields<'a>) -> Result<Option<(&'a str, f64)>, FileError> {
+    let Some(of) = imu.table("instance", &["column", "number"])? else {
+        return Ok(None);
+    };
+    Ok(Some((
+        of.need("column", "the column that tells instruments apart")?
+            .text()?,
+        of.need("number", "what it says of the one that is meant")?
+            .number()?,
+    )))
+}
+
+/// Rows of several instruments cannot be one of two streams.
+fn check_instance(
+    imu: &Fields,
+    has_accel_from: bool,
+    instance: Option<(&str, f64)>,
+) -> Result<(), FileError> {
+    match instance {
+        Some((column, _)) if has_accel_from => Err(imu.missing(
+            "stream",
+            &format!("one instrument without `{column}`, as accel_from needs"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// What a row holds, and along which axes.
+fn output_and_axes(imu: &Fields) -> Result<(Output, BodyAxes), FileError> {
+    let output = imu
+        .need("output", "what a row holds: pulse, increment or rate")?
+        .choice(&OUTPUTS)?;
+    let axes = match imu.get("body_axes") {
+        Some(field) => field.choice(&BodyAxes::WORDS)?,
+        None => BodyAxes::Rfu,
+    };
+    Ok((output, axes))
+}
+
+/// What times may do, by the other records that are put beside the instrument's.
+fn allowed_breaks(top: &Fields, has_accel_from: bool) -> Breaks {
+    let told = ["turntable", "segments"];
+    match told.iter().any(|name| top.get(name).is_some()) {
+        _ if has_accel_from => Breaks::None,
+        true => Breaks::Pauses,
+        false => Breaks::Settings,
+    }
+}
+
+/// Rows may lack a time only where a period is given and no table must be put beside them.
+fn check_time(top: &Fields, columns: &Fields, clock: Clock) -> Result<(), FileError> {
+    let follow = clock.period.is_some() && top.get("turntable").is_none();
+    if clock.column.is_none() && !follow {
+        return Err(columns.missing(
+            "time",
+            "the name of a column; rows may follow one another without it if sample_period_s is \
+             given and there is no [turntable]",
+        ));
+    }
+    Ok(())
 }
 
 /// 1σ of the parameters of the terms that `[imu.terms]` switches on.

@@ -58,53 +58,10 @@ impl Joined {
         let gyro = Track::read(&parts.gyro)?;
         let accel = Track::read(&parts.accel)?;
         let courses = accel.courses();
-        let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
-        // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
-        let ahead = gyro.clock.first - accel.clock.first;
-        let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
-        let mut course = 0;
-        let mut weights = 0.0;
-        for (k, &number) in gyro.clock.numbers.iter().enumerate() {
-            let time = gyro.clock.first + gyro.clock.time(number as f64);
-            let begin = place(number as f64 - lag);
-            let end = place(number as f64 + 1.0 - lag);
-            while courses
-                .get(course)
-                .is_some_and(|course| course.end() < begin)
-            {
-                course += 1;
-            }
-            let course = courses.get(course);
-            // Where one of both lacks samples, the row does.
-            let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
-                continue;
-            };
-            let factor = match output {
-                // Clocks that are one give values as they stand, to the last bit.
-                Output::Rate if (end - begin - 1.0).abs() > 1e-9 => (end - begin).recip(),
-                _ => 1.0,
-            };
-            weights += weight;
-            let mut row = vec![time];
-            row.extend(gyro.columns.iter().map(|column| column[k]));
-            row.extend(sums.map(|sum| sum * factor));
-            row.extend(gyro.further.iter().map(|column| column[k]));
-            rows.push(row);
-        }
+        let (rows, weights) = rows_of_both(&gyro, &accel, &courses, output, lag);
         let file = parts.gyro.source.file.clone();
         if rows.is_empty() {
-            let of = |track: &Track| {
-                let last = track.clock.numbers.last().map_or(0.0, |&last| last as f64);
-                let (first, period) = (track.clock.first, track.clock.period);
-                format!("{first} s to {} s", first + last * period)
-            };
-            return Err(FileError::new(
-                &parts.accel.source.file,
-                Place::File,
-                format_args!("accelerometers from {}", of(&accel)),
-                format_args!("times that overlap the gyros', {}", of(&gyro)),
-                "Bring both streams to one clock, or correct time_unit.",
-            ));
+            return Err(apart(&parts.accel.source.file, &gyro, &accel));
         }
         let squares = courses.iter().map(Course::edge_error);
         let count = courses.len() as f64;
@@ -124,27 +81,11 @@ impl Joined {
         let mut units = vec!["s".to_owned()];
         units.extend(gyro.units.iter().chain(&accel.units).cloned());
         units.resize(header.len(), String::new());
-        let mut remarks = gyro.remarks;
-        remarks.extend(
-            accel
-                .remarks
-                .into_iter()
-                .filter(|remark| !remarks.contains(remark))
-                .collect::<Vec<_>>(),
-        );
-        let uneven = accel.clock.uneven();
-        remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
-        remarks.push(format!(
-            "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
-             gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
-            rounded(gyro.clock.period),
-            rounded(accel.clock.period)
-        ));
         Ok(Self {
             file,
             header,
             units,
-            remarks,
+            remarks: remarks_of_both(gyro, accel),
             rows,
             error: mean.map(|square| seconds * (weight * square).sqrt()),
             at: 0,
@@ -187,6 +128,87 @@ impl Joined {
             .copied()
             .unwrap_or(f64::NAN)
     }
+}
+
+/// The rows at which both streams have samples, and the sum of the weights of their edges' errors.
+fn rows_of_both(
+    gyro: &Track,
+    accel: &Track,
+    courses: &[Course],
+    output: Output,
+    lag: f64,
+) -> (Vec<Vec<f64>>, f64) {
+    let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
+    // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
+    let ahead = gyro.clock.first - accel.clock.first;
+    let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
+    let mut course = 0;
+    let mut weights = 0.0;
+    for (k, &number) in gyro.clock.numbers.iter().enumerate() {
+        let time = gyro.clock.first + gyro.clock.time(number as f64);
+        let begin = place(number as f64 - lag);
+        let end = place(number as f64 + 1.0 - lag);
+        while courses
+            .get(course)
+            .is_some_and(|course| course.end() < begin)
+        {
+            course += 1;
+        }
+        let course = courses.get(course);
+        // Where one of both lacks samples, the row does.
+        let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
+            continue;
+        };
+        let factor = match output {
+            // Clocks that are one give values as they stand, to the last bit.
+            Output::Rate if (end - begin - 1.0).abs() > 1e-9 => (end - begin).recip(),
+            _ => 1.0,
+        };
+        weights += weight;
+        let mut row = vec![time];
+        row.extend(gyro.columns.iter().map(|column| column[k]));
+        row.extend(sums.map(|sum| sum * factor));
+        row.extend(gyro.further.iter().map(|column| column[k]));
+        rows.push(row);
+    }
+    (rows, weights)
+}
+
+/// Streams whose times do not overlap.
+fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
+    let of = |track: &Track| {
+        let last = track.clock.numbers.last().map_or(0.0, |&last| last as f64);
+        let (first, period) = (track.clock.first, track.clock.period);
+        format!("{first} s to {} s", first + last * period)
+    };
+    FileError::new(
+        file,
+        Place::File,
+        format_args!("accelerometers from {}", of(accel)),
+        format_args!("times that overlap the gyros', {}", of(gyro)),
+        "Bring both streams to one clock, or correct time_unit.",
+    )
+}
+
+/// What both streams have to say, each remark once, and that they are two.
+fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
+    let mut remarks = gyro.remarks;
+    remarks.extend(
+        accel
+            .remarks
+            .into_iter()
+            .filter(|remark| !remarks.contains(remark))
+            .collect::<Vec<_>>(),
+    );
+    let uneven = accel.clock.uneven();
+    remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
+    remarks.push(format!(
+        "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
+         gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
+        rounded(gyro.clock.period),
+        rounded(accel.clock.period)
+    ));
+    remarks
 }
 
 /// Seven digits.

@@ -30,6 +30,17 @@ pub(super) const META: [&str; 8] = [
     "notes",
 ];
 
+/// The fields of `run.toml` itself.
+const TABLES: [&str; 7] = [
+    "format",
+    "site",
+    "meta",
+    "imu",
+    "standstill",
+    "turntable",
+    "segments",
+];
+
 impl Run {
     /// Reads `run.toml` and the files that it names, relative to itself.
     ///
@@ -43,19 +54,7 @@ impl Run {
             text: &text,
         };
         let table = document.parse()?;
-        let top = Fields::top(
-            document,
-            &table,
-            &[
-                "format",
-                "site",
-                "meta",
-                "imu",
-                "standstill",
-                "turntable",
-                "segments",
-            ],
-        )?;
+        let top = Fields::top(document, &table, &TABLES)?;
         top.need("format", "the format of this file")?
             .choice(&[(FORMAT, ())])?;
         let directory = path.parent().unwrap_or(Path::new(""));
@@ -70,16 +69,7 @@ impl Run {
 
         // The small files' fields are checked before the large files are read.
         let mut files = vec![path.to_owned(), instrument.log.source.file.clone()];
-        let accel = instrument
-            .log
-            .accel_from
-            .as_ref()
-            .map(|(source, _)| &source.file);
-        files.extend(
-            accel
-                .filter(|file| **file != instrument.log.source.file)
-                .cloned(),
-        );
+        files.extend(other_file(&instrument));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
         let imu = instrument.log.read(&mut notes)?;
@@ -134,6 +124,12 @@ impl Run {
         self.recording.notes.extend(notes);
         self
     }
+}
+
+/// The file of the accelerometers, if it is another than that of the gyros.
+fn other_file(instrument: &InstrumentFields) -> Option<PathBuf> {
+    let (source, _) = instrument.log.accel_from.as_ref()?;
+    (source.file != instrument.log.source.file).then(|| source.file.clone())
 }
 
 fn text_of(path: &Path) -> Result<String, FileError> {

@@ -147,6 +147,35 @@ impl AttitudeColumns<usize> {
     }
 }
 
+/// What `[turntable]` states of the errors of a table with this number of angles.
+fn geometry(fields: &Fields, angles: usize) -> Result<TableGeometry, FileError> {
+    let optional = |name| -> Result<f64, FileError> {
+        let field = fields.get(name);
+        let field = field
+            .map(|field| field.positive_to(HALF_TURN))
+            .transpose()?;
+        Ok(field.unwrap_or(0.0) * ARCSEC)
+    };
+    let mut axes = TableGeometry::default().axes;
+    for (kind, key) in AxisError::ALL.into_iter().zip(AXIS_KEYS) {
+        match fields.get(key) {
+            Some(field) if angles == 0 => {
+                return Err(field.error(
+                        "it with `angles` only, for a quaternion does not tell the axes apart",
+                        "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
+                    ));
+            }
+            Some(_) => axes += kind.of_table(angles, optional(key)?),
+            None => (),
+        }
+    }
+    let level = optional("level_sigma_arcsec")?;
+    Ok(TableGeometry {
+        base: Vector3::new(level, level, optional("north_sigma_arcsec")?),
+        axes,
+    })
+}
+
 /// What `run.toml` says of the file.
 pub(super) struct TableLogFile<'a> {
     pub source: Source<'a>,
@@ -195,31 +224,7 @@ impl<'a> TableLogFile<'a> {
             field.positive_to(MINUTE_MS)?;
             notes.push("turntable.time_sigma_ms is read but has no effect yet.".to_owned());
         }
-        let optional = |name| -> Result<f64, FileError> {
-            let field = fields.get(name);
-            let field = field
-                .map(|field| field.positive_to(HALF_TURN))
-                .transpose()?;
-            Ok(field.unwrap_or(0.0) * ARCSEC)
-        };
-        let mut axes = TableGeometry::default().axes;
-        for (kind, key) in AxisError::ALL.into_iter().zip(AXIS_KEYS) {
-            match fields.get(key) {
-                Some(field) if attitude.angles.is_empty() => {
-                    return Err(field.error(
-                        "it with `angles` only, for a quaternion does not tell the axes apart",
-                        "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
-                    ));
-                }
-                Some(_) => axes += kind.of_table(attitude.angles.len(), optional(key)?),
-                None => (),
-            }
-        }
-        let level = optional("level_sigma_arcsec")?;
-        let geometry = TableGeometry {
-            base: Vector3::new(level, level, optional("north_sigma_arcsec")?),
-            axes,
-        };
+        let geometry = geometry(&fields, attitude.angles.len())?;
         let sigma = |name| -> Result<f64, FileError> {
             let field = fields.need(name, "a 1σ in seconds of arc")?;
             Ok(field.positive_to(HALF_TURN)? * ARCSEC)

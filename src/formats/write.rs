@@ -35,34 +35,7 @@ pub fn write_run(
     output: Output,
     truth: Option<&Calibration>,
 ) -> Result<(), FileError> {
-    let configuration = directory.join("run.toml");
-    for sensor in Sensor::ALL {
-        let unit = run.instrument.unit.get(sensor);
-        let names = || units(sensor, output).iter().map(|&(name, _)| name);
-        if !names().any(|name| name == unit) {
-            return Err(FileError::new(
-                &configuration,
-                Place::File,
-                format_args!("{}_unit = `{unit}` for this output", sensor.name()),
-                format_args!("one of {}", list(names())),
-                "Change the unit or the output.",
-            ));
-        }
-    }
-    if let Some(name) = run
-        .recording
-        .meta
-        .keys()
-        .find(|name| !META.contains(&name.as_str()))
-    {
-        return Err(FileError::new(
-            &configuration,
-            Place::File,
-            format_args!("`{name}` among the meta fields"),
-            format_args!("one of {}", list(META)),
-            suggestion(name, META, "Rename it."),
-        ));
-    }
+    check_words(&directory.join("run.toml"), run, output)?;
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = directory.join(name);
         let written = File::create(&path).and_then(|file| write_rows(&path, file, content));
@@ -92,6 +65,34 @@ pub fn write_run(
         write("truth.json", &|file| file.write_all(&bytes))?;
     }
     Ok(())
+}
+
+/// Units must be of this output, and meta fields among those that [`Run::read`] knows.
+fn check_words(configuration: &Path, run: &Run, output: Output) -> Result<(), FileError> {
+    for sensor in Sensor::ALL {
+        let unit = run.instrument.unit.get(sensor);
+        let names = || units(sensor, output).iter().map(|&(name, _)| name);
+        if !names().any(|name| name == unit) {
+            return Err(FileError::new(
+                configuration,
+                Place::File,
+                format_args!("{}_unit = `{unit}` for this output", sensor.name()),
+                format_args!("one of {}", list(names())),
+                "Change the unit or the output.",
+            ));
+        }
+    }
+    let mut fields = run.recording.meta.keys();
+    match fields.find(|name| !META.contains(&name.as_str())) {
+        Some(name) => Err(FileError::new(
+            configuration,
+            Place::File,
+            format_args!("`{name}` among the meta fields"),
+            format_args!("one of {}", list(META)),
+            suggestion(name, META, "Rename it."),
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Writes rows into a file, compressed if the name ends in `.gz`.
@@ -218,14 +219,47 @@ fn triple(v: Vector3<f64>) -> String {
 }
 
 fn configuration_text(run: &Run, output: Output) -> String {
-    let (output, _) = OUTPUTS
-        .into_iter()
-        .find(|&(_, known)| known == output)
-        .unwrap_or(OUTPUTS[0]);
-    let (site, imu, noise) = (&run.site, &run.recording.imu, &run.instrument.noise);
     let mut sections = vec![
-        format!(
-            r#"format = "{FORMAT}"
+        site_text(run),
+        meta_text(&run.recording.meta),
+        imu_text(run, output),
+    ];
+    sections.extend(
+        Sensor::ALL
+            .into_iter()
+            .filter_map(|sensor| gauss_markov_text(run, sensor)),
+    );
+    sections.extend(Sensor::ALL.map(|sensor| motion_noise_text(run, sensor)));
+    sections.push(
+        "\n# known before calibration: N = scale * installation * u + bias, N the file's quantity \
+         per second\n"
+            .to_owned(),
+    );
+    sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
+    sections.extend(terms_text(run));
+    sections.push(standstill_text(run));
+    if run.recording.table.is_some() {
+        sections.push(turntable_text(run));
+    }
+    if !run.recording.segments.is_empty() {
+        sections.push(format!(
+            r#"
+# labelled sections of the record, in s
+[segments]
+file = "segments.csv"
+position_sigma_deg = {:?}
+"#,
+            short(run.segment_sigma / DEGREE)
+        ));
+    }
+    sections.concat()
+}
+
+/// The format of the file and `[site]`.
+fn site_text(run: &Run) -> String {
+    let site = &run.site;
+    format!(
+        r#"format = "{FORMAT}"
 
 # the place of the turntable
 [site]
@@ -235,15 +269,23 @@ height_m = {height:?}
 gravity_m_s2 = {gravity:?}
 gravity_sigma_mgal = {gravity_sigma:?}
 "#,
-            latitude = short(site.latitude / DEGREE),
-            longitude = short(site.longitude / DEGREE),
-            height = site.height,
-            gravity = site.gravity,
-            gravity_sigma = short(site.gravity_sigma / MILLIGAL),
-        ),
-        meta_text(&run.recording.meta),
-        format!(
-            r#"
+        latitude = short(site.latitude / DEGREE),
+        longitude = short(site.longitude / DEGREE),
+        height = site.height,
+        gravity = site.gravity,
+        gravity_sigma = short(site.gravity_sigma / MILLIGAL),
+    )
+}
+
+/// `[imu]`, and the random walks of `[imu.noise]`.
+fn imu_text(run: &Run, output: Output) -> String {
+    let (output, _) = OUTPUTS
+        .into_iter()
+        .find(|&(_, known)| known == output)
+        .unwrap_or(OUTPUTS[0]);
+    let (imu, noise) = (&run.recording.imu, &run.instrument.noise);
+    format!(
+        r#"
 # the instrument's samples, along body right-front-up
 [imu]
 file = "imu.csv.gz"
@@ -259,69 +301,68 @@ columns = {{ time = "t", gyro = ["gx", "gy", "gz"], accel = ["ax", "ay", "az"]{t
 angle_random_walk_deg_per_sqrt_h = {angle_walk:?}
 velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
 "#,
-            gyro_unit = quoted(&run.instrument.unit.gyro),
-            accel_unit = quoted(&run.instrument.unit.accel),
-            period = imu.period,
-            continuous = imu.continuous,
-            temperature = match imu.temperature {
-                Some(_) => ", temperature = \"temperature\"",
-                None => "",
-            },
-            angle_walk = short(noise.gyro.random_walk / DEG_PER_SQRT_H),
-            velocity_walk = short(noise.accel.random_walk / MICRO_G_PER_SQRT_HZ),
-        ),
-    ];
-    for sensor in Sensor::ALL {
-        let keys = NoiseKeys::of(sensor);
-        let (sigma, unit) = keys.gauss_markov;
-        if let Some(bias) = noise.get(sensor).gauss_markov {
-            sections.push(format!(
-                "{sigma} = {:?}\n{} = {:?}\n",
-                short(bias.sigma / unit),
-                keys.correlation_time,
-                bias.correlation_time
-            ));
-        }
-    }
-    for sensor in Sensor::ALL {
-        let keys = NoiseKeys::of(sensor);
-        let MotionNoise {
-            by_motion,
-            by_duration,
-        } = *run.instrument.motion_noise.get(sensor);
-        let (name, unit) = keys.by_duration;
-        for (name, value) in [(keys.by_motion, by_motion), (name, by_duration / unit)] {
-            if value > 0.0 {
-                sections.push(format!("{name} = {:?}\n", short(value)));
-            }
-        }
-    }
-    sections.push(
-        "\n# known before calibration: N = scale * installation * u + bias, N the file's quantity \
-         per second\n"
-            .to_owned(),
-    );
-    sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
-    sections.extend(terms_text(run));
-    sections.push(format!(
+        gyro_unit = quoted(&run.instrument.unit.gyro),
+        accel_unit = quoted(&run.instrument.unit.accel),
+        period = imu.period,
+        continuous = imu.continuous,
+        temperature = match imu.temperature {
+            Some(_) => ", temperature = \"temperature\"",
+            None => "",
+        },
+        angle_walk = short(noise.gyro.random_walk / DEG_PER_SQRT_H),
+        velocity_walk = short(noise.accel.random_walk / MICRO_G_PER_SQRT_HZ),
+    )
+}
+
+fn gauss_markov_text(run: &Run, sensor: Sensor) -> Option<String> {
+    let keys = NoiseKeys::of(sensor);
+    let (sigma, unit) = keys.gauss_markov;
+    let bias = run.instrument.noise.get(sensor).gauss_markov?;
+    Some(format!(
+        "{sigma} = {:?}\n{} = {:?}\n",
+        short(bias.sigma / unit),
+        keys.correlation_time,
+        bias.correlation_time
+    ))
+}
+
+fn motion_noise_text(run: &Run, sensor: Sensor) -> String {
+    let keys = NoiseKeys::of(sensor);
+    let MotionNoise {
+        by_motion,
+        by_duration,
+    } = *run.instrument.motion_noise.get(sensor);
+    let (name, unit) = keys.by_duration;
+    [(keys.by_motion, by_motion), (name, by_duration / unit)]
+        .into_iter()
+        .filter(|&(_, value)| value > 0.0)
+        .map(|(name, value)| format!("{name} = {:?}\n", short(value)))
+        .collect()
+}
+
+fn standstill_text(run: &Run) -> String {
+    let mut text = format!(
         "# how still the IMU is while the table is at rest\n[standstill]\nposition_sigma_m = {:?}\n",
         run.standstill.position_sigma
-    ));
+    );
     if let Some(sigma) = run.standstill.sigma.gyro {
         let sigma = short(sigma / ARCSEC);
-        sections.push(format!("attitude_sigma_arcsec = {sigma:?}\n"));
+        text += &format!("attitude_sigma_arcsec = {sigma:?}\n");
     }
     if let Some(sigma) = run.standstill.sigma.accel {
-        sections.push(format!("velocity_sigma_m_s = {sigma:?}\n"));
+        text += &format!("velocity_sigma_m_s = {sigma:?}\n");
     }
     if run.standstill.turning > 0.0 {
         let turning = short(run.standstill.turning / DEGREE);
-        sections.push(format!("turning_deg_per_sqrt_s = {turning:?}\n"));
+        text += &format!("turning_deg_per_sqrt_s = {turning:?}\n");
     }
-    if run.recording.table.is_some() {
-        let letters = axis_letters(run);
-        sections.push(format!(
-            r#"
+    text
+}
+
+fn turntable_text(run: &Run) -> String {
+    let letters = axis_letters(run);
+    let mut text = format!(
+        r#"
 # attitude of the table's mounting face, body right-front-up to East-North-Up
 [turntable]
 file = "table.csv.gz"
@@ -329,39 +370,26 @@ columns = {{ time = "t", quaternion = ["qw", "qx", "qy", "qz"]{angles} }}
 position_sigma_arcsec = {position:?}    # constant while the table stands, new at every position
 reading_sigma_arcsec = {reading:?}    # white, each reading
 "#,
-            angles = letters.as_ref().map_or_else(String::new, |letters| format!(
-                ", angles = {:?}, axes = {letters:?}",
-                &ANGLES[..letters.len()]
-            )),
-            position = short(run.table.position_sigma / ARCSEC),
-            reading = short(run.table.reading_sigma / ARCSEC),
-        ));
-        let geometry = &run.table.geometry;
-        let of_base = [
-            ("level_sigma_arcsec", geometry.base.x),
-            ("north_sigma_arcsec", geometry.base.z),
-        ];
-        let of_axes = AXIS_KEYS.into_iter().zip(AxisError::ALL);
-        let of_axes = of_axes.filter(|_| letters.is_some());
-        let of_axes =
-            of_axes.map(|(key, kind)| (key, geometry.axes.rows_range(kind.range()).max()));
-        let stated = of_base.into_iter().chain(of_axes);
-        for (key, sigma) in stated.filter(|&(_, sigma)| sigma > 0.0) {
-            sections.push(format!("{key} = {:?}\n", short(sigma / ARCSEC)));
-        }
+        angles = letters.as_ref().map_or_else(String::new, |letters| format!(
+            ", angles = {:?}, axes = {letters:?}",
+            &ANGLES[..letters.len()]
+        )),
+        position = short(run.table.position_sigma / ARCSEC),
+        reading = short(run.table.reading_sigma / ARCSEC),
+    );
+    let geometry = &run.table.geometry;
+    let of_base = [
+        ("level_sigma_arcsec", geometry.base.x),
+        ("north_sigma_arcsec", geometry.base.z),
+    ];
+    let of_axes = AXIS_KEYS.into_iter().zip(AxisError::ALL);
+    let of_axes = of_axes.filter(|_| letters.is_some());
+    let of_axes = of_axes.map(|(key, kind)| (key, geometry.axes.rows_range(kind.range()).max()));
+    let stated = of_base.into_iter().chain(of_axes);
+    for (key, sigma) in stated.filter(|&(_, sigma)| sigma > 0.0) {
+        text += &format!("{key} = {:?}\n", short(sigma / ARCSEC));
     }
-    if !run.recording.segments.is_empty() {
-        sections.push(format!(
-            r#"
-# labelled sections of the record, in s
-[segments]
-file = "segments.csv"
-position_sigma_deg = {:?}
-"#,
-            short(run.segment_sigma / DEGREE)
-        ));
-    }
-    sections.concat()
+    text
 }
 
 fn prior_text(run: &Run, sensor: Sensor) -> String {

@@ -141,21 +141,10 @@ impl Draft {
         let only = sheet.goes_on.then_some(rows);
         let instance = match streams {
             Some(_) => None,
-            None => columns::instance(&sheet),
+            None => retain_instance(&mut sheet),
         };
-        if let Some((column, number)) = instance {
-            sheet.retain(|columns, row| columns[column][row] == number);
-        }
         let mut columns = Columns::find(&sheet);
-        // Rows of another sensor have nothing in them.
-        let of_triads: Vec<usize> = [columns.triads.gyro, columns.triads.accel]
-            .into_iter()
-            .flatten()
-            .flatten()
-            .collect();
-        if columns.time.is_some() && !of_triads.is_empty() {
-            sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
-        }
+        retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
         let (rows, mut triads) = columns.samples(&sheet).unzip();
         let wrapped = triads.as_mut().map(registers::unwrap).unwrap_or_default();
@@ -191,16 +180,10 @@ impl Draft {
                 registers = Some(found);
             }
         }
-        let noise = |triads: &PerSensor<Vec<Vector3<f64>>>| {
-            let (period, rest) = (clock.period?, motion.as_ref()?.longest_rest.clone());
-            let at_rest = PerSensor::from_fn(|sensor| &triads.get(sensor)[rest.clone()]);
-            Some(noise::figures(
-                &at_rest,
-                period,
-                quantities.per_second(period),
-            ))
-        };
-        let noise = triads.as_ref().and_then(noise).unwrap_or_default();
+        let at_rest = triads.as_ref().zip(motion.as_ref());
+        let noise = at_rest
+            .and_then(|(triads, motion)| noise_at_rest(triads, motion, &quantities, clock.period))
+            .unwrap_or_default();
         if let Some(streams) = streams.as_ref().filter(|streams| streams.accel.is_none()) {
             columns.names = streams.columns(Sensor::Gyro);
         }
@@ -219,6 +202,42 @@ impl Draft {
             only,
         }
     }
+}
+
+/// Keeps the rows of one of several instruments, and says by which column and number.
+fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
+    let (column, number) = columns::instance(sheet)?;
+    sheet.retain(|columns, row| columns[column][row] == number);
+    Some((column, number))
+}
+
+/// Keeps the rows in which a triad has a value.
+fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
+    // Rows of another sensor have nothing in them.
+    let of_triads: Vec<usize> = [columns.triads.gyro, columns.triads.accel]
+        .into_iter()
+        .flatten()
+        .flatten()
+        .collect();
+    if columns.time.is_some() && !of_triads.is_empty() {
+        sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
+    }
+}
+
+/// The noise of both triads in the longest rest, in the file's quantity per second.
+fn noise_at_rest(
+    triads: &PerSensor<Vec<Vector3<f64>>>,
+    motion: &Motion,
+    quantities: &Quantities,
+    period: Option<f64>,
+) -> Option<PerSensor<Option<NoiseFigures>>> {
+    let (period, rest) = (period?, motion.longest_rest.clone());
+    let at_rest = PerSensor::from_fn(|sensor| &triads.get(sensor)[rest.clone()]);
+    Some(noise::figures(
+        &at_rest,
+        period,
+        quantities.per_second(period),
+    ))
 }
 
 /// Of the gyros, and of accelerometers in the same stream.

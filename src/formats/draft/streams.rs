@@ -65,48 +65,14 @@ impl Streams {
             return Err(damage);
         }
         let places: Vec<Places> = found.iter().map(Places::of).collect();
-        let is_meant = |k: &usize| match wanted {
-            Some(name) => found[*k].stream.name == name,
-            None => found[*k].stream.is_inertial && found[*k].samples >= FEWEST_ROWS as u64,
-        };
-        let with = |sensor: Sensor, other: bool| {
-            let of = (0..found.len()).filter(is_meant).filter(|&k| {
-                // Streams are put together by their times.
-                if !other && places[k].time.is_none() {
-                    return false;
-                }
-                let triads = &places[k].triads;
-                let has_both = triads.gyro.is_some() && triads.accel.is_some();
-                triads.get(sensor).is_some() && (!other || has_both)
-            });
-            // Of equal ones the first.
-            of.rev().max_by_key(|&k| found[k].samples)
-        };
-        let (both, gyro, accel) = (
-            with(Sensor::Gyro, true),
-            with(Sensor::Gyro, false),
-            with(Sensor::Accel, false),
-        );
-        let samples = |k: Option<usize>| k.map_or(0, |k| found[k].samples);
-        let apart = samples(gyro).min(samples(accel));
-        let (gyro, accel) = match (both, gyro, accel) {
-            (Some(both), ..) if samples(Some(both)) >= apart => (both, None),
-            (_, Some(gyro), Some(accel)) => (gyro, Some(accel)),
-            _ => {
-                let most = (0..found.len())
-                    .filter(is_meant)
-                    .max_by_key(|&k| found[k].samples);
-                let Some(any) = most.or((0..found.len()).max_by_key(|&k| found[k].samples)) else {
-                    return Err(FileError::new(
-                        file,
-                        crate::formats::Place::File,
-                        "no samples",
-                        "streams of samples",
-                        "Record the file again.",
-                    ));
-                };
-                (any, None)
-            }
+        let Some((gyro, accel)) = chosen(&found, &places, wanted) else {
+            return Err(FileError::new(
+                file,
+                crate::formats::Place::File,
+                "no samples",
+                "streams of samples",
+                "Record the file again.",
+            ));
         };
         let salvage = damage.is_some();
         let source = |k: usize| Source {
@@ -114,50 +80,42 @@ impl Streams {
             stream: Some(&found[k].stream.name),
             salvage,
         };
-        let time_of = |k: usize| {
-            let place = places[k].time.unwrap_or(0);
-            let column = &found[k].stream.columns[place];
+        let numbers = PerSensor {
+            gyro,
+            accel: accel.unwrap_or(gyro),
+        };
+        let mut time = PerSensor::from_fn(|sensor| {
+            let k = *numbers.get(sensor);
+            let column = &found[k].stream.columns[places[k].time.unwrap_or(0)];
             (column.name.clone(), column.unit)
-        };
-        let mut of_both = PerSensor {
-            gyro: time_of(gyro),
-            accel: time_of(accel.unwrap_or(gyro)),
-        };
-        if let Some(accel) = accel {
-            for (k, sensor) in [(gyro, Sensor::Gyro), (accel, Sensor::Accel)] {
-                let (name, unit) = of_both.get_mut(sensor);
+        });
+        let sheet = if accel.is_some() {
+            let sources = PerSensor::from_fn(|sensor| source(*numbers.get(sensor)));
+            for sensor in Sensor::ALL {
+                let (name, unit) = time.get_mut(sensor);
                 if unit.is_empty() {
-                    *unit = unit_of(&source(k), name)?;
+                    *unit = unit_of(sources.get(sensor), name)?;
                 }
             }
-        }
-        let mut sheet = match accel {
-            None => Sheet::of(source(gyro).open()?, FEWEST_ROWS)?,
-            Some(accel) => {
-                let sources = PerSensor {
-                    gyro: source(gyro),
-                    accel: source(accel),
-                };
-                let numbers = PerSensor { gyro, accel };
-                joined(&PerSensor::from_fn(|sensor| {
-                    let k = *numbers.get(sensor);
-                    Member {
-                        source: sources.get(sensor),
-                        found: &found[k],
-                        triad: places[k].triads.get(sensor).unwrap_or_default(),
-                        time: of_both.get(sensor).clone(),
-                    }
-                }))?
-            }
-        };
-        if accel.is_none() {
+            joined(&PerSensor::from_fn(|sensor| {
+                let k = *numbers.get(sensor);
+                Member {
+                    source: sources.get(sensor),
+                    found: &found[k],
+                    triad: places[k].triads.get(sensor).unwrap_or_default(),
+                    time: time.get(sensor).clone(),
+                }
+            }))?
+        } else {
+            let mut sheet = Sheet::of(source(gyro).open()?, FEWEST_ROWS)?;
             sheet.names = names(&found[gyro]);
-        }
+            sheet
+        };
         let name = |k: usize| found[k].stream.name.clone();
         let streams = Self {
             gyro: name(gyro),
             accel: accel.map(name),
-            time: of_both,
+            time,
             axes: found[gyro].stream.axes,
             damage: damage.map(|damage| damage.to_string()),
             written: None,
@@ -260,6 +218,50 @@ impl Streams {
         let found = self.found.iter().find(|found| found.stream.name == *name)?;
         let triad = (*Places::of(found).triads.get(sensor))?;
         Some(triad.map(|k| found.stream.columns[k].name.clone()))
+    }
+}
+
+/// The stream of the gyros, and of the accelerometers if that is another; where no stream that is meant has them,
+/// the longest.
+fn chosen(
+    found: &[Found],
+    places: &[Places],
+    wanted: Option<&str>,
+) -> Option<(usize, Option<usize>)> {
+    let is_meant = |k: &usize| match wanted {
+        Some(name) => found[*k].stream.name == name,
+        None => found[*k].stream.is_inertial && found[*k].samples >= FEWEST_ROWS as u64,
+    };
+    let with = |sensor: Sensor, other: bool| {
+        let of = (0..found.len()).filter(is_meant).filter(|&k| {
+            // Streams are put together by their times.
+            if !other && places[k].time.is_none() {
+                return false;
+            }
+            let triads = &places[k].triads;
+            let has_both = triads.gyro.is_some() && triads.accel.is_some();
+            triads.get(sensor).is_some() && (!other || has_both)
+        });
+        // Of equal ones the first.
+        of.rev().max_by_key(|&k| found[k].samples)
+    };
+    let (both, gyro, accel) = (
+        with(Sensor::Gyro, true),
+        with(Sensor::Gyro, false),
+        with(Sensor::Accel, false),
+    );
+    let samples = |k: Option<usize>| k.map_or(0, |k| found[k].samples);
+    let apart = samples(gyro).min(samples(accel));
+    match (both, gyro, accel) {
+        (Some(both), ..) if samples(Some(both)) >= apart => Some((both, None)),
+        (_, Some(gyro), Some(accel)) => Some((gyro, Some(accel))),
+        _ => {
+            let most = (0..found.len())
+                .filter(is_meant)
+                .max_by_key(|&k| found[k].samples);
+            let any = most.or((0..found.len()).max_by_key(|&k| found[k].samples))?;
+            Some((any, None))
+        }
     }
 }
 

@@ -41,6 +41,41 @@ impl Draft {
     }
 
     fn rows(&self, text: &mut String) {
+        self.output_and_units(text);
+        self.time_unit(text);
+        self.sample_period(text);
+        line(
+            text,
+            "time_stamp",
+            "\"end\"",
+            "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"",
+        );
+        if self.cuts > 0 {
+            let why = format!(
+                "gravity changes its direction at once in {}: sections laid end to end; if not, true",
+                places(self.cuts)
+            );
+            line(text, "continuous", "false", &why);
+        } else {
+            line(text, "continuous", "true", &self.gaps());
+        }
+        self.body_axes(text);
+        if let Some((column, number)) = self.instance {
+            let of = format!(
+                "{{ column = {}, number = {number} }}",
+                quoted(&self.columns.names[column])
+            );
+            line(
+                text,
+                "instance",
+                &of,
+                "rows of several instruments: those of the first",
+            );
+        }
+        self.columns(text);
+    }
+
+    fn output_and_units(&self, text: &mut String) {
         let found = &self.quantities;
         let output = match found.output {
             Output::Pulse => "pulse",
@@ -65,6 +100,9 @@ impl Draft {
                  negative scale.\n",
             );
         }
+    }
+
+    fn time_unit(&self, text: &mut String) {
         let clock = &self.clock;
         let unit = self
             .streams
@@ -78,6 +116,10 @@ impl Draft {
         } else if clock.unit != "s" {
             line(text, "time_unit", &quoted(clock.unit), &clock.why);
         }
+    }
+
+    fn sample_period(&self, text: &mut String) {
+        let clock = &self.clock;
         match clock.period {
             Some(period) if clock.is_stated => {
                 let rate = short(period.recip());
@@ -98,21 +140,9 @@ impl Draft {
                 "s from row to row, which a counter does not tell",
             ),
         }
-        line(
-            text,
-            "time_stamp",
-            "\"end\"",
-            "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"",
-        );
-        if self.cuts > 0 {
-            let why = format!(
-                "gravity changes its direction at once in {}: sections laid end to end; if not, true",
-                places(self.cuts)
-            );
-            line(text, "continuous", "false", &why);
-        } else {
-            line(text, "continuous", "true", &self.gaps());
-        }
+    }
+
+    fn body_axes(&self, text: &mut String) {
         let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
         match of_streams {
             Some(axes) => line(
@@ -131,19 +161,6 @@ impl Draft {
                 line(text, "body_axes", "\"rfu\"", &why);
             }
         }
-        if let Some((column, number)) = self.instance {
-            let of = format!(
-                "{{ column = {}, number = {number} }}",
-                quoted(&self.columns.names[column])
-            );
-            line(
-                text,
-                "instance",
-                &of,
-                "rows of several instruments: those of the first",
-            );
-        }
-        self.columns(text);
     }
 
     fn gaps(&self) -> String {
@@ -166,41 +183,13 @@ impl Draft {
             streams.write_columns(text);
             return;
         }
+        self.doubts_of_triads(text);
         let columns = &self.columns;
-        let named = |triad: &[usize; 3]| {
-            let names = triad.map(|k| quoted(&columns.names[k]));
-            format!("[{}]", names.join(", "))
-        };
-        for sensor in Sensor::ALL {
-            for other in columns.others.get(sensor) {
-                let _ = writeln!(text, "# {} could be {}, too", sensor.name(), named(other));
-            }
-        }
-        if columns.by_size && columns.triads.gyro.is_some() {
-            text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
-        }
-        let mut fields = Vec::new();
-        let name = |k: usize| quoted(&columns.names[k]);
-        match (columns.time, columns.nanoseconds) {
-            (Some(time), Some(further)) => {
-                fields.push(format!("time = [{}, {}]", name(time), name(further)));
-            }
-            (Some(time), None) => fields.push(format!("time = {}", quoted(&columns.names[time]))),
-            (None, _) if self.clock.is_stated => {
-                let _ = writeln!(text, "# {}: rows follow one another.", self.clock.why);
-            }
-            (None, _) => {
-                let why = &self.clock.why;
-                let _ = writeln!(
-                    text,
-                    "# TODO: {why}: name one that is, or give sample_period_s."
-                );
-            }
-        }
+        let mut fields: Vec<String> = self.time_column(text).into_iter().collect();
         let mut missing = Vec::new();
         for sensor in Sensor::ALL {
             match columns.triads.get(sensor) {
-                Some(triad) => fields.push(format!("{} = {}", sensor.name(), named(triad))),
+                Some(triad) => fields.push(format!("{} = {}", sensor.name(), self.named(triad))),
                 None => missing.push(sensor.name()),
             }
         }
@@ -227,6 +216,54 @@ impl Draft {
         } else {
             let why = self.blocked.join("; ");
             let _ = writeln!(text, "# columns = {{ {fields} }}  # TODO: {why}");
+        }
+    }
+
+    /// The names of a triad's columns, as a list.
+    fn named(&self, triad: &[usize; 3]) -> String {
+        let names = triad.map(|k| quoted(&self.columns.names[k]));
+        format!("[{}]", names.join(", "))
+    }
+
+    /// Which other columns could be a triad, and whether only numbers told the triads.
+    fn doubts_of_triads(&self, text: &mut String) {
+        let columns = &self.columns;
+        for sensor in Sensor::ALL {
+            for other in columns.others.get(sensor) {
+                let _ = writeln!(
+                    text,
+                    "# {} could be {}, too",
+                    sensor.name(),
+                    self.named(other)
+                );
+            }
+        }
+        if columns.by_size && columns.triads.gyro.is_some() {
+            text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
+        }
+    }
+
+    /// The field of the columns of time; where there is none, a remark instead.
+    fn time_column(&self, text: &mut String) -> Option<String> {
+        let columns = &self.columns;
+        let name = |k: usize| quoted(&columns.names[k]);
+        match (columns.time, columns.nanoseconds) {
+            (Some(time), Some(further)) => {
+                Some(format!("time = [{}, {}]", name(time), name(further)))
+            }
+            (Some(time), None) => Some(format!("time = {}", name(time))),
+            (None, _) if self.clock.is_stated => {
+                let _ = writeln!(text, "# {}: rows follow one another.", self.clock.why);
+                None
+            }
+            (None, _) => {
+                let why = &self.clock.why;
+                let _ = writeln!(
+                    text,
+                    "# TODO: {why}: name one that is, or give sample_period_s."
+                );
+                None
+            }
         }
     }
 

@@ -180,13 +180,7 @@ impl Quantities {
                 let pulses = whole && sum_variance.is_some_and(|ratio| ratio < PULSE_SUMS);
                 self.output = if pulses { Output::Pulse } else { Output::Rate };
                 unit.word = Some("count");
-                unit.why = match (whole, named) {
-                    (true, _) => "whole numbers".to_owned(),
-                    (false, Some(named)) => {
-                        format!("{named} has no word of its own here: a count with a scale")
-                    }
-                    (false, None) => format!("no known unit makes {size}"),
-                };
+                unit.why = why_count(whole, named, &format!("no known unit makes {size}"));
                 let per_g = gravity * self.per_second(seconds);
                 unit.scale = match named {
                     Some("mg") => Some(Scale::of_name(1e3 / STANDARD_GRAVITY, "mg")),
@@ -196,11 +190,7 @@ impl Quantities {
             }
         }
         self.units.accel = unit;
-        self.output_why = match self.output {
-            Output::Pulse => "whole numbers whose sums vary less than they would if fractions were not carried over".to_owned(),
-            Output::Increment => format!("gravity times {} s a row", short(seconds)),
-            Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
-        };
+        self.output_why = output_why(self.output, seconds);
     }
 
     fn gyros(
@@ -212,12 +202,7 @@ impl Quantities {
     ) {
         let (angle, is_turned) = (motion.angle.map(f64::abs), motion.is_turned);
         let seconds = period.unwrap_or(f64::NAN);
-        // Angle in one row of a unit of it.
-        let known: &[(&'static str, f64)] = match self.output {
-            Output::Rate => &[("rad/s", 1.0), ("deg/s", DEGREE), ("deg/h", DEG_PER_H)],
-            Output::Increment => &[("rad", 1.0), ("deg", DEGREE), ("arcsec", ARCSEC)],
-            Output::Pulse => &[],
-        };
+        let known = angle_units(self.output);
         let row = if self.output == Output::Rate {
             seconds
         } else {
@@ -228,17 +213,11 @@ impl Quantities {
                 .map(|angle| angle / (unit * row))
                 .filter(|f| f.is_finite())
         };
-        let fits =
-            |unit: f64| turns(unit).is_some_and(|f| f < TURN_FACTOR && f > TURN_FACTOR.recip());
+        let fits = |unit: f64| turns(unit).is_some_and(turns_fit);
         let by_name = known.iter().find(|(word, _)| Some(*word) == named);
         let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
         // Without a clock each unit needs a period of its own.
         let unknown = angle.filter(|_| !row.is_finite() && !whole && named.is_none());
-        let likely = |angle: f64| {
-            let periods = known.iter().map(|&(word, unit)| (word, angle / unit));
-            let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
-            usual.next().filter(|_| usual.next().is_none())
-        };
         // Counts per second for one rad/s: rows add up to the angle.
         let measured = angle
             .map(|angle| row / angle)
@@ -247,20 +226,13 @@ impl Quantities {
         match (by_name, by_turn) {
             (Some(&(word, value)), _) => {
                 unit.word = Some(word);
-                unit.why = "as the file says".to_owned();
-                match turns(value) {
-                    Some(factor) if !fits(value) => {
-                        unit.why += &format!(", but gravity turns {} times as far", short(factor));
-                    }
-                    Some(_) => unit.why += ", and as gravity turns",
-                    None => {}
-                }
+                unit.why = why_named(turns(value));
             }
             (None, Some(&(word, _))) if !whole => {
                 unit.word = Some(word);
                 unit.why = "gravity turns as far".to_owned();
             }
-            _ if let Some(angle) = unknown => match likely(angle) {
+            _ if let Some(angle) = unknown => match usual_period(known, angle) {
                 Some((word, period)) => {
                     unit.word = Some(word);
                     let rate = short(period.recip());
@@ -270,13 +242,7 @@ impl Quantities {
             },
             _ if whole || self.output == Output::Pulse || angle.is_some() || named.is_some() => {
                 unit.word = Some("count");
-                unit.why = match (whole, named) {
-                    (true, _) => "whole numbers".to_owned(),
-                    (false, Some(named)) => {
-                        format!("{named} has no word of its own here: a count with a scale")
-                    }
-                    (false, None) => "no known unit fits the turns of gravity".to_owned(),
-                };
+                unit.why = why_count(whole, named, "no known unit fits the turns of gravity");
                 unit.scale = match named {
                     Some("mdps") => Some(Scale::of_name(1e3 / DEGREE, "mdps")),
                     _ => measured.map(|value| Scale::of_steps(value, self.output)),
@@ -289,6 +255,61 @@ impl Quantities {
         }
         self.units.gyro = unit;
     }
+}
+
+/// Why a triad is taken to hold counts.
+fn why_count(whole: bool, named: Option<&str>, unfit: &str) -> String {
+    match (whole, named) {
+        (true, _) => "whole numbers".to_owned(),
+        (false, Some(named)) => {
+            format!("{named} has no word of its own here: a count with a scale")
+        }
+        (false, None) => unfit.to_owned(),
+    }
+}
+
+/// Why rows are taken to hold that, by the accelerometers.
+fn output_why(output: Output, seconds: f64) -> String {
+    match output {
+        Output::Pulse => {
+            "whole numbers whose sums vary less than they would if fractions were not carried over"
+                .to_owned()
+        }
+        Output::Increment => format!("gravity times {} s a row", short(seconds)),
+        Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
+    }
+}
+
+/// Units of gyros, with the angle in one row of a unit of it.
+fn angle_units(output: Output) -> &'static [(&'static str, f64)] {
+    match output {
+        Output::Rate => &[("rad/s", 1.0), ("deg/s", DEGREE), ("deg/h", DEG_PER_H)],
+        Output::Increment => &[("rad", 1.0), ("deg", DEGREE), ("arcsec", ARCSEC)],
+        Output::Pulse => &[],
+    }
+}
+
+fn turns_fit(factor: f64) -> bool {
+    factor < TURN_FACTOR && factor > TURN_FACTOR.recip()
+}
+
+/// Why gyros have the unit that the file names, with what the turns of gravity say of it.
+fn why_named(factor: Option<f64>) -> String {
+    match factor {
+        Some(factor) if !turns_fit(factor) => format!(
+            "as the file says, but gravity turns {} times as far",
+            short(factor)
+        ),
+        Some(_) => "as the file says, and as gravity turns".to_owned(),
+        None => "as the file says".to_owned(),
+    }
+}
+
+/// The only unit with which rows that turn by this angle come at a usual period, and the period.
+fn usual_period(known: &[(&'static str, f64)], angle: f64) -> Option<(&'static str, f64)> {
+    let periods = known.iter().map(|&(word, unit)| (word, angle / unit));
+    let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
+    usual.next().filter(|_| usual.next().is_none())
 }
 
 /// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.

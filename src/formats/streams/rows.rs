@@ -102,27 +102,7 @@ impl StreamRows {
             return Self::open(file, again, Some(&only), salvage);
         }
         let Some(stream) = stream else {
-            let names: Vec<&str> = with_samples
-                .iter()
-                .map(|&k| &*log.streams()[k].name)
-                .collect();
-            let (found, expected) = match (names.is_empty(), name) {
-                (true, _) => ("no samples".to_owned(), "streams of samples".to_owned()),
-                (false, Some(name)) => (
-                    format!("the streams {}", list(names.iter().copied())),
-                    format!("a stream `{name}` with samples"),
-                ),
-                (false, None) => (
-                    format!("the streams {}", list(names.iter().copied())),
-                    "one stream, or `stream` in run.toml".to_owned(),
-                ),
-            };
-            let advice = suggestion(
-                name.unwrap_or_default(),
-                names.iter().copied(),
-                "Name one of them; `turncal init FILE` says what each holds.",
-            );
-            return Err(FileError::new(file, Place::File, found, expected, advice));
+            return Err(no_stream(file, log.as_ref(), &with_samples, name));
         };
         log.values(&mut row)
             .map_err(|broken| broken.of(file, CUT_OFF))?;
@@ -249,6 +229,31 @@ impl StreamRows {
         }
         error
     }
+}
+
+/// A log of which no stream with samples can be meant.
+fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&str>) -> FileError {
+    let names: Vec<&str> = with_samples
+        .iter()
+        .map(|&k| &*log.streams()[k].name)
+        .collect();
+    let (found, expected) = match (names.is_empty(), name) {
+        (true, _) => ("no samples".to_owned(), "streams of samples".to_owned()),
+        (false, Some(name)) => (
+            format!("the streams {}", list(names.iter().copied())),
+            format!("a stream `{name}` with samples"),
+        ),
+        (false, None) => (
+            format!("the streams {}", list(names.iter().copied())),
+            "one stream, or `stream` in run.toml".to_owned(),
+        ),
+    };
+    let advice = suggestion(
+        name.unwrap_or_default(),
+        names.iter().copied(),
+        "Name one of them; `turncal init FILE` says what each holds.",
+    );
+    FileError::new(file, Place::File, found, expected, advice)
 }
 
 /// Whether this is the stream's name, which may leave out that it is the first instance.
