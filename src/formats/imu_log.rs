@@ -346,14 +346,19 @@ impl ImuLog<'_> {
                 jitter_max: clock.jitter_max,
                 off_stated_period: clock.off_given,
                 columns: of_axes,
-                named: NamedColumns {
-                    time: self.clock_of_rows().column.map(str::to_owned),
-                    triads: layout.triads(),
-                    temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
-                    axes: self.axes.order(),
-                },
+                named: self.named_columns(layout),
                 temperature: None,
             }),
+        }
+    }
+
+    /// The columns of the record by the names that the file gives them.
+    fn named_columns(&self, layout: &Layout) -> NamedColumns {
+        NamedColumns {
+            time: self.clock_of_rows().column.map(str::to_owned),
+            triads: layout.triads(),
+            temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
+            axes: self.axes.order(),
         }
     }
 

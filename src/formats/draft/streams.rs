@@ -66,13 +66,7 @@ impl Streams {
         }
         let places: Vec<Places> = found.iter().map(Places::of).collect();
         let Some((gyro, accel)) = chosen(&found, &places, wanted) else {
-            return Err(FileError::new(
-                file,
-                crate::formats::Place::File,
-                "no samples",
-                "streams of samples",
-                "Record the file again.",
-            ));
+            return Err(no_samples(file));
         };
         let salvage = damage.is_some();
         let source = |k: usize| Source {
@@ -91,12 +85,7 @@ impl Streams {
         });
         let sheet = if accel.is_some() {
             let sources = PerSensor::from_fn(|sensor| source(*numbers.get(sensor)));
-            for sensor in Sensor::ALL {
-                let (name, unit) = time.get_mut(sensor);
-                if unit.is_empty() {
-                    *unit = unit_of(sources.get(sensor), name)?;
-                }
-            }
+            find_units(&mut time, &sources)?;
             joined(&PerSensor::from_fn(|sensor| {
                 let k = *numbers.get(sensor);
                 Member {
@@ -263,6 +252,30 @@ fn chosen(
             Some((any, None))
         }
     }
+}
+
+fn no_samples(file: &Path) -> FileError {
+    FileError::new(
+        file,
+        crate::formats::Place::File,
+        "no samples",
+        "streams of samples",
+        "Record the file again.",
+    )
+}
+
+/// Finds the units of times by their steps where the log does not say them.
+fn find_units(
+    time: &mut PerSensor<(String, &'static str)>,
+    sources: &PerSensor<Source>,
+) -> Result<(), FileError> {
+    for sensor in Sensor::ALL {
+        let (name, unit) = time.get_mut(sensor);
+        if unit.is_empty() {
+            *unit = unit_of(sources.get(sensor), name)?;
+        }
+    }
+    Ok(())
 }
 
 /// The word for the unit of a column of time, by its steps.

@@ -121,34 +121,36 @@ impl Header {
     }
 }
 
+/// The kind of a number, whether it is big-endian, and its size in bytes; no kind for what is no number.
+fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
+    let (order, rest) = text.split_at_checked(1)?;
+    let (letter, size) = rest.split_at_checked(1)?;
+    let size: usize = size.parse().ok().filter(|&size| size < 1 << 20)?;
+    let kind = match (letter, size) {
+        ("f", 4) => Kind::F32,
+        ("f", 8) => Kind::F64,
+        ("i", 1) => Kind::I8,
+        ("i", 2) => Kind::I16,
+        ("i", 4) => Kind::I32,
+        ("i" | "M" | "m", 8) => Kind::I64,
+        ("u" | "b", 1) => Kind::U8,
+        ("u", 2) => Kind::U16,
+        ("u", 4) => Kind::U32,
+        ("u", 8) => Kind::U64,
+        // Text is of four bytes a letter.
+        ("U", _) => return Some((None, 4 * size)),
+        _ => return Some((None, size)),
+    };
+    Some((Some((kind, order == ">")), size))
+}
+
 /// The numbers of an item and its size in bytes.
 fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
-    let of_text = |text: &str| -> Option<(Option<(Kind, bool)>, usize)> {
-        let (order, rest) = text.split_at_checked(1)?;
-        let (letter, size) = rest.split_at_checked(1)?;
-        let size: usize = size.parse().ok().filter(|&size| size < 1 << 20)?;
-        let kind = match (letter, size) {
-            ("f", 4) => Kind::F32,
-            ("f", 8) => Kind::F64,
-            ("i", 1) => Kind::I8,
-            ("i", 2) => Kind::I16,
-            ("i", 4) => Kind::I32,
-            ("i" | "M" | "m", 8) => Kind::I64,
-            ("u" | "b", 1) => Kind::U8,
-            ("u", 2) => Kind::U16,
-            ("u", 4) => Kind::U32,
-            ("u", 8) => Kind::U64,
-            // Text is of four bytes a letter.
-            ("U", _) => return Some((None, 4 * size)),
-            _ => return Some((None, size)),
-        };
-        Some((Some((kind, order == ">")), size))
-    };
     match descr {
         Value::Text(text) => {
             // The unit of a time follows in brackets.
             let text = text.split_once('[').map_or(&**text, |(kind, _)| kind);
-            let (kind, size) = of_text(text)?;
+            let (kind, size) = item_kind(text)?;
             let field = Field {
                 name: None,
                 kind,
@@ -167,7 +169,7 @@ fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
                     return None;
                 };
                 let kind = kind.split_once('[').map_or(&**kind, |(kind, _)| kind);
-                let (kind, size) = of_text(kind)?;
+                let (kind, size) = item_kind(kind)?;
                 let count = match entry.get(2) {
                     None => 1,
                     Some(Value::Whole(count)) => *count,
