@@ -49,7 +49,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
     let solved = match solved.noise.learnt || is_no_noise {
         true => solved,
-        false => learnt_or_stated(solved, progress)?,
+        false => learnt_or_stated(&as_stated, solved, progress)?,
     };
     outcome(&as_stated, solved, form_test)
 }

@@ -9,12 +9,15 @@ use super::problem::Problem;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
 use crate::calibration::several::alone::Alone;
+use crate::calibration::start::coarse::CoarseStart;
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]
 pub struct Solved<'a> {
     /// As it was calibrated: with the noise that was estimated and the orders of temperature that the data call for.
     pub problem: Problem<'a>,
+    /// Where the iterations of one recording began.
+    pub start: Option<CoarseStart>,
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
     /// Of the pass with feedback, where there was one.
@@ -39,6 +42,7 @@ impl<'a> Solved<'a> {
         Self {
             noise: NoiseReport::stated(problem.options.noise, None),
             problem: problem.clone(),
+            start: None,
             priors,
             passes,
             feedback_history: Vec::new(),

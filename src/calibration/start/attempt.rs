@@ -15,6 +15,9 @@ use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
 use crate::run::Aiding;
 
+/// A fall of −2 ln of the likelihood that is nothing: a third of a σ of one parameter.
+const SETTLED: f64 = 0.1;
+
 /// From the coarse start, with the heading in the likeliest of four quadrants where Earth rate does not tell it; where
 /// stated noise does not converge, with the noise that the data show there.
 pub fn from_coarse_start<'a>(
@@ -31,8 +34,12 @@ pub fn from_coarse_start<'a>(
         best = others.into_iter().fold(best, likelier);
     }
     let (mut stated, start) = best;
-    if let (Some(chosen), Ok(stated)) = (Heading::of(&stated), &mut stated) {
-        stated.by_headings = chosen.mean_square_to(&headings);
+    let chosen = Heading::of(&stated);
+    if let Ok(stated) = &mut stated {
+        stated.start = Some(start.clone());
+        if let Some(chosen) = chosen {
+            stated.by_headings = chosen.mean_square_to(&headings);
+        }
     }
     let converged = |solved: &Solved| solved.iterated.converged;
     let stopped = matches!(stated, Err(CalibrationError::Stopped));
@@ -180,15 +187,37 @@ fn learnt_at<'a>(
     learn(Solved::stated(problem, attitudes, here, passes), progress)
 }
 
-/// With the noise that the data show, where they contradict what is stated.
+/// With the noise that the data show, where they contradict what is stated. It is estimated where stated noise led and,
+/// without a table, at the start as well: stated noise that is too small may lead to a place from which no step leads
+/// back. The likelier result is kept.
 pub fn learnt_or_stated<'a>(
+    as_stated: &Problem<'a>,
     stated: Solved<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
-    match learn(stated.clone(), progress) {
-        Ok(learnt) if learnt.iterated.converged || !stated.iterated.converged => Ok(learnt),
-        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
+    let learnt = match learn(stated.clone(), progress) {
+        Ok(learnt) if learnt.iterated.converged || !stated.iterated.converged => learnt,
+        Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
         // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
-        _ => Ok(stated),
+        _ => return Ok(stated),
+    };
+    // Where a table is read attitudes are known, and no step leads far.
+    let may_be_astray = learnt.noise.learnt && as_stated.model.aiding == Aiding::Velocity;
+    let Some(start) = learnt.start.clone().filter(|_| may_be_astray) else {
+        return Ok(learnt);
+    };
+    let deviance = |solved: &Solved| solved.iterated.held.deviance();
+    match learnt_at(as_stated, start, progress) {
+        Ok(other) if other.iterated.converged && deviance(&other) < deviance(&learnt) - SETTLED => {
+            Ok(Solved {
+                problem: other.problem,
+                iterated: other.iterated,
+                noise: other.noise,
+                passes: [learnt.passes, other.passes].concat(),
+                ..learnt
+            })
+        }
+        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
+        _ => Ok(learnt),
     }
 }
