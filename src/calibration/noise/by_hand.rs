@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::learn::INTERVAL;
-use super::likelihood_ratio::limit;
+use super::likelihood_ratio::{INTERVAL, limit};
 use super::report::{NoiseReport, SourceFigures};
 use super::source::Source;
 use crate::calibration::checks::finding::Finding;

@@ -2,7 +2,7 @@
 
 use super::factors::{Factors, Scale};
 use super::fit::{Fit, Likelihood};
-use super::likelihood_ratio::limit;
+use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::replay::Script;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
@@ -31,8 +31,7 @@ const ENOUGH: usize = 1000;
 /// Steps of a dwell between these observations at most: longer ones would not tell white noise of velocity
 /// and attitude from random walk at all.
 const LONGEST: usize = 10;
-/// Half of a 95 % interval in σ, and what 95 % stay below.
-pub const INTERVAL: f64 = 1.96;
+/// What 95 % stay below, in σ.
 const ONE_SIDED: f64 = 1.645;
 
 /// Keeps stated noise or estimates it, as the problem's options say, from what was solved with stated noise.

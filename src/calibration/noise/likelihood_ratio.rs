@@ -2,6 +2,9 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+/// Half of a 95 % interval, in σ.
+pub const INTERVAL: f64 = 1.96;
+
 /// What −2 ln of a likelihood ratio stays below but for this chance where `two_sided` factors may go
 /// either way and `one_sided` ones are at zero, which they cannot go below: a mixture of χ², in which
 /// each of the latter counts half of the time (Self and Liang 1987, J. Am. Stat. Assoc. 82(398), case 9,
