@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector3};
 
-use super::errors::blocks;
+use super::errors::{Rows, blocks};
 use super::instrument::{Response, response};
 use super::runge_kutta::step;
 use super::strapdown::{Height, Instant, Solution};
@@ -213,22 +213,24 @@ impl SensedErrors {
 /// The linear error model at one moment, height held: `ẋ = F x + G (∂ε/∂θ) θ`.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
-    dynamics: ErrorMatrix,
-    forcing: Sensitivity,
+    dynamics: Rows<STATES, STATES>,
+    forcing: Rows<STATES, PARAMETERS>,
 }
 
 impl Linearisation {
     /// About a true motion.
     pub fn about(at: &Instant, sensed: &SensedErrors) -> Self {
         let ErrorModel { dynamics, input } = at.linear_model();
-        let forcing = input * sensed.at(at);
-        Self { dynamics, forcing }
+        Self {
+            dynamics: dynamics.transpose(),
+            forcing: sensed.at(at).tr_mul(&input.transpose()),
+        }
     }
 
     /// The same with what each parameter drives times a weight of its own.
     pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
         let mut weighted = self.clone();
-        for (parameter, mut forcing) in weighted.forcing.column_iter_mut().enumerate() {
+        for (parameter, mut forcing) in weighted.forcing.row_iter_mut().enumerate() {
             forcing *= weight(parameter);
         }
         weighted
@@ -236,8 +238,9 @@ impl Linearisation {
 
     /// What errors by parameters become through a step of this duration in s, linearised at start, middle and end.
     pub fn follow(before: &Sensitivity, duration: f64, linearised: [&Self; 3]) -> Sensitivity {
-        let rate = |linear: &Self, at: &Sensitivity| linear.forcing + linear.dynamics * at;
-        step(before, duration, linearised, rate)
+        let rate =
+            |linear: &Self, at: &Rows<STATES, PARAMETERS>| linear.forcing + at * linear.dynamics;
+        step(&before.transpose(), duration, linearised, rate).transpose()
     }
 }
 

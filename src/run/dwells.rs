@@ -161,9 +161,9 @@ fn turn_beyond(
     limit: impl Fn(usize) -> f64,
 ) -> bool {
     let mut angle = Vector3::zeros();
-    (1..).zip(increments).any(|(count, increment)| {
+    increments.enumerate().any(|(before, increment)| {
         angle += increment - zero;
-        angle.norm() > limit(count)
+        angle.norm_squared() > limit(before + 1).powi(2)
     })
 }
 

@@ -68,8 +68,7 @@ impl Budget {
         let covariance = |source, factor| {
             let mut model = problem.model.clone();
             model.varied = Some((source, factor));
-            let replay = script.replay(&problem.with_model(model), &accepted)?;
-            Ok::<_, CalibrationError>(replay.covariance)
+            script.covariance(&problem.with_model(model), &accepted)
         };
         let part = |source: BudgetSource| {
             let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|factor| covariance(source, factor));

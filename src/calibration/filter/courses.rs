@@ -20,20 +20,24 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// The course that the last part of a dwell took. What another part has in common with it from its begin on is worked
-/// out already.
+/// Courses that parts of dwells have taken: a tree, from where all begin.
 pub struct Courses<const M: usize, const G: usize> {
     models: Vec<StepModel<M>>,
-    points: Vec<Point<M, G>>,
+    points: Vec<Point>,
+    gains: Vec<Gain<M, G>>,
+    /// At each point. Kept apart: on a course that is known only its last one is read.
+    known: Vec<Known<M, G>>,
 }
 
 /// A point of a course.
-struct Point<const M: usize, const G: usize> {
+struct Point {
     /// What happened since the point before it.
     event: Event,
+    /// A point that follows it, and another one that follows the point before it.
+    next: Option<usize>,
+    beside: Option<usize>,
     /// How an observation was taken in, if that is what happened.
-    gain: Option<Gain<M, G>>,
-    known: Known<M, G>,
+    gain: Option<usize>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -66,8 +70,8 @@ pub struct Known<const M: usize, const G: usize> {
     pub information: [[f64; G]; G],
 }
 
-/// Models that are told apart at most: one for each length of a step and each gap in the samples.
-const MOST_MODELS: usize = 256;
+/// So many bytes are kept before a part begins: those of some ten courses.
+const MOST: usize = 1 << 23;
 
 impl<const M: usize, const G: usize> Courses<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
@@ -80,26 +84,32 @@ impl<const M: usize, const G: usize> Courses<M, G> {
                 row[component] = 1.0;
             }
         }
-        let known = Known {
-            of_given,
-            covariance: [[0.0; M]; M],
-            information: [[0.0; G]; G],
+        let begin = Point {
+            event: Event::Begin,
+            next: None,
+            beside: None,
+            gain: None,
         };
         Self {
             models: Vec::new(),
-            points: vec![Point {
-                event: Event::Begin,
-                gain: None,
-                known,
+            points: vec![begin],
+            gains: Vec::new(),
+            known: vec![Known {
+                of_given,
+                covariance: [[0.0; M]; M],
+                information: [[0.0; G]; G],
             }],
         }
     }
 
-    /// Forgets everything where models have become too many.
+    /// Forgets everything where that is too much.
     pub fn tidy(&mut self) {
-        if self.models.len() > MOST_MODELS {
+        if size_of_val(&*self.known) + size_of_val(&*self.gains) > MOST {
             self.models.clear();
+            self.gains.clear();
             self.points.truncate(1);
+            self.points[Self::BEGIN].next = None;
+            self.known.truncate(1);
         }
     }
 
@@ -118,53 +128,65 @@ impl<const M: usize, const G: usize> Courses<M, G> {
 
     /// What is known at a point.
     pub fn known(&self, point: usize) -> &Known<M, G> {
-        &self.points[point].known
+        &self.known[point]
     }
 
     /// How the observation of a point was taken in.
     pub fn gain(&self, point: usize) -> Option<&Gain<M, G>> {
-        self.points[point].gain.as_ref()
+        self.points[point].gain.map(|gain| &self.gains[gain])
     }
 
     /// Where a step leads.
     pub fn step(&mut self, from: usize, model: usize) -> usize {
         let event = Event::Step(model);
-        if !self.follows(from, event) {
-            let mut known = self.known(from).clone();
-            known.propagate(&self.models[model]);
-            let gain = None;
-            self.points.push(Point { event, gain, known });
-        }
-        from + 1
+        self.reached(from, event).unwrap_or_else(|| {
+            let known = self.known[from].propagated(&self.models[model]);
+            self.lead(from, event, None, known)
+        })
     }
 
     /// Where it leads to take in three navigation errors from a state on, observed with this variance each; `None`
     /// where their covariance is not positive definite.
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);
-        if !self.follows(from, event) {
-            let mut known = self.known(from).clone();
+        self.reached(from, event).or_else(|| {
+            let mut known = self.known[from].clone();
             let gain = known.gain(state, variance)?;
             known.tell(&gain);
-            let gain = Some(gain);
-            self.points.push(Point { event, gain, known });
-        }
-        Some(from + 1)
+            self.gains.push(gain);
+            Some(self.lead(from, event, Some(self.gains.len() - 1), known))
+        })
     }
 
-    /// Whether this followed a point before; if not, another course begins there.
-    fn follows(&mut self, point: usize, event: Event) -> bool {
-        let next = self.points.get(point + 1);
-        let same = next.is_some_and(|next| next.event == event);
-        if !same {
-            self.points.truncate(point + 1);
-        }
-        same
+    /// Where an event led before.
+    fn reached(&self, from: usize, event: Event) -> Option<usize> {
+        let beside = |&point: &usize| self.points[point].beside;
+        let mut followers = std::iter::successors(self.points[from].next, beside);
+        followers.find(|&point| self.points[point].event == event)
+    }
+
+    fn lead(
+        &mut self,
+        from: usize,
+        event: Event,
+        gain: Option<usize>,
+        known: Known<M, G>,
+    ) -> usize {
+        let number = self.points.len();
+        let beside = self.points[from].next.replace(number);
+        self.points.push(Point {
+            event,
+            next: None,
+            beside,
+            gain,
+        });
+        self.known.push(known);
+        number
     }
 }
 
 impl<const M: usize, const G: usize> Known<M, G> {
-    fn propagate(&mut self, model: &StepModel<M>) {
+    fn propagated(&self, model: &StepModel<M>) -> Self {
         let mut of_given = [[0.0; G]; M];
         let mut half = [[0.0; M]; M];
         for &(row, column, phi) in &model.transition {
@@ -180,8 +202,11 @@ impl<const M: usize, const G: usize> Known<M, G> {
                 sum[at] += phi * half[row][column];
             }
         }
-        self.of_given = of_given;
-        self.covariance = covariance;
+        Self {
+            of_given,
+            covariance,
+            information: self.information,
+        }
     }
 
     fn gain(&self, state: usize, variance: f64) -> Option<Gain<M, G>> {

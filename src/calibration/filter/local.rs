@@ -123,6 +123,14 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         self.given.take(&look.unexpected);
     }
 
+    /// Takes an observation into covariances alone; `None` if its own is not positive definite.
+    pub fn tell(&mut self, observed: &Observed) -> Option<()> {
+        self.at = self
+            .courses
+            .observe(self.at, observed.state, observed.variance)?;
+        Some(())
+    }
+
     pub fn outcome(self) -> Outcome {
         let known = self.courses.known(self.at);
         let rows = factor(known.information, self.vector);

@@ -31,6 +31,12 @@ pub trait Observer {
     /// Of each component.
     fn variance(&self, seen: &Seen) -> f64;
     fn judge(&mut self, innovations: Innovations) -> Verdict;
+
+    /// The verdict on the next observation where it is known and covariances alone are wanted: its innovation is
+    /// not worked out, nor what it does to the mean.
+    fn foregone(&mut self) -> Option<Verdict> {
+        None
+    }
 }
 
 /// What a part of a dwell did.
@@ -119,6 +125,12 @@ impl Filter {
                     residual: seen.residual,
                     variance: observer.variance(seen),
                 };
+                if let Some(verdict) = observer.foregone() {
+                    if verdict == Verdict::Accepted && local.tell(&observed).is_none() {
+                        return Taken::Diverged;
+                    }
+                    continue;
+                }
                 let Some(look) = local.look(&observed) else {
                     return Taken::Diverged;
                 };

@@ -32,13 +32,12 @@ pub struct Moves {
 }
 
 /// A replay's innovations.
+#[derive(Default)]
 pub struct Replay {
     /// Of observations that were let in, in order.
     pub scalars: Vec<ScalarInnovation>,
     /// Squared whitened innovation of every observation of three components, let in or not.
     pub distances: Vec<f64>,
-    /// Of the parameters of both triads at the end.
-    pub covariance: ParameterMatrix,
 }
 
 impl Replay {
@@ -88,90 +87,101 @@ impl<'a> Script<'a> {
     /// The filter's pass with the noise of a problem's model. `accepted` tells of each observation of
     /// three components whether it is let in; those beyond its end are.
     pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
+        let mut replay = Replay::default();
+        self.follow(problem, accepted, Some(&mut replay))?;
+        Ok(replay)
+    }
+
+    /// Covariance of the parameters of both triads at the end of such a pass.
+    pub fn covariance(
+        &self,
+        problem: &Problem,
+        accepted: &[bool],
+    ) -> Result<ParameterMatrix, CalibrationError> {
+        let filter = self.follow(problem, accepted, None)?;
+        Ok(filter.parameter_covariance())
+    }
+
+    fn follow(
+        &self,
+        problem: &Problem,
+        accepted: &[bool],
+        mut replay: Option<&mut Replay>,
+    ) -> Result<Filter, CalibrationError> {
         let model = &problem.model;
-        let filter = Filter::new(model, &PriorErrors::at(model, self.at));
-        let mut pass = Pass {
-            model,
-            accepted,
-            dwells: Dwells::of(&filter),
-            filter,
-            replay: Replay {
-                scalars: Vec::new(),
-                distances: Vec::new(),
-                covariance: ParameterMatrix::zeros(),
-            },
-        };
+        let mut filter = Filter::new(model, &PriorErrors::at(model, self.at));
+        let mut dwells = Dwells::of(&filter);
+        let mut accepted = accepted.iter();
         let mut before = None;
         let stretches = problem.stretches().iter().zip(self.priors);
         let of_each = self.events.iter().zip(&self.at.initial_attitudes);
         for ((stretch, prior), (events, initial)) in stretches.zip(of_each) {
             let start = stretch.start(prior, initial);
-            begin(&mut pass.filter, model, before, stretch, &start, self.at);
+            begin(&mut filter, model, before, stretch, &start, self.at);
             before = Some(stretch);
+            let mut decided = Decided {
+                model,
+                stretch,
+                accepted: &mut accepted,
+                replay: replay.as_deref_mut(),
+            };
             for event in events {
-                pass.take_in(stretch, event)?;
+                let of = (&mut filter, &mut dwells);
+                let taken = event.take_in(of, (model, stretch), &mut decided);
+                if taken != Taken::Whole || !decided.is_finite() {
+                    return Err(CalibrationError::Diverged { time: event.end() });
+                }
             }
         }
-        pass.replay.covariance = pass.filter.parameter_covariance();
-        Ok(pass.replay)
-    }
-}
-
-/// A replay of one stretch after the other.
-struct Pass<'a> {
-    model: &'a Model,
-    accepted: &'a [bool],
-    filter: Filter,
-    dwells: Dwells,
-    replay: Replay,
-}
-
-impl Pass<'_> {
-    fn take_in(&mut self, stretch: &Stretch, event: &Event) -> Result<(), CalibrationError> {
-        let mut decided = Decided {
-            stretch,
-            model: self.model,
-            accepted: self.accepted,
-            replay: &mut self.replay,
-        };
-        let filter = (&mut self.filter, &mut self.dwells);
-        let taken = event.take_in(filter, (self.model, stretch), &mut decided);
-        let last = self.replay.distances.last();
-        match taken {
-            Taken::Whole if last.is_none_or(|distance| distance.is_finite()) => Ok(()),
-            _ => Err(CalibrationError::Diverged { time: event.end() }),
-        }
+        Ok(filter)
     }
 }
 
 /// Lets in what was decided before.
-struct Decided<'a> {
-    stretch: &'a Stretch<'a>,
+struct Decided<'a, 'b> {
     model: &'a Model,
-    accepted: &'a [bool],
-    replay: &'a mut Replay,
+    stretch: &'a Stretch<'a>,
+    accepted: &'a mut std::slice::Iter<'b, bool>,
+    /// Where innovations go; none where covariances alone are wanted.
+    replay: Option<&'a mut Replay>,
 }
 
-impl Observer for Decided<'_> {
+impl Decided<'_, '_> {
+    fn verdict(&mut self) -> Verdict {
+        match self.accepted.next() {
+            Some(false) => Verdict::Rejected,
+            _ => Verdict::Accepted,
+        }
+    }
+
+    /// Whether the last innovation is.
+    fn is_finite(&self) -> bool {
+        let replay = self.replay.as_deref();
+        let last = replay.and_then(|replay| replay.distances.last());
+        last.is_none_or(|distance| distance.is_finite())
+    }
+}
+
+impl Observer for Decided<'_, '_> {
     fn variance(&self, seen: &Seen) -> f64 {
         self.stretch
             .observation_variance(self.model, seen.kind, seen.readings)
     }
 
+    fn foregone(&mut self) -> Option<Verdict> {
+        self.replay.is_none().then(|| self.verdict())
+    }
+
     fn judge(&mut self, innovations: Innovations) -> Verdict {
-        let Replay {
-            scalars, distances, ..
-        } = &mut *self.replay;
-        let accepted = self.accepted.get(distances.len()).copied().unwrap_or(true);
-        let three = innovations.scalars;
-        let squares = three.map(|s| s.innovation.powi(2) / s.variance);
-        distances.push(squares.iter().sum());
-        match accepted {
-            true => {
-                scalars.extend(three);
-                Verdict::Accepted
+        let verdict = self.verdict();
+        if let Some(replay) = &mut self.replay {
+            let three = innovations.scalars;
+            let squares = three.map(|s| s.innovation.powi(2) / s.variance);
+            replay.distances.push(squares.iter().sum());
+            if verdict == Verdict::Accepted {
+                replay.scalars.extend(three);
             }
-            false => Verdict::Rejected,
         }
+        verdict
     }
 }
