@@ -148,14 +148,18 @@ impl Problem<'_> {
             .collect();
         all.insert(BudgetSource::Pulses);
         for sensor in Sensor::ALL {
-            all.extend([BudgetSource::white(sensor), BudgetSource::at_rest(sensor)]);
+            all.insert(BudgetSource::white(sensor));
             if *model.motion_noise.get(sensor) != MotionNoise::default() {
                 all.insert(BudgetSource::moves(sensor));
             }
         }
+        all.insert(BudgetSource::VelocityAtRest);
         match model.aiding {
             Aiding::Table => all.insert(BudgetSource::TableReading),
-            Aiding::Velocity => all.insert(BudgetSource::Turning),
+            Aiding::Velocity => {
+                all.insert(BudgetSource::AttitudeAtRest);
+                all.insert(BudgetSource::Turning)
+            }
         };
         let bridged = |run: &Run| {
             let imu = &run.recording.imu;

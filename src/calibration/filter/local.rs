@@ -33,7 +33,8 @@ pub struct Local<'a, const M: usize, const G: usize> {
     mean: [f64; M],
     /// Rows of `g` times what they measured, summed.
     vector: [f64; G],
-    given: Given<G>,
+    /// None where covariances alone are wanted: means and innovations are not worked out then.
+    given: Option<Given<G>>,
 }
 
 /// An innovation, and what taking it in needs.
@@ -60,7 +61,7 @@ pub(in crate::calibration) struct Outcome {
 }
 
 impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
-    pub fn new(given: Given<G>, courses: &'a mut Courses<M, G>) -> Self {
+    pub fn new(given: Option<Given<G>>, courses: &'a mut Courses<M, G>) -> Self {
         Self {
             courses,
             at: Courses::<M, G>::BEGIN,
@@ -77,6 +78,9 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
 
     pub fn propagate(&mut self, model: usize) {
         self.at = self.courses.step(self.at, model);
+        if self.given.is_none() {
+            return;
+        }
         let mut mean = [0.0; M];
         for &(row, column, phi) in &self.courses.model(model).transition {
             mean[row] += phi * self.mean[column];
@@ -94,7 +98,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         let Gain { root, rows, .. } = self.courses.gain(to)?;
         let expected = Vector3::from_fn(|axis, _| self.mean[observed.state + axis]);
         let residual = root.solve_lower_triangular(&(observed.residual - expected))?;
-        let unexpected = self.given.look(rows, &residual)?;
+        let unexpected = self.given.as_ref()?.look(rows, &residual)?;
         let scalars = [0, 1, 2].map(|k| {
             let sigma = root[(k, k)] * unexpected.root[(k, k)];
             ScalarInnovation {
@@ -120,7 +124,9 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
                 add(&mut self.vector, look.residual[k], &gain.rows[k]);
             }
         }
-        self.given.take(&look.unexpected);
+        if let Some(given) = &mut self.given {
+            given.take(&look.unexpected);
+        }
     }
 
     /// Takes an observation into covariances alone; `None` if its own is not positive definite.

@@ -32,10 +32,14 @@ pub trait Observer {
     fn variance(&self, seen: &Seen) -> f64;
     fn judge(&mut self, innovations: Innovations) -> Verdict;
 
-    /// The verdict on the next observation where it is known and covariances alone are wanted: its innovation is
-    /// not worked out, nor what it does to the mean.
-    fn foregone(&mut self) -> Option<Verdict> {
-        None
+    /// Whether covariances alone are wanted and verdicts known: innovations are not worked out then, nor means.
+    fn knows(&self) -> bool {
+        false
+    }
+
+    /// The verdict that is known on the next observation.
+    fn foregone(&mut self) -> Verdict {
+        Verdict::Accepted
     }
 }
 
@@ -64,7 +68,8 @@ impl Filter {
         courses.tidy();
         let models = self.models(segment, courses);
         let across = &map.given.states * &self.p;
-        let mut local = Local::new(self.given(&map.given, &across), courses);
+        let given = (!observer.knows()).then(|| self.given(&map.given, &across));
+        let mut local = Local::new(given, courses);
         match self.through(&mut local, (segment, &models), observer) {
             Taken::Whole => {}
             other => return other,
@@ -125,8 +130,9 @@ impl Filter {
                     residual: seen.residual,
                     variance: observer.variance(seen),
                 };
-                if let Some(verdict) = observer.foregone() {
-                    if verdict == Verdict::Accepted && local.tell(&observed).is_none() {
+                if observer.knows() {
+                    let accepted = observer.foregone() == Verdict::Accepted;
+                    if accepted && local.tell(&observed).is_none() {
                         return Taken::Diverged;
                     }
                     continue;

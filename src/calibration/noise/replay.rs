@@ -168,8 +168,12 @@ impl Observer for Decided<'_, '_> {
             .observation_variance(self.model, seen.kind, seen.readings)
     }
 
-    fn foregone(&mut self) -> Option<Verdict> {
-        self.replay.is_none().then(|| self.verdict())
+    fn knows(&self) -> bool {
+        self.replay.is_none()
+    }
+
+    fn foregone(&mut self) -> Verdict {
+        self.verdict()
     }
 
     fn judge(&mut self, innovations: Innovations) -> Verdict {
