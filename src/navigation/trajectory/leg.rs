@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::{Change, Segment, Start};
+use super::segment::{Change, Segment, Start};
 use crate::attitude::from_pitch_roll_heading;
 use crate::navigation::{Instant, Solution};
 use crate::turntable::{Profile, Turned};
