@@ -21,6 +21,7 @@
 use super::budget::source::BudgetSource;
 use super::model::Model;
 use super::parameters::PARAMETERS;
+use super::parameters::auxiliary::OF_AXES;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::several::thermal::Coefficient;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS, Term};
@@ -58,8 +59,23 @@ pub struct Layout {
     base: Vec<usize>,
     /// The error of the table's axes that each state is.
     axes: Vec<usize>,
-    /// Auxiliary parameters that are no states but tried.
-    tried: Vec<usize>,
+    /// Constants that are no states: the filter carries what they do to it.
+    columns: Vec<Constant>,
+}
+
+/// What is the same throughout a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Constant {
+    /// A parameter of both triads, by its index.
+    Parameter(usize),
+    /// A parameter of the error terms, by its index.
+    Term(usize),
+    Thermal(Coefficient),
+    Gravity,
+    /// An error of the table's base, by its axis.
+    Base(usize),
+    /// An error of the table's axes, by its index.
+    Axis(usize),
 }
 
 impl Layout {
@@ -92,31 +108,61 @@ impl Layout {
             axes: (0..AXIS_ERRORS)
                 .filter(|&k| model.geometry.axes[k] > 0.0)
                 .collect(),
-            tried: Vec::new(),
+            columns: Vec::new(),
         }
     }
 
-    /// The same with auxiliary parameters, in their order, that are no states but tried.
+    /// The same with auxiliary parameters, in their order, as columns.
     pub fn trying(mut self, auxiliary: &[usize]) -> Self {
-        self.tried = auxiliary.to_vec();
+        let constant = |&index: &usize| match index.checked_sub(TABLE_GEOMETRY) {
+            Some(term) => Constant::Term(term),
+            None if index < OF_AXES => Constant::Base(index),
+            None => Constant::Axis(index - OF_AXES),
+        };
+        self.columns = auxiliary.iter().map(constant).collect();
         self
     }
 
-    /// Number of auxiliary parameters that are tried.
-    pub fn tried(&self) -> usize {
-        self.tried.len()
+    /// The same with all constants as columns, those that are states first: the filter is left with what moves and
+    /// what is drawn anew.
+    pub fn reduced(mut self) -> Self {
+        let base = self.base.iter().map(|&axis| Constant::Base(axis));
+        let axes = self.axes.iter().map(|&k| Constant::Axis(k));
+        let states: Vec<Constant> = self.driving().chain(base).chain(axes).collect();
+        self.columns.splice(0..0, states);
+        self.parameters.clear();
+        self.terms.clear();
+        self.thermal.clear();
+        self.gravity = false;
+        self.base.clear();
+        self.axes.clear();
+        self
     }
 
-    /// Number among those tried and index among [`TERM_PARAMETERS`] of each parameter of the error terms.
-    pub fn tried_terms(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let tried = self.tried.iter().enumerate();
-        tried.filter_map(|(k, &index)| Some((k, index.checked_sub(TABLE_GEOMETRY)?)))
+    /// The constants that are states and drive navigation errors, in their order.
+    pub fn driving(&self) -> impl Iterator<Item = Constant> + '_ {
+        let parameters = self
+            .parameters
+            .iter()
+            .map(|&index| Constant::Parameter(index));
+        let terms = self.terms.iter().map(|&index| Constant::Term(index));
+        let thermal = self.thermal.iter().map(|&of| Constant::Thermal(of));
+        let gravity = self.gravity.then_some(Constant::Gravity);
+        parameters.chain(terms).chain(thermal).chain(gravity)
     }
 
-    /// Number among those tried and index among [`TABLE_GEOMETRY`] of each error of the table.
-    pub fn tried_of_table(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let tried = self.tried.iter().copied().enumerate();
-        tried.filter(|&(_, index)| index < TABLE_GEOMETRY)
+    /// Constants that are no states.
+    pub fn columns(&self) -> &[Constant] {
+        &self.columns
+    }
+
+    /// The parameters of the error terms that are states or columns.
+    pub fn terms_on(&self) -> impl Iterator<Item = usize> + '_ {
+        let columns = self.columns.iter().filter_map(|column| match column {
+            Constant::Term(index) => Some(*index),
+            _ => None,
+        });
+        self.terms.iter().copied().chain(columns)
     }
 
     /// Number of states.

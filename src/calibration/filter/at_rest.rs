@@ -6,7 +6,7 @@ use super::Filter;
 use super::courses::StepModel;
 use super::given::Given;
 use super::linear::Linear;
-use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::layout::{ATTITUDE, Constant, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::segment::Segment;
 use crate::navigation::Block;
 
@@ -55,11 +55,9 @@ impl Filter {
                 }
             }
         }
-        let on = self.layout.terms().count();
-        for ((k, _), term) in self.layout.tried_terms().zip(&block.terms[on..]) {
-            let column = std::array::from_fn(|row| term.column[row]);
+        for (k, column) in self.column_effects(block).enumerate() {
             for (row, rate) in rates(block, &column).into_iter().enumerate() {
-                given.tried[(first + row, k)] = rate;
+                given.columns[(first + row, k)] = rate;
             }
         }
         // What the table's attitude does to `g`.
@@ -92,10 +90,11 @@ impl Filter {
                     table.states[(axis, state)] = response[(axis, k)];
                 }
             }
-            for (number, index) in self.layout.tried_of_table() {
-                table.tried[(axis, number)] = match index.checked_sub(3) {
-                    None => f64::from(index == axis),
-                    Some(k) => response.map_or(0.0, |response| response[(axis, k)]),
+            for (k, constant) in self.layout.columns().iter().enumerate() {
+                table.columns[(axis, k)] = match constant {
+                    Constant::Base(of) => f64::from(*of == axis),
+                    Constant::Axis(of) => response.map_or(0.0, |response| response[(axis, *of)]),
+                    _ => 0.0,
                 };
             }
         }

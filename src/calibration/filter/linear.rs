@@ -2,18 +2,18 @@
 
 use nalgebra::DMatrix;
 
-/// Quantities that are linear in the errors, a row each: by state, and by parameter that is tried.
+/// Quantities that are linear in the errors, a row each: by state, and by constant that is no state.
 #[derive(Debug)]
 pub struct Linear {
     pub states: DMatrix<f64>,
-    pub tried: DMatrix<f64>,
+    pub columns: DMatrix<f64>,
 }
 
 impl Linear {
-    pub fn zeros(rows: usize, states: usize, tried: usize) -> Self {
+    pub fn zeros(rows: usize, states: usize, columns: usize) -> Self {
         Self {
             states: DMatrix::zeros(rows, states),
-            tried: DMatrix::zeros(rows, tried),
+            columns: DMatrix::zeros(rows, columns),
         }
     }
 
@@ -21,7 +21,7 @@ impl Linear {
     pub fn combined(&self, weights: &DMatrix<f64>) -> Self {
         Self {
             states: weights * &self.states,
-            tried: weights * &self.tried,
+            columns: weights * &self.columns,
         }
     }
 
@@ -30,7 +30,7 @@ impl Linear {
         let count = others.states.nrows();
         let mut rows = self.states.rows_mut(first, count);
         rows += &others.states;
-        let mut rows = self.tried.rows_mut(first, count);
-        rows += &others.tried;
+        let mut rows = self.columns.rows_mut(first, count);
+        rows += &others.columns;
     }
 }

@@ -112,7 +112,7 @@ impl Filter {
     /// The same with auxiliary parameters that are no states but tried.
     pub fn trying(mut self, auxiliary: &[usize]) -> Self {
         self.layout = self.layout.trying(auxiliary);
-        let tried = self.layout.tried();
+        let tried = self.layout.columns().len();
         self.sensitivity = (tried > 0).then(|| Sensitivity::new(tried, self.x.len()));
         self
     }

@@ -4,10 +4,10 @@ use nalgebra::DMatrix;
 
 use super::Filter;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::layout::{ATTITUDE, NAVIGATION};
-use crate::calibration::parameters::sensor_and_parameter;
+use crate::calibration::layout::{ATTITUDE, Constant, NAVIGATION};
+use crate::calibration::parameters::{ParameterVector, parameter, sensor_and_parameter};
 use crate::calibration::several::day_to_day::OwnState;
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix};
 
 impl Filter {
@@ -40,25 +40,20 @@ impl Filter {
                 (None, _) => f64::from(moving[row] == k),
             }
         });
-        let on = self.layout.terms().count();
-        let mut tried = DMatrix::zeros(self.layout.tried(), MOVING);
-        for ((k, _), term) in self.layout.tried_terms().zip(&block.terms[on..]) {
-            for place in 0..MOVING {
-                tried[(k, place)] = term.column[own(place)];
-            }
-        }
-        self.carry(&moving, transition, &noise, &tried);
+        let columns: Vec<_> = self.column_effects(block).collect();
+        let added = DMatrix::from_fn(columns.len(), MOVING, |k, place| columns[k][own(place)]);
+        self.carry(&moving, transition, &noise, &added);
     }
 
     /// Only the rows of Φ of the states that move differ from identity. Of `Φ P Φᵀ + Q` only their rows and
-    /// columns change. `transition` holds these rows, a column for each of the first states; `tried` what
-    /// parameters that are tried add, a row each.
+    /// columns change. `transition` holds these rows, a column for each of the first states; `added` what
+    /// constants that are no states add, a row each.
     pub fn carry(
         &mut self,
         moving: &[usize],
         transition: DMatrix<f64>,
         noise: &DMatrix<f64>,
-        tried: &DMatrix<f64>,
+        added: &DMatrix<f64>,
     ) {
         let first = transition.ncols();
         let x = &transition * self.x.rows(0, first);
@@ -75,7 +70,7 @@ impl Filter {
             }
         }
         if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.propagate(moving, &transition, tried);
+            sensitivity.propagate(moving, &transition, added);
         }
     }
 
@@ -107,60 +102,70 @@ impl Filter {
 
     /// What navigation errors, and each state that drives them, make of the navigation errors.
     pub fn driving_columns(&self, block: &Block) -> Vec<[f64; NAVIGATION]> {
-        let PerSensor { gyro, accel } = &*block.parameters;
-        let of_triad = |sensor: Sensor, parameter: usize| match sensor {
-            Sensor::Gyro => gyro.column(parameter),
-            Sensor::Accel => accel.column(parameter),
-        };
-        let of_parameter = |index: usize| {
-            let (sensor, parameter) = sensor_and_parameter(index);
-            of_triad(sensor, parameter)
-        };
-        // On an instrument that is turned, parameters do what those of the turned one do that they change.
-        let of_turned = |direction: &[f64], row: usize| -> f64 {
-            let of = |(index, by): (usize, &f64)| of_parameter(index)[row] * by;
-            direction.iter().enumerate().map(of).sum()
-        };
-        let of_common = |index: usize, row: usize| match &self.turned {
-            Some(turned) => of_turned(turned.by_parameters.column(index).as_slice(), row),
-            None => of_parameter(index)[row],
-        };
-        let mut columns: Vec<[f64; NAVIGATION]> = Vec::with_capacity(self.x.len());
-        let mut add = |column: &dyn Fn(usize) -> f64| columns.push(std::array::from_fn(column));
-        for column in block.navigation.column_iter() {
-            add(&|row| column[row]);
-        }
-        for (_, index) in self.layout.parameters() {
-            add(&|row| of_common(index, row));
-        }
-        for term in block.terms.iter().take(self.layout.terms().count()) {
-            add(&|row| term.column[row]);
-        }
-        for (_, coefficient) in self.layout.thermal() {
-            let weight = block.thermal.as_ref();
-            let weight = weight.map_or(0.0, |state| coefficient.weight(state));
-            let column = of_triad(coefficient.sensor, coefficient.parameter);
-            add(&|row| column[row] * weight);
-        }
-        if self.layout.gravity().is_some() {
-            add(&|row| block.gravity[row]);
-        }
+        let layout = &self.layout;
+        let navigation = block.navigation.column_iter();
+        let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
+        let constants = layout
+            .driving()
+            .map(|constant| self.effect(block, constant));
         // A bias does the same whether it varies or stays.
-        for (_, sensor, constant) in self.layout.varying_biases() {
-            add(&|row| of_triad(sensor, constant)[row]);
-        }
-        for (_, own) in self.layout.own() {
-            match own {
-                OwnState::Parameter(index) => add(&|row| of_common(index, row)),
-                OwnState::Mounting(axis) => {
-                    let turned = self.turned.as_ref();
-                    let direction = turned.map(|turned| turned.by_mounting.column(axis));
-                    let direction = direction.as_ref().map_or(&[][..], |d| d.as_slice());
-                    add(&|row| of_turned(direction, row));
-                }
+        let varying = layout.varying_biases().map(|(_, sensor, constant)| {
+            let columns = block.parameters.get(sensor);
+            std::array::from_fn(|row| columns[(row, constant)])
+        });
+        let own = layout.own().map(|(_, own)| match own {
+            OwnState::Parameter(index) => self.effect(block, Constant::Parameter(index)),
+            OwnState::Mounting(axis) => {
+                let turned = self.turned.as_ref();
+                let by_axis = turned.map(|turned| turned.by_mounting.column(axis).into_owned());
+                by_axis.map_or([0.0; NAVIGATION], |by_axis| of_parameters(block, &by_axis))
             }
+        });
+        navigation
+            .chain(constants)
+            .chain(varying)
+            .chain(own)
+            .collect()
+    }
+
+    /// The same of each constant that is no state.
+    pub fn column_effects<'a>(
+        &'a self,
+        block: &'a Block,
+    ) -> impl Iterator<Item = [f64; NAVIGATION]> + 'a {
+        let columns = self.layout.columns().iter();
+        columns.map(|&constant| self.effect(block, constant))
+    }
+
+    /// What a constant makes of the navigation errors.
+    fn effect(&self, block: &Block, constant: Constant) -> [f64; NAVIGATION] {
+        match constant {
+            Constant::Parameter(index) => match &self.turned {
+                // On an instrument that is turned, it does what those of the turned one do that it changes.
+                Some(turned) => {
+                    of_parameters(block, &turned.by_parameters.column(index).into_owned())
+                }
+                None => {
+                    let (sensor, parameter) = sensor_and_parameter(index);
+                    let columns = block.parameters.get(sensor);
+                    std::array::from_fn(|row| columns[(row, parameter)])
+                }
+            },
+            Constant::Term(index) => {
+                let term = block.terms.iter().find(|term| term.parameter == index);
+                term.map_or([0.0; NAVIGATION], |term| {
+                    std::array::from_fn(|row| term.column[row])
+                })
+            }
+            Constant::Thermal(coefficient) => {
+                let weight = block.thermal.as_ref();
+                let weight = weight.map_or(0.0, |state| coefficient.weight(state));
+                let columns = block.parameters.get(coefficient.sensor);
+                std::array::from_fn(|row| columns[(row, coefficient.parameter)] * weight)
+            }
+            Constant::Gravity => std::array::from_fn(|row| block.gravity[row]),
+            Constant::Base(_) | Constant::Axis(_) => [0.0; NAVIGATION],
         }
-        columns
     }
 
     /// Varying biases forget as time goes by, and are driven.
@@ -178,4 +183,14 @@ impl Filter {
             self.p[(state, state)] += driven * (1.0 - keep * keep);
         }
     }
+}
+
+/// What a change of the parameters of both triads makes of the navigation errors.
+fn of_parameters(block: &Block, change: &ParameterVector) -> [f64; NAVIGATION] {
+    let of = |sensor: Sensor| {
+        let change = change.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
+        block.parameters.get(sensor) * change
+    };
+    let sum = of(Sensor::Gyro) + of(Sensor::Accel);
+    std::array::from_fn(|row| sum[row])
 }

@@ -64,7 +64,7 @@ impl Sensitivity {
         gain: &DMatrix<f64>,
         (whiten, whitened): (&DMatrix<f64>, &DVector<f64>),
     ) {
-        let sensed = &h.states * self.of_states.transpose() + &h.tried;
+        let sensed = &h.states * self.of_states.transpose() + &h.columns;
         self.of_states
             .gemm(-1.0, &sensed.transpose(), &gain.transpose(), 1.0);
         let last = sensed.ncols();

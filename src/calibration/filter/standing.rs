@@ -162,7 +162,7 @@ impl Filter {
         for axis in 0..3 {
             end.states[(POSITION + axis, POSITION + axis)] += 1.0;
         }
-        let added = end.tried.transpose();
+        let added = end.columns.transpose();
         self.carry(moving, end.states, &outcome.covariance, &added);
         for (&state, offset) in moving.iter().zip(outcome.offset.iter()) {
             self.x[state] += offset;

@@ -9,7 +9,7 @@ use super::measurement::Measurement;
 impl Filter {
     /// So many quantities that no error does anything to.
     pub fn none(&self, rows: usize) -> Linear {
-        Linear::zeros(rows, self.x.len(), self.layout.tried())
+        Linear::zeros(rows, self.x.len(), self.layout.columns().len())
     }
 
     /// Takes in a measurement.

@@ -205,8 +205,7 @@ fn navigator<'a>(
     (model, layout): (&Model, &Layout),
 ) -> Result<Navigator<'a>, CalibrationError> {
     let run = stretch.run;
-    let tried = layout.tried_terms();
-    let on = layout.terms().chain(tried).map(|(_, index)| index);
+    let on = layout.terms_on();
     let start = State::at_rest(*initial);
     let triads = at.in_recording(stretch.recording);
     let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, start);

@@ -336,7 +336,7 @@ impl Filter {
                     });
                     let row = Linear {
                         states: DMatrix::from_row_slice(1, h.len(), h.as_slice()),
-                        tried: DMatrix::zeros(1, 0),
+                        columns: DMatrix::zeros(1, 0),
                     };
                     let value = DVector::from_element(1, z);
                     let across = &row.states * &self.p;
