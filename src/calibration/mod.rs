@@ -7,6 +7,7 @@
 mod checks;
 mod filter;
 mod record;
+mod reduction;
 mod several;
 mod start;
 

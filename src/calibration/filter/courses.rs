@@ -57,6 +57,8 @@ pub struct Gain<const M: usize, const G: usize> {
     pub rows: [[f64; G]; 3],
     /// What the whitened observation gains of the navigation errors.
     pub of_errors: [[f64; M]; 3],
+    /// Logarithm of the determinant of its covariance.
+    pub log_determinant: f64,
 }
 
 /// What is known of navigation errors `U g + m` where `g` is given, and of `g`.
@@ -219,6 +221,7 @@ impl<const M: usize, const G: usize> Known<M, G> {
         whiten(&root, &mut rows);
         whiten(&root, &mut of_errors);
         Some(Gain {
+            log_determinant: 2.0 * root.diagonal().map(f64::ln).sum(),
             root,
             rows,
             of_errors,

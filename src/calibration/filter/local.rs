@@ -33,7 +33,10 @@ pub struct Local<'a, const M: usize, const G: usize> {
     mean: [f64; M],
     /// Rows of `g` times what they measured, summed.
     vector: [f64; G],
-    /// None where covariances alone are wanted: means and innovations are not worked out then.
+    /// Of what was observed, given `g = 0`: squares, and logarithm of the determinant of its covariance.
+    squares: f64,
+    log_determinant: f64,
+    /// What is known of `g`; none where innovations are not asked for.
     given: Option<Given<G>>,
 }
 
@@ -54,6 +57,9 @@ pub(in crate::calibration) struct Outcome {
     pub measured: DMatrix<f64>,
     /// … and what each measures, of σ 1.
     pub values: DVector<f64>,
+    /// Squares of what was observed that `g` has no part in, and logarithm of the determinant of its covariance.
+    pub squares: f64,
+    pub log_determinant: f64,
     /// Navigation errors at the end: rows of `g`, offset, covariance.
     pub of_given: DMatrix<f64>,
     pub offset: DVector<f64>,
@@ -67,6 +73,8 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
             at: Courses::<M, G>::BEGIN,
             mean: [0.0; M],
             vector: [0.0; G],
+            squares: 0.0,
+            log_determinant: 0.0,
             given,
         }
     }
@@ -78,9 +86,6 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
 
     pub fn propagate(&mut self, model: usize) {
         self.at = self.courses.step(self.at, model);
-        if self.given.is_none() {
-            return;
-        }
         let mut mean = [0.0; M];
         for &(row, column, phi) in &self.courses.model(model).transition {
             mean[row] += phi * self.mean[column];
@@ -92,12 +97,8 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     // A look is half a kilobyte, which would be copied on its way out.
     #[inline(always)]
     pub fn look(&mut self, observed: &Observed) -> Option<Look<G>> {
-        let to = self
-            .courses
-            .observe(self.at, observed.state, observed.variance)?;
+        let (to, residual) = self.whitened(observed)?;
         let Gain { root, rows, .. } = self.courses.gain(to)?;
-        let expected = Vector3::from_fn(|axis, _| self.mean[observed.state + axis]);
-        let residual = root.solve_lower_triangular(&(observed.residual - expected))?;
         let unexpected = self.given.as_ref()?.look(rows, &residual)?;
         let scalars = [0, 1, 2].map(|k| {
             let sigma = root[(k, k)] * unexpected.root[(k, k)];
@@ -114,36 +115,59 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
         })
     }
 
+    /// Where it leads to take an observation in, and the observation, whitened, given `g = 0`.
+    #[inline(always)]
+    fn whitened(&mut self, observed: &Observed) -> Option<(usize, Vector3<f64>)> {
+        let Observed {
+            state,
+            residual,
+            variance,
+        } = *observed;
+        let to = self.courses.observe(self.at, state, variance)?;
+        let expected = Vector3::from_fn(|axis, _| self.mean[state + axis]);
+        let root = &self.courses.gain(to)?.root;
+        Some((to, root.solve_lower_triangular(&(residual - expected))?))
+    }
+
     /// Takes an innovation in.
     #[inline]
     pub fn take(&mut self, look: &Look<G>) {
-        self.at = look.to;
-        if let Some(gain) = self.courses.gain(look.to) {
-            for k in 0..3 {
-                add(&mut self.mean, look.residual[k], &gain.of_errors[k]);
-                add(&mut self.vector, look.residual[k], &gain.rows[k]);
-            }
-        }
+        self.add(look.to, &look.residual);
         if let Some(given) = &mut self.given {
             given.take(&look.unexpected);
         }
     }
 
-    /// Takes an observation into covariances alone; `None` if its own is not positive definite.
+    /// Takes an observation in without asking for its innovation; `None` as of [`Self::look`].
     pub fn tell(&mut self, observed: &Observed) -> Option<()> {
-        self.at = self
-            .courses
-            .observe(self.at, observed.state, observed.variance)?;
+        let (to, residual) = self.whitened(observed)?;
+        self.add(to, &residual);
         Some(())
+    }
+
+    #[inline]
+    fn add(&mut self, to: usize, residual: &Vector3<f64>) {
+        self.at = to;
+        self.squares += residual.norm_squared();
+        if let Some(gain) = self.courses.gain(to) {
+            self.log_determinant += gain.log_determinant;
+            for k in 0..3 {
+                add(&mut self.mean, residual[k], &gain.of_errors[k]);
+                add(&mut self.vector, residual[k], &gain.rows[k]);
+            }
+        }
     }
 
     pub fn outcome(self) -> Outcome {
         let known = self.courses.known(self.at);
         let rows = factor(known.information, self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
+        let values = DVector::from_vec(values);
         Outcome {
             measured: matrix(&rows),
-            values: values.into(),
+            squares: self.squares - values.norm_squared(),
+            log_determinant: self.log_determinant,
+            values,
             of_given: matrix(&known.of_given),
             offset: DVector::from_column_slice(&self.mean),
             covariance: matrix(&known.covariance),

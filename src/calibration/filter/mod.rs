@@ -1,12 +1,12 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
+pub mod columns;
 pub mod courses;
 pub mod given;
 pub mod linear;
 pub mod local;
 pub mod measurement;
 pub mod rows;
-pub mod sensitivity;
 
 mod at_rest;
 mod dwells;
@@ -22,7 +22,6 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::checks::dwell_scatter::Posterior;
-use crate::calibration::filter::sensitivity::Sensitivity;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::{Linearisation, Start};
 use crate::calibration::model::Model;
@@ -31,6 +30,7 @@ use crate::calibration::record::segment::between;
 use crate::calibration::several::day_to_day::{DayToDay, Difference, Turned};
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients};
 use crate::navigation::{ProcessNoise, State};
+use columns::Columns;
 
 /// Mean and covariance of the errors.
 #[derive(Debug, Clone)]
@@ -46,8 +46,8 @@ pub struct Filter {
     day_to_day: DayToDay,
     /// What the mounting of the recording does to the parameters, where it has its own.
     turned: Option<Turned>,
-    /// What auxiliary parameters that are tried would do.
-    pub sensitivity: Option<Sensitivity>,
+    /// What constants that are no states do.
+    pub columns: Option<Columns>,
     /// The source whose variance is multiplied, and by what, see [`Model::weight`].
     varied: Option<(BudgetSource, f64)>,
 }
@@ -64,7 +64,16 @@ pub enum Since<'a> {
 impl Filter {
     /// Before the first stretch begins, with the means of what is constant.
     pub fn new(model: &Model, errors: &PriorErrors) -> Self {
-        let layout = Layout::new(model);
+        Self::of(Layout::new(model), model, errors)
+    }
+
+    /// The same with all constants as columns.
+    pub fn reduced(model: &Model) -> Self {
+        let layout = Layout::new(model).reduced();
+        Self::of(layout, model, &PriorErrors::none()).carrying_columns()
+    }
+
+    fn of(layout: Layout, model: &Model, errors: &PriorErrors) -> Self {
         let n = layout.size();
         let (mut x, mut p) = (DVector::zeros(n), DMatrix::zeros(n, n));
         for (state, index) in layout.parameters() {
@@ -104,16 +113,20 @@ impl Filter {
             varying,
             day_to_day: model.day_to_day,
             turned: None,
-            sensitivity: None,
+            columns: None,
             varied: model.varied,
         }
     }
 
-    /// The same with auxiliary parameters that are no states but tried.
+    /// The same with auxiliary parameters as columns.
     pub fn trying(mut self, auxiliary: &[usize]) -> Self {
         self.layout = self.layout.trying(auxiliary);
-        let tried = self.layout.columns().len();
-        self.sensitivity = (tried > 0).then(|| Sensitivity::new(tried, self.x.len()));
+        self.carrying_columns()
+    }
+
+    fn carrying_columns(mut self) -> Self {
+        let columns = self.layout.columns().len();
+        self.columns = (columns > 0).then(|| Columns::new(columns, self.x.len()));
         self
     }
 
@@ -161,8 +174,8 @@ impl Filter {
     /// Forgets a state: its error is drawn anew, independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
-        if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.redraw(state);
+        if let Some(columns) = &mut self.columns {
+            columns.redraw(state);
         }
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
@@ -205,10 +218,10 @@ impl Filter {
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;
-            if let Some(sensitivity) = &mut self.sensitivity {
+            if let Some(columns) = &mut self.columns {
                 for row in 0..3 {
                     let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
-                    sensitivity.add(first + row, turned);
+                    columns.add(first + row, turned);
                 }
             }
             let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);

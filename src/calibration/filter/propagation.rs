@@ -69,8 +69,8 @@ impl Filter {
                 self.p[(at_row, at_column)] = corner[(row, column)];
             }
         }
-        if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.propagate(moving, &transition, added);
+        if let Some(columns) = &mut self.columns {
+            columns.propagate(moving, &transition, added);
         }
     }
 
@@ -174,8 +174,8 @@ impl Filter {
             let (state, sigma, correlation_time) = self.varying[k];
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
-            if let Some(sensitivity) = &mut self.sensitivity {
-                sensitivity.scale(state, keep);
+            if let Some(columns) = &mut self.columns {
+                columns.scale(state, keep);
             }
             self.p.row_mut(state).scale_mut(keep);
             self.p.column_mut(state).scale_mut(keep);

@@ -32,7 +32,7 @@ pub trait Observer {
     fn variance(&self, seen: &Seen) -> f64;
     fn judge(&mut self, innovations: Innovations) -> Verdict;
 
-    /// Whether covariances alone are wanted and verdicts known: innovations are not worked out then, nor means.
+    /// Whether verdicts are known: innovations are not worked out then.
     fn knows(&self) -> bool {
         false
     }
@@ -75,6 +75,10 @@ impl Filter {
             other => return other,
         }
         let outcome = local.outcome();
+        if let Some(columns) = &mut self.columns {
+            columns.squares += outcome.squares;
+            columns.log_determinant += outcome.log_determinant;
+        }
         if !outcome.values.is_empty() {
             let measured = map.given.combined(&outcome.measured);
             let across = &outcome.measured * across;

@@ -50,8 +50,8 @@ impl Filter {
         self.p.gemm(1.0, &gain, &rest.transpose(), 1.0);
         self.p.gemm(1.0, &rest, &gain.transpose(), 1.0);
         self.p.fill_lower_triangle_with_upper_triangle();
-        if let Some(sensitivity) = &mut self.sensitivity {
-            sensitivity.update(h, &gain, (&whiten, &whitened));
+        if let Some(columns) = &mut self.columns {
+            columns.update(h, &gain, (&whiten, &whitened));
         }
     }
 }

@@ -2,6 +2,7 @@
 //! is tried.
 
 use crate::calibration::error::CalibrationError;
+use crate::calibration::filter::columns::Columns;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
@@ -12,6 +13,7 @@ use crate::calibration::pass::{
 };
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::events::{Event, Events};
+use crate::calibration::reduction::Reduction;
 use crate::imu::{PerSensor, Sensor};
 
 /// What a pass does at one point of linearisation, whatever the noise.
@@ -88,7 +90,9 @@ impl<'a> Script<'a> {
     /// three components whether it is let in; those beyond its end are.
     pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
         let mut replay = Replay::default();
-        self.follow(problem, accepted, Some(&mut replay))?;
+        let model = &problem.model;
+        let filter = Filter::new(model, &PriorErrors::at(model, self.at));
+        self.follow(problem, accepted, filter, |_| {}, Some(&mut replay))?;
         Ok(replay)
     }
 
@@ -98,18 +102,42 @@ impl<'a> Script<'a> {
         problem: &Problem,
         accepted: &[bool],
     ) -> Result<ParameterMatrix, CalibrationError> {
-        let filter = self.follow(problem, accepted, None)?;
+        let model = &problem.model;
+        let filter = Filter::new(model, &PriorErrors::at(model, self.at));
+        let filter = self.follow(problem, accepted, filter, |_| {}, None)?;
         Ok(filter.parameter_covariance())
+    }
+
+    /// What such a pass says of the constants.
+    pub fn reduce(
+        &self,
+        problem: &Problem,
+        accepted: &[bool],
+    ) -> Result<Reduction, CalibrationError> {
+        let mut dwells = Vec::new();
+        let take = |filter: &mut Filter| {
+            dwells.extend(filter.columns.as_mut().map(Columns::take_rows));
+        };
+        let filter = Filter::reduced(&problem.model);
+        let filter = self.follow(problem, accepted, filter, take, None)?;
+        let columns = filter.columns.as_ref();
+        Ok(Reduction {
+            constants: filter.layout.columns().to_vec(),
+            squares: columns.map_or(0.0, |columns| columns.squares),
+            log_determinant: columns.map_or(0.0, |columns| columns.log_determinant),
+            dwells,
+        })
     }
 
     fn follow(
         &self,
         problem: &Problem,
         accepted: &[bool],
+        mut filter: Filter,
+        mut after_dwell: impl FnMut(&mut Filter),
         mut replay: Option<&mut Replay>,
     ) -> Result<Filter, CalibrationError> {
         let model = &problem.model;
-        let mut filter = Filter::new(model, &PriorErrors::at(model, self.at));
         let mut dwells = Dwells::of(&filter);
         let mut accepted = accepted.iter();
         let mut before = None;
@@ -130,6 +158,9 @@ impl<'a> Script<'a> {
                 let taken = event.take_in(of, (model, stretch), &mut decided);
                 if taken != Taken::Whole || !decided.is_finite() {
                     return Err(CalibrationError::Diverged { time: event.end() });
+                }
+                if matches!(event, Event::Rest(rest) if rest.last) {
+                    after_dwell(&mut filter);
                 }
             }
         }

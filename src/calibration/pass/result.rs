@@ -131,10 +131,15 @@ impl Sums {
 
     /// What auxiliary parameters that were tried would do.
     fn take_tried(&mut self) -> Option<Tried> {
-        let sensitivity = self.filter.sensitivity.take()?;
+        let mut columns = self.filter.columns.take()?;
+        let rows = columns.take_rows();
+        let n = rows.ncols() - 1;
+        let normal = rows.tr_mul(&rows);
+        let information = normal.view((0, 0), (n, n)).into_owned();
+        let score = normal.view((0, n), (n, 1)).column(0).into_owned();
         let states = self.filter.layout.parameters();
         let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();
-        let (information, score, of_states) = sensitivity.normal_equations(states.into_iter());
+        let of_states = columns.of_states.select_columns(&states).transpose();
         let mut of_parameters = DMatrix::zeros(PARAMETERS, score.len());
         for (row, index) in of_states.row_iter().zip(indices) {
             of_parameters.set_row(index, &row);

@@ -1,0 +1,93 @@
+//! What constants that are no states do to a filter.
+//!
+//! The filter is linear: with such constants at q instead of zero its mean would be `x + U q`, and its
+//! innovations `ν − G q` with the same covariance. U is carried along; whitened rows `[G ν]` are kept. Estimate and
+//! covariance of q, and what q does to every state, are those of a filter that has q among its states, of any prior
+//! and any part of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)),
+//! without the cost of that filter.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::linear::Linear;
+
+/// Constants that are no states, and what they do to a filter.
+#[derive(Debug, Clone)]
+pub struct Columns {
+    /// U, a column for each state.
+    pub of_states: DMatrix<f64>,
+    /// Whitened rows `[G ν]`, one after the other.
+    rows: Vec<f64>,
+    /// Squares of what was observed that no constant and no state has a part in.
+    pub squares: f64,
+    /// Logarithm of the determinant of the covariance of what was observed, the constants given.
+    pub log_determinant: f64,
+}
+
+impl Columns {
+    /// Of so many constants and states, before anything is observed.
+    pub fn new(constants: usize, states: usize) -> Self {
+        Self {
+            of_states: DMatrix::zeros(constants, states),
+            rows: Vec::new(),
+            squares: 0.0,
+            log_determinant: 0.0,
+        }
+    }
+
+    /// A state is drawn anew, whatever the parameters are.
+    pub fn redraw(&mut self, state: usize) {
+        self.of_states.column_mut(state).fill(0.0);
+    }
+
+    /// A state forgets.
+    pub fn scale(&mut self, state: usize, keep: f64) {
+        self.of_states.column_mut(state).scale_mut(keep);
+    }
+
+    /// The states that move become what `transition` makes of the first states, plus what each parameter adds to
+    /// them (rows, by parameter).
+    pub fn propagate(&mut self, moving: &[usize], transition: &DMatrix<f64>, added: &DMatrix<f64>) {
+        let first = self.of_states.columns(0, transition.ncols());
+        let moved = first * transition.transpose() + added;
+        for (&state, column) in moving.iter().zip(moved.column_iter()) {
+            self.of_states.column_mut(state).copy_from(&column);
+        }
+    }
+
+    /// A state becomes itself plus others by these weights.
+    pub fn add(&mut self, state: usize, others: impl Iterator<Item = (usize, f64)>) {
+        let mut sum = self.of_states.column(state).into_owned();
+        for (other, weight) in others {
+            sum.axpy(weight, &self.of_states.column(other), 1.0);
+        }
+        self.of_states.column_mut(state).copy_from(&sum);
+    }
+
+    /// Measurements H are taken in by a gain: what whitens their innovations, and the whitened innovations.
+    pub fn update(
+        &mut self,
+        h: &Linear,
+        gain: &DMatrix<f64>,
+        (whiten, whitened): (&DMatrix<f64>, &DVector<f64>),
+    ) {
+        let sensed = &h.states * self.of_states.transpose() + &h.columns;
+        self.of_states
+            .gemm(-1.0, &sensed.transpose(), &gain.transpose(), 1.0);
+        self.log_determinant -= 2.0 * whiten.diagonal().map(f64::ln).sum();
+        let sensed = whiten * sensed;
+        for (row, value) in sensed.row_iter().zip(whitened) {
+            self.rows.extend(row.iter().chain([value]));
+        }
+    }
+
+    /// The rows since they were last taken, a triangle of them where they are more than that has.
+    pub fn take_rows(&mut self) -> DMatrix<f64> {
+        let columns = self.of_states.nrows() + 1;
+        let rows = std::mem::take(&mut self.rows);
+        let rows = DMatrix::from_row_slice(rows.len() / columns, columns, &rows);
+        match rows.nrows() > columns {
+            true => rows.qr().unpack_r(),
+            false => rows,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+use super::*;
+use crate::calibration::pass::{Gate, Mode, PassResult, pass};
+use crate::calibration::{ErrorTerm, Options, UNWATCHED, estimate};
+use crate::imu::Term;
+use crate::run::Aiding;
+use crate::simulation::Scenario;
+
+/// A run, calibrated, with rows of this model at the point where it was.
+fn against_passes(scenario: &str, options: &Options, off: &[ErrorTerm]) {
+    let run = Scenario::load(scenario)
+        .unwrap()
+        .simulate(3, 0)
+        .unwrap()
+        .run;
+    let problem = Problem::new(&run, options);
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
+    let problem = outcome.as_calibrated(&problem);
+    let (priors, at) = (&outcome.prior_attitudes, &outcome.linearised_at);
+    let script = Script::new(&problem, priors, at).unwrap();
+    let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
+    let reduction = Reduction::new(&script, &problem, &accepted).unwrap();
+    let both = |terms: &[ErrorTerm]| {
+        let mut model = problem.model.clone();
+        terms.iter().for_each(|&term| model.switch_off(term));
+        let prior = Prior::new(&reduction.constants, &model, at);
+        let gate = Gate::As(&outcome.innovations);
+        let whole = pass(&problem.with_model(model), priors, at, Mode::Held(gate)).unwrap();
+        (reduction.posterior(&prior).unwrap(), whole)
+    };
+    let compared = |(posterior, whole): &(Posterior, PassResult)| {
+        let step = to_vector(&whole.estimate.triads) - to_vector(&at.triads);
+        for (k, constant) in reduction.constants.iter().enumerate() {
+            let Constant::Parameter(index) = *constant else {
+                continue;
+            };
+            let sigma = whole.covariance[(index, index)].sqrt();
+            let off = (posterior.mean[k] - step[index]) / sigma;
+            let ratio = posterior.covariance[(k, k)].sqrt() / sigma;
+            assert!(off.abs() < 1e-6, "{scenario} {index}: {off} σ");
+            assert!((ratio - 1.0).abs() < 1e-7, "{scenario} {index}: σ {ratio}");
+        }
+    };
+    let (with, without) = (both(&[]), both(off));
+    compared(&with);
+    compared(&without);
+    // Squares of positions, observed to a metre, are in that of the rows alone.
+    let ours = without.0.cost - with.0.cost;
+    let theirs = without.1.cost - with.1.cost;
+    assert!((ours - theirs).abs() < 1e-2, "{scenario}: {ours} {theirs}");
+    let ours = without.0.deviance - with.0.deviance;
+    let theirs = without.1.deviance() - with.1.deviance();
+    assert!((ours - theirs).abs() < 1e-2, "{scenario}: {ours} {theirs}");
+}
+
+#[test]
+fn a_prior_and_rows_are_a_pass_of_the_whole_filter_whatever_is_on() {
+    let table = [
+        ErrorTerm::TableBase,
+        ErrorTerm::Instrument(Term::AccelSecondOrder),
+        ErrorTerm::Instrument(Term::GSensitivity),
+    ];
+    let plain = Options::default();
+    let with = table.into_iter().fold(plain.clone(), Options::with);
+    against_passes("demo", &with, &table[..2]);
+    let velocity = with.aiding(Aiding::Velocity);
+    against_passes("nineteen-position", &velocity, &table[1..]);
+    let varying = plain.with(ErrorTerm::GaussMarkovBias).with(table[2]);
+    against_passes("mems", &varying, &table[2..]);
+}
