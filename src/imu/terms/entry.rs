@@ -45,36 +45,16 @@ pub struct TermEntry {
     /// A parameter beyond this makes of gravity, or of a turn at [`REFERENCE_RATE`], as much again, as no
     /// instrument does, in SI.
     pub largest: f64,
-    /// The names of its parameters in files.
-    pub parameters: &'static [&'static str],
-    /// Its equation.
-    pub effect: Effect,
-}
-
-/// What a term adds to the input of its triad, rad/s or m/s².
-pub enum Effect {
-    /// In proportion to its parameters: `∂t/∂q`, a column each.
-    Linear(fn(&Sensed, &mut Columns)),
-    /// In another way.
-    Nonlinear {
-        /// `t(q)`.
-        added: fn(&Sensed, &[f64]) -> Vector3<f64>,
-        /// `∂t/∂q` at these parameters, a column each.
-        response: fn(&Sensed, &[f64], &mut Columns),
-    },
+    /// The names of its parameters in files: what all begin with, and how each ends.
+    pub parameters: (&'static str, &'static [&'static str]),
+    /// `∂t/∂q`, t(q) being what it adds to the input of its triad in rad/s or m/s²: a column for each parameter.
+    pub response: fn(&Sensed, &[f64], &mut Columns),
+    /// `t(q)` itself, where that is not in proportion to its parameters.
+    pub added: Option<fn(&Sensed, &[f64]) -> Vector3<f64>>,
 }
 
 /// The columns of a term in a [`super::TermResponse`].
 pub type Columns<'a> = nalgebra::MatrixViewMut3xX<'a, f64>;
 
-/// The names of one parameter per axis.
-macro_rules! per_axis {
-    ($stem:literal) => {
-        &[
-            concat!($stem, ".x"),
-            concat!($stem, ".y"),
-            concat!($stem, ".z"),
-        ]
-    };
-}
-pub(super) use per_axis;
+/// Ends of the names of one parameter per axis.
+pub const PER_AXIS: [&str; 3] = [".x", ".y", ".z"];

@@ -11,6 +11,8 @@
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
+use super::Sensor;
+
 mod entry;
 mod sensed;
 
@@ -84,7 +86,7 @@ const FIRST: [usize; Term::ALL.len() + 1] = {
     let mut first = [0; Term::ALL.len() + 1];
     let mut k = 0;
     while k < Term::ALL.len() {
-        first[k + 1] = first[k] + Term::ALL[k].entry().parameters.len();
+        first[k + 1] = first[k] + Term::ALL[k].entry().parameters.1.len();
         k += 1;
     }
     first
@@ -103,15 +105,17 @@ impl Term {
         self.entry().name
     }
 
-    /// The unit of its parameters in files and reports: its name, and its value in SI.
-    pub fn unit(self) -> (&'static str, f64) {
-        self.entry().unit
+    /// Those of a triad.
+    fn of_sensor(sensor: Sensor) -> impl Iterator<Item = Self> {
+        let all = Self::ALL.into_iter();
+        all.filter(move |term| term.entry().sensor == sensor)
     }
 
     /// 1σ of each of its parameters where nothing better is known, in SI: ten times what precise
     /// instruments have.
     pub fn usual_sigma(self) -> f64 {
-        self.entry().usual_sigma * self.unit().1
+        let entry = self.entry();
+        entry.usual_sigma * entry.unit.1
     }
 
     /// Indices of its parameters.
@@ -126,15 +130,16 @@ impl Term {
     }
 
     /// The name of a parameter in files; `None` beyond the last.
-    pub fn parameter_name(parameter: usize) -> Option<&'static str> {
+    pub fn parameter_name(parameter: usize) -> Option<String> {
         let term = Self::of(parameter)?;
-        let names = term.entry().parameters;
-        names.get(parameter - term.parameters().start).copied()
+        let (stem, ends) = term.entry().parameters;
+        let end = ends[parameter - term.parameters().start];
+        Some(format!("{stem}{end}"))
     }
 
     /// The parameter of a name in files.
     pub fn parameter_named(name: &str) -> Option<usize> {
-        (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k) == Some(name))
+        (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k).as_deref() == Some(name))
     }
 }
 
