@@ -138,22 +138,17 @@ impl ThermalModel {
 /// power on.
 pub fn powers(range: &ThermalRange, coefficients: &ThermalValues) -> [f64; HIGHEST_ORDER] {
     // Newton's divided differences at as many temperatures as there are coefficients, and the reference.
-    let nodes: [f64; HIGHEST_ORDER + 1] = std::array::from_fn(|k| {
-        let span = range.highest - range.lowest;
-        span.max(1.0) * (k as f64) / HIGHEST_ORDER as f64
-    });
-    let at = |by: f64| {
-        let mut values = range.values(range.reference + by, 0.0);
-        values[RATE] = 0.0;
-        coefficients.dot(&values)
-    };
+    const NODES: usize = HIGHEST_ORDER + 1;
+    let span = (range.highest - range.lowest).max(1.0);
+    let node = |k: usize| span * (k as f64) / HIGHEST_ORDER as f64;
+    let last = node(HIGHEST_ORDER);
     let vandermonde =
-        SMatrix::<f64, { HIGHEST_ORDER + 1 }, { HIGHEST_ORDER + 1 }>::from_fn(|row, column| {
-            (nodes[row] / nodes[HIGHEST_ORDER]).powi(column as i32)
-        });
-    let values = SVector::<f64, { HIGHEST_ORDER + 1 }>::from_fn(|row, _| at(nodes[row]));
+        SMatrix::<f64, NODES, NODES>::from_fn(|row, column| (node(row) / last).powi(column as i32));
+    let values = SVector::<f64, NODES>::from_fn(|row, _| {
+        coefficients.dot(&range.values(range.reference + node(row), 0.0))
+    });
     let scaled = vandermonde.lu().solve(&values).unwrap_or_default();
-    std::array::from_fn(|k| scaled[k + 1] / nodes[HIGHEST_ORDER].powi(k as i32 + 1))
+    std::array::from_fn(|k| scaled[k + 1] / last.powi(k as i32 + 1))
 }
 
 #[cfg(test)]

@@ -88,11 +88,6 @@ impl Default for TableGeometry {
 }
 
 impl TableGeometry {
-    /// Whether there are any.
-    pub fn any(&self) -> bool {
-        *self != Self::default()
-    }
-
     /// Whether there are any of a kind.
     pub fn has(&self, kind: AxisError) -> bool {
         self.axes.rows_range(kind.range()).amax() > 0.0

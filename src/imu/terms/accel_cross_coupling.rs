@@ -1,10 +1,9 @@
 //! Output of an accelerometer with the product of specific force along two axes.
 
-use super::accel_second_order;
-use super::entry::{Columns, Sensed, TermEntry};
+use nalgebra::RowVector3;
 
-/// The two components of specific force that are multiplied, in the order of the parameters.
-const PRODUCTS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+use super::accel_second_order;
+use super::entry::{TermEntry, set_rows};
 
 pub const ENTRY: TermEntry = TermEntry {
     name: "accel-cross-coupling",
@@ -18,14 +17,11 @@ pub const ENTRY: TermEntry = TermEntry {
             ".x.xy", ".x.xz", ".x.yz", ".y.xy", ".y.xz", ".y.yz", ".z.xy", ".z.xz", ".z.yz",
         ],
     ),
-    response,
+    response: |sensed, _, columns| {
+        let f = sensed.force;
+        set_rows(columns, |_| {
+            RowVector3::new(f.x * f.y, f.x * f.z, f.y * f.z)
+        });
+    },
     ..accel_second_order::ENTRY
 };
-
-fn response(sensed: &Sensed, _: &[f64], columns: &mut Columns) {
-    for axis in 0..3 {
-        for (k, &(one, other)) in PRODUCTS.iter().enumerate() {
-            columns[(axis, 3 * axis + k)] = sensed.force[one] * sensed.force[other];
-        }
-    }
-}

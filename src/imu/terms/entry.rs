@@ -1,6 +1,6 @@
 //! How a term is called, and what it does.
 
-use nalgebra::Vector3;
+use nalgebra::{RowVector3, Vector3};
 
 use crate::imu::Sensor;
 use crate::units::DEGREE;
@@ -55,6 +55,14 @@ pub struct TermEntry {
 
 /// The columns of a term in a [`super::TermResponse`].
 pub type Columns<'a> = nalgebra::MatrixViewMut3xX<'a, f64>;
+
+/// Fills the columns of a term that has three parameters on each axis, which act on no other.
+pub fn set_rows(columns: &mut Columns, row: impl Fn(usize) -> RowVector3<f64>) {
+    for axis in 0..columns.ncols() / 3 {
+        let mut own = columns.fixed_view_mut::<1, 3>(axis, 3 * axis);
+        own.copy_from(&row(axis));
+    }
+}
 
 /// Ends of the names of one parameter per axis.
 pub const PER_AXIS: [&str; 3] = [".x", ".y", ".z"];

@@ -1,6 +1,6 @@
 //! Bias of the gyros with specific force, along and across their axes.
 
-use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{REFERENCE_RATE, TermEntry, set_rows};
 use crate::imu::Sensor;
 use crate::units::{DEG_PER_H, STANDARD_GRAVITY};
 
@@ -21,14 +21,6 @@ pub const ENTRY: TermEntry = TermEntry {
             ".xx", ".xy", ".xz", ".yx", ".yy", ".yz", ".zx", ".zy", ".zz",
         ],
     ),
-    response,
+    response: |sensed, _, columns| set_rows(columns, |_| sensed.force.transpose()),
     added: None,
 };
-
-fn response(sensed: &Sensed, _: &[f64], columns: &mut Columns) {
-    for axis in 0..3 {
-        for (column, &f) in sensed.force.iter().enumerate() {
-            columns[(axis, 3 * axis + column)] = f;
-        }
-    }
-}

@@ -1,7 +1,7 @@
 //! Accelerometers that stand apart: x and y stand away from z by lever arms r_x and r_y and sense row i of
 //! `([ω̇×] + [ω×]²) r_i` besides. One lever arm common to all three cannot be told from rest.
 
-use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry, set_rows};
 use crate::imu::Sensor;
 use crate::units::STANDARD_GRAVITY;
 
@@ -28,9 +28,5 @@ pub const ENTRY: TermEntry = TermEntry {
 fn response(sensed: &Sensed, _: &[f64], columns: &mut Columns) {
     let rate = sensed.rate.cross_matrix();
     let turning = sensed.angular_acceleration.cross_matrix() + rate * rate;
-    for axis in 0..2 {
-        for component in 0..3 {
-            columns[(axis, 3 * axis + component)] = turning[(axis, component)];
-        }
-    }
+    set_rows(columns, |axis| turning.row(axis).into_owned());
 }
