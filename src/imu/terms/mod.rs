@@ -8,13 +8,12 @@
 //! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
 //! scale factor); IEEE Std 528-2019 (gyros: acceleration-squared sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect, time offset).
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::Sensor;
 
 mod entry;
-mod sensed;
 
 mod accel_cross_coupling;
 mod accel_second_order;
@@ -140,6 +139,33 @@ impl Term {
     /// The parameter of a name in files.
     pub fn parameter_named(name: &str) -> Option<usize> {
         (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k).as_deref() == Some(name))
+    }
+}
+
+impl Sensed {
+    /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².
+    pub fn added(&self, sensor: Sensor, q: &TermVector) -> Vector3<f64> {
+        let mut linear = self.response(sensor, q);
+        let mut others = Vector3::zeros();
+        for term in Term::of_sensor(sensor) {
+            if let Some(added) = term.entry().added {
+                linear.columns_range_mut(term.parameters()).fill(0.0);
+                others += added(self, &q.as_slice()[term.parameters()]);
+            }
+        }
+        linear * q + others
+    }
+
+    /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter, where the parameters are
+    /// these.
+    pub fn response(&self, sensor: Sensor, q: &TermVector) -> TermResponse {
+        let mut response = TermResponse::zeros();
+        for term in Term::of_sensor(sensor) {
+            let own = term.parameters();
+            let columns = &mut response.columns_mut(own.start, own.len());
+            (term.entry().response)(self, &q.as_slice()[own], columns);
+        }
+        response
     }
 }
 
