@@ -50,8 +50,11 @@ pub struct TermEntry {
     /// `∂t/∂q`, t(q) being what it adds to the input of its triad in rad/s or m/s²: a column for each parameter.
     pub response: fn(&Sensed, &[f64], &mut Columns),
     /// `t(q)` itself, where that is not in proportion to its parameters.
-    pub added: Option<fn(&Sensed, &[f64]) -> Vector3<f64>>,
+    pub added: Option<Added>,
 }
+
+/// What a term adds to the input of its triad at these parameters, rad/s or m/s².
+pub type Added = fn(&Sensed, &[f64]) -> Vector3<f64>;
 
 /// The columns of a term in a [`super::TermResponse`].
 pub type Columns<'a> = nalgebra::MatrixViewMut3xX<'a, f64>;
