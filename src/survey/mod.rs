@@ -94,7 +94,11 @@ impl Survey {
     /// Looks at a run.
     pub fn of(run: &Run) -> Self {
         let rests = motion::rests(run);
-        let durations = || rests.iter().map(|rest| rest.duration(run));
+        let durations = || {
+            rests
+                .iter()
+                .map(|rest| rest.dwell.duration(&run.recording.imu))
+        };
         Self {
             turns: motion::turns(run, &rests),
             labels: motion::checks(run, &rests),

@@ -115,7 +115,7 @@ fn fault(run: &Run, fault: &Fault) -> Value {
 }
 
 fn dwell(run: &Run, rest: &Rest) -> Value {
-    let [start, end] = rest.times(run);
+    let [start, end] = rest.dwell.times(run);
     let mut data = json!({
         "start_s": start,
         "end_s": end,

@@ -116,7 +116,7 @@ pub(super) fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
 pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
     let after = |k: usize| survey.turns.iter().find(|turn| turn.from == Some(k));
     let row = |(k, rest): (usize, &Rest)| {
-        let [begin, end] = rest.times(run);
+        let [begin, end] = rest.dwell.times(run);
         let mut row = cells![
             (k + 1).to_string(),
             value(begin, 1.0),

@@ -8,18 +8,16 @@ use serde::Serialize;
 
 use super::rest::Rest;
 use super::turn::{Turn, zero};
-use crate::imu::Sensor;
+use crate::navigation::samples_of;
 use crate::recording::{LabelledMotion, Segment};
+use crate::run::Run;
+use crate::run::dwell::{Dwell, common};
 use crate::run::dwells::imu::standstills;
-use crate::run::{Dwell, Run};
+use crate::run::turning::tolerance;
 use crate::units::DEGREE;
 
 /// A label's axis further than this from the plumb line is another one, rad.
 const OTHER_AXIS: f64 = 30.0 * DEGREE;
-/// A turn that differs from its label by more than this part of it is another one.
-const OTHER_ANGLE: f64 = 0.1;
-/// … or that many σ of the gyros' scale.
-const SCALE_SIGMAS: f64 = 5.0;
 /// A section of a position may move for this part of its time.
 const MOVING: f64 = 0.05;
 /// A section that begins or ends at a faster rate begins or ends within a turn, rad/s …
@@ -78,36 +76,36 @@ pub struct ContradictedLabel {
 
 impl fmt::Display for ContradictedLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            label,
-            start,
-            said,
-            used,
-        } = self;
-        let used = if *used {
-            "used with other borders"
-        } else {
-            "not used"
+        let used = match self.used {
+            true => "used with other borders",
+            false => "not used",
         };
+        let (label, start, said) = (&self.label, self.start, &self.said);
         write!(f, "`{label}` at {start:.1} s {said} ({used})")
     }
 }
 
+/// Verdict, disagreement and samples as labelled of a [`LabelCheck`].
+type Checked = (Verdict, Option<String>, Option<Range<usize>>);
+
 /// Every labelled section against what the record does at these rests.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     let standstills = standstills(run);
-    let check = |segment: &Segment| match segment.motion {
-        Some(LabelledMotion::Stands { up }) => position(run, rests, &standstills, segment, &up),
-        Some(LabelledMotion::Turns { axis, angle }) => turn(run, rests, segment, &axis, angle),
-        None => LabelCheck {
+    let check = |segment: &Segment| {
+        let (verdict, disagreement, as_labelled) = match segment.motion {
+            Some(LabelledMotion::Stands { up }) => position(run, rests, &standstills, segment, &up),
+            Some(LabelledMotion::Turns { axis, angle }) => turn(run, rests, segment, &axis, angle),
+            None => {
+                let nothing = "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect";
+                (Verdict::Unknown, Some(nothing.to_owned()), None)
+            }
+        };
+        LabelCheck {
             segment: segment.clone(),
-            verdict: Verdict::Unknown,
-            disagreement: Some(
-                "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect"
-                    .to_owned(),
-            ),
-            as_labelled: None,
-        },
+            verdict,
+            disagreement,
+            as_labelled,
+        }
     };
     run.recording.segments.iter().map(check).collect()
 }
@@ -116,30 +114,27 @@ pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
 fn position(
     run: &Run,
     rests: &[Rest],
-    standstills: &[Dwell],
+    standstills: &[Range<usize>],
     segment: &Segment,
     up: &Vector3<f64>,
-) -> LabelCheck {
+) -> Checked {
     // Samples of it in which it stands, where it turns in the others.
     let standing = run.standing_in(&segment.samples, standstills);
-    let samples = standing.clone().unwrap_or_else(|| segment.samples.clone());
-    let section = Dwell::of(samples.clone());
-    let force = section.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias;
-    let (off, moving) = (force.angle(up), moving(run, rests, &segment.samples));
-    let is_still = moving <= MOVING * (segment.end - segment.start) && standing.is_none();
-    LabelCheck {
-        segment: segment.clone(),
-        verdict: Verdict::Position { off, moving },
-        disagreement: match off < OTHER_AXIS {
-            true if is_still => None,
-            true => Some(format!("is not still for {moving:.1} s: shorten it")),
-            false => Some(format!(
-                "has another axis up, {:.0}° off the label's: correct the label or body_axes",
-                off / DEGREE
-            )),
-        },
-        as_labelled: (off < OTHER_AXIS).then_some(samples),
+    let turns = standing.is_some();
+    let section = Dwell::of(standing.unwrap_or_else(|| segment.samples.clone()));
+    let off = section.force(run).angle(up);
+    let moving = moving(run, rests, &segment.samples);
+    let verdict = Verdict::Position { off, moving };
+    if off >= OTHER_AXIS {
+        let words = format!(
+            "has another axis up, {:.0}° off the label's: correct the label or body_axes",
+            off / DEGREE
+        );
+        return (verdict, Some(words), None);
     }
+    let is_still = moving <= MOVING * (segment.end - segment.start) && !turns;
+    let words = (!is_still).then(|| format!("is not still for {moving:.1} s: shorten it"));
+    (verdict, words, Some(section.samples))
 }
 
 /// A section that is labelled as a turn by an angle.
@@ -149,61 +144,47 @@ fn turn(
     segment: &Segment,
     axis: &Vector3<f64>,
     labelled: f64,
-) -> LabelCheck {
+) -> Checked {
     let (imu, samples) = (&run.recording.imu, segment.samples.clone());
     let zero = zero(run, rests, samples.start);
-    let length = ((END / imu.period).round() as usize)
-        .max(1)
-        .min(samples.len());
+    let angle = |samples: &Range<usize>| {
+        imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
+    };
+    let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance(run);
+    let found = Turn::of(run, samples.clone(), &zero);
+    let off = (found.axis * found.angle.signum()).angle(axis);
+    let within = angle(&samples).dot(axis);
+    let verdict = Verdict::Turn {
+        angle: within,
+        off: off.min(std::f64::consts::PI - off),
+    };
+    let length = samples_of(END, imu.period).min(samples.len());
     let ends = [
         samples.start..samples.start + length,
         samples.end - length..samples.end,
     ];
-    let turns =
-        |end: Range<usize>| angle(run, end, &zero).norm() / length as f64 / imu.period > TURNING;
+    let turns = |end: &Range<usize>| angle(end).norm() / length as f64 / imu.period > TURNING;
     // Beyond sections laid end to end lies something else.
     let whole = match imu.continuous {
         true => to_rests(rests, &samples),
         false => samples.clone(),
     };
-    let within = angle(run, samples.clone(), &zero).dot(axis);
-    let to_rests = angle(run, whole.clone(), &zero).dot(axis);
-    let is_cut =
-        ends.into_iter().any(turns) && (!imu.continuous || (to_rests - within).abs() > LOST);
-    let tolerance = OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.max());
-    let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance;
-    let found = Turn::of(run, samples.clone(), &zero);
-    let off = (found.axis * found.angle.signum()).angle(axis);
-    LabelCheck {
-        segment: segment.clone(),
-        verdict: Verdict::Turn {
-            angle: within,
-            off: off.min(std::f64::consts::PI - off),
-        },
-        disagreement: match is_cut {
-            true => Some(
-                "starts or ends during the turn: extend it until the sensor is still at both ends"
-                    .to_owned(),
-            ),
-            false if as_said(within) => None,
-            false => Some(format!(
-                "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, \
-                 or the gyros' scale",
-                within / DEGREE,
-                labelled / DEGREE
-            )),
-        },
-        as_labelled: match is_cut {
-            true => (as_said(to_rests) && whole != samples).then_some(whole),
-            false => as_said(within).then_some(samples),
-        },
+    let to_rests = angle(&whole).dot(axis);
+    if ends.iter().any(turns) && (!imu.continuous || (to_rests - within).abs() > LOST) {
+        let words =
+            "starts or ends during the turn: extend it until the sensor is still at both ends";
+        let as_labelled = (as_said(to_rests) && whole != samples).then_some(whole);
+        return (verdict, Some(words.to_owned()), as_labelled);
     }
-}
-
-/// Sum of the gyros over some samples, rad.
-fn angle(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Vector3<f64> {
-    let imu = &run.recording.imu;
-    imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
+    if as_said(within) {
+        return (verdict, None, Some(samples));
+    }
+    let words = format!(
+        "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, or the gyros' scale",
+        within / DEGREE,
+        labelled / DEGREE
+    );
+    (verdict, Some(words), None)
 }
 
 /// Some samples and those between them and the rests before and after.
@@ -218,11 +199,9 @@ fn to_rests(rests: &[Rest], samples: &Range<usize>) -> Range<usize> {
 
 /// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.
 fn moving(run: &Run, rests: &[Rest], samples: &Range<usize>) -> f64 {
-    let of = |rest: &Rest| {
-        let Range { start, end } = rest.dwell.samples;
-        end.min(samples.end)
-            .saturating_sub(start.max(samples.start))
-    };
-    let standing: usize = rests.iter().map(of).sum();
-    samples.len().saturating_sub(standing) as f64 * run.recording.imu.period
+    let standing = rests
+        .iter()
+        .map(|rest| common(&rest.dwell.samples, samples).len());
+    let moving = samples.len().saturating_sub(standing.sum());
+    moving as f64 * run.recording.imu.period
 }

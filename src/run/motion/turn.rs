@@ -7,8 +7,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::rest::Rest;
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
+use crate::navigation::samples_of;
 use crate::recording::LabelledMotion;
 use crate::run::Run;
+use crate::run::turning::{SMALLEST, STEP};
 use crate::units::DEGREE;
 
 /// Turns about one axis go along it for this part of their way at least …
@@ -17,10 +19,6 @@ const ALONG: f64 = 0.95;
 const ONE_AXIS: f64 = 1.0 * DEGREE;
 /// … and this part of the way.
 const APART: f64 = 0.02;
-/// The way is measured in steps this long, s, so that noise adds little to it.
-const STEP: f64 = 0.1;
-/// What turns by less has not turned, rad.
-const SMALLEST: f64 = 1.0 * DEGREE;
 /// Turns about an axis within this angle of a body axis are about that.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
 
@@ -46,9 +44,10 @@ pub struct Turn {
 }
 
 impl Turn {
-    pub(super) fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
+    /// What these samples turn by, with this output as zero, rad/s; the rest before is not said.
+    pub fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
         let period = run.recording.imu.period;
-        let length = ((STEP / period).round() as usize).max(1);
+        let length = samples_of(STEP, period);
         let mut attitude = Matrix3::identity();
         let (mut sum, mut way, mut fastest) = (Vector3::zeros(), 0.0, 0.0f64);
         for step in run.recording.imu.gyro.parts(samples.clone(), length) {
@@ -113,27 +112,26 @@ pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
 
 /// What turns from rest to rest, or in sections labelled as turns.
 pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
+    let imu = &run.recording.imu;
     let between = rests.windows(2).enumerate().map(|(from, pair)| {
         let samples = pair[0].dwell.samples.end..pair[1].dwell.samples.start;
         (Some(from), samples)
     });
-    let labelled = run.recording.segments.iter().filter_map(|segment| {
-        let turns = matches!(segment.motion, Some(LabelledMotion::Turns { .. }));
-        turns.then(|| (None, segment.samples.clone()))
-    });
-    let all: Vec<(Option<usize>, Range<usize>)> = match run.recording.imu.continuous {
+    let segments = run.recording.segments.iter();
+    let labelled = segments.filter(|of| matches!(of.motion, Some(LabelledMotion::Turns { .. })));
+    let labelled = labelled.map(|segment| (None, segment.samples.clone()));
+    let all: Vec<(Option<usize>, Range<usize>)> = match imu.continuous {
         true => between.collect(),
         false => labelled.collect(),
     };
-    // What was lost on the way may be any turn.
-    let known = |samples: &Range<usize>| !samples.is_empty() && !run.recording.imu.is_lost(samples);
-    let turns = all.into_iter().filter(|(_, samples)| known(samples));
-    let turns = turns.map(|(from, samples)| {
+    let turns = all.into_iter().filter_map(|(from, samples)| {
+        // What was lost on the way may be any turn.
+        let known = !samples.is_empty() && !imu.is_lost(&samples);
         let zero = zero(run, rests, samples.start);
-        Turn {
+        known.then(|| Turn {
             from,
             ..Turn::of(run, samples, &zero)
-        }
+        })
     });
     turns
         .filter(|turn| turn.angle.abs() > SMALLEST || turn.fastest > SMALLEST)

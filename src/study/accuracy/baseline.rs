@@ -93,8 +93,8 @@ impl Baseline {
             .map(|part| {
                 let part = part?;
                 let shorter = |dwell: &Dwell| {
-                    let duration = dwell.samples.len() as f64 * run.recording.imu.period;
-                    dwell.first_seconds(part * duration, &run.recording.imu)
+                    let imu = &run.recording.imu;
+                    dwell.first_seconds(part * dwell.duration(imu), imu)
                 };
                 let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
                 let closed_form = six_position_of(&problem, &dwells).ok()?;

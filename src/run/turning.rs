@@ -1,0 +1,18 @@
+//! What counts as a turn of the gyros, and as another one than a label or the table says.
+
+use super::Run;
+use crate::units::DEGREE;
+
+/// Turns are measured in steps this long, s, so that noise adds little to them.
+pub const STEP: f64 = 0.1;
+/// What turns by less has not turned, rad.
+pub const SMALLEST: f64 = 1.0 * DEGREE;
+/// A turn that differs by more than this part of it is another one …
+const OTHER_ANGLE: f64 = 0.1;
+/// … or that many σ of the gyros' scale.
+pub const SCALE_SIGMAS: f64 = 5.0;
+
+/// By which part of a turn the gyros may be off before it is another one.
+pub fn tolerance(run: &Run) -> f64 {
+    OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.amax())
+}
