@@ -84,9 +84,9 @@ impl Dwell {
         self.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias
     }
 
-    /// The first seconds of it; the attitude is that of all its readings.
-    pub fn first_seconds(&self, duration: f64, imu: &ImuSamples) -> Self {
-        let samples = (duration / imu.period).round() as usize;
+    /// The first part of it; the attitude is that of all its readings.
+    pub fn first_part(&self, part: f64, imu: &ImuSamples) -> Self {
+        let samples = (part * self.duration(imu) / imu.period).round() as usize;
         let end = self.samples.end.min(self.samples.start + samples);
         Self {
             samples: self.samples.start..end,

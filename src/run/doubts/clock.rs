@@ -5,11 +5,11 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::earth::ROTATION_RATE;
-use crate::navigation::samples_of;
+use crate::imu::Sensor;
 use crate::recording::{TableLog, nanoseconds};
-use crate::run::Run;
 use crate::run::dwells::table::standstills;
-use crate::run::turning::{SCALE_SIGMAS as SIGMAS, SMALLEST, STEP, tolerance};
+use crate::run::turning::{self, SCALE_SIGMAS as SIGMAS, SMALLEST, STEP, tolerance};
+use crate::run::{Dwell, Run};
 use crate::statistics::{SIGMA_OF_MEDIAN, median, median_of_axes};
 use crate::units::{DEGREE, PPM};
 
@@ -17,12 +17,13 @@ use crate::units::{DEGREE, PPM};
 const SHORTER_WAY: f64 = 1.0;
 
 /// A move from one dwell to the next.
-#[derive(Debug, Clone, Copy)]
 struct Move {
-    /// How far it goes, and when, by the gyros.
-    gyros: Way,
-    /// The same by the table.
-    table: Way,
+    /// How far it goes by the gyros and by the table, one way and the other, rad.
+    gyros: f64,
+    table: f64,
+    /// When, by the table, and by how much later by the gyros, s.
+    time: f64,
+    late: f64,
     /// By how much the ways of the same move may differ, rad.
     tolerance: f64,
     /// By how much a bias that dwells tell makes them differ, rad.
@@ -31,39 +32,18 @@ struct Move {
     interval: f64,
 }
 
-impl Move {
-    /// By how much the gyros are later, s.
-    fn late(&self) -> f64 {
-        self.gyros.middle - self.table.middle
-    }
-}
-
-/// Steps of a move, summed.
-#[derive(Debug, Clone, Copy, Default)]
-struct Way {
-    /// In all, one way and the other, rad.
-    angle: f64,
-    /// Mean time of it, s.
-    middle: f64,
-    /// Rate, rad/s.
-    fastest: f64,
-}
-
-impl Way {
-    /// Of steps with their times in the middle, durations in s and angles in rad, except those at rest: they
-    /// turn by less than `noise` and by less than rate `zero` makes.
-    fn of(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> Self {
-        let mut way = Self::default();
-        for (time, duration, angle) in steps {
-            way.fastest = way.fastest.max(angle / duration);
-            if angle > noise + zero * duration {
-                way.middle += angle * time;
-                way.angle += angle;
-            }
+/// The angle of some steps in all, rad, their mean time, s, and the fastest rate, rad/s. Steps: time in the middle and
+/// duration, s, and angle, rad. Those are at rest that turn by less than `noise` and less than rate `zero` makes.
+fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [f64; 3] {
+    let (mut all, mut moment, mut fastest) = (0.0, 0.0, 0.0f64);
+    for (time, duration, angle) in steps {
+        fastest = fastest.max(angle / duration);
+        if angle > noise + zero * duration {
+            moment += angle * time;
+            all += angle;
         }
-        way.middle /= way.angle.max(f64::MIN_POSITIVE);
-        way
     }
+    [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
 /// Moves that the gyros make by another angle than the table, or at another time; else a scale that all of them
@@ -73,7 +53,7 @@ impl Way {
 /// samples are stamped.
 pub fn clock(run: &Run) -> Option<String> {
     let moves = moves(run, run.recording.table.as_ref()?);
-    let is_another = |m: &&Move| (m.gyros.angle - m.table.angle).abs() > m.tolerance;
+    let is_another = |m: &&Move| (m.gyros - m.table).abs() > m.tolerance;
     let mut others = moves.iter().filter(is_another);
     if let Some(first) = others.next() {
         return Some(format!(
@@ -82,14 +62,14 @@ pub fn clock(run: &Run) -> Option<String> {
              not of one run or clock. Otherwise check gyro_unit, scale and the unit of the table's angles.",
             1 + others.count(),
             moves.len(),
-            first.table.middle,
-            first.gyros.angle / DEGREE,
-            first.table.angle / DEGREE
+            first.time,
+            first.gyros / DEGREE,
+            first.table / DEGREE
         ));
     }
     let interval = moves.iter().map(|m| m.interval).fold(0.0, f64::max);
     let resolved = interval + run.recording.imu.period;
-    match moves.iter().any(|m| m.late().abs() > resolved) {
+    match moves.iter().any(|m| m.late.abs() > resolved) {
         true => other_times(&moves, resolved, run.recording.imu.period),
         false => scale(run, &moves),
     }
@@ -101,7 +81,7 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
         true => format!("{late:.2} s later"),
         false => format!("{:.2} s earlier", -late),
     };
-    let late = || moves.iter().map(Move::late);
+    let late = || moves.iter().map(|m| m.late);
     let (low, high) = (late().reduce(f64::min)?, late().reduce(f64::max)?);
     if high - low <= resolved {
         return Some(format!(
@@ -112,14 +92,14 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     }
     let changes = moves
         .windows(2)
-        .map(|pair| (pair[1].late() - pair[0].late(), pair));
+        .map(|pair| (pair[1].late - pair[0].late, pair));
     let (change, jump) = changes.max_by(|one, other| one.0.abs().total_cmp(&other.0.abs()))?;
     if change.abs() > 0.5 * (high - low) {
         return Some(format!(
             "Between the moves at {:.1} s and {:.1} s the gyros begin to turn {} against the table: {} about {:.0} \
              rows there, or the table log jumps. Correct the log that is wrong.",
-            jump[0].table.middle,
-            jump[1].table.middle,
+            jump[0].time,
+            jump[1].time,
             by(change),
             match change < 0.0 {
                 true => "the IMU log has lost",
@@ -129,16 +109,16 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
         ));
     }
     let (first, last) = (moves.first()?, moves.last()?);
-    let apart = (last.late() - first.late()) / (last.table.middle - first.table.middle);
-    let at = |of: &Move| nanoseconds((of.table.middle * 10.0).round() / 10.0);
+    let apart = (last.late - first.late) / (last.time - first.time);
+    let at = |of: &Move| nanoseconds((of.time * 10.0).round() / 10.0);
     Some(format!(
         "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} \
          s, {} in that at {} s. Scale factors are wrong by as much. Check for rows that are lost or repeated all \
          along, sample_period_s and the stamps of both logs.",
         apart / PPM,
-        by(first.late()),
+        by(first.late),
         at(first),
-        by(last.late()),
+        by(last.late),
         at(last)
     ))
 }
@@ -149,7 +129,7 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     // The first and the last may be cut by the end of a log.
     let moves = moves.get(1..moves.len().saturating_sub(1))?;
     let sum = |of: fn(&Move) -> f64| moves.iter().map(of).sum::<f64>();
-    let (gyros, table) = (sum(|m| m.gyros.angle), sum(|m| m.table.angle));
+    let (gyros, table) = (sum(|m| m.gyros), sum(|m| m.table));
     let sigma = run.instrument.prior.gyro.scale_sigma.amax();
     let off = gyros / table - 1.0;
     (table > 0.0 && off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
@@ -166,13 +146,13 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
 
 /// Mean rates of the gyros while the table stands, the middle one of each axis: their biases, with a part of
 /// Earth rate, and how far off these may be, rad/s. The prior's may be wrong; stands are where the clocks are.
-fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
+fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     let prior = &run.instrument.prior.gyro;
-    let imu = &run.recording.imu;
-    let known = stands.iter().filter(|s| !s.is_empty() && !imu.is_lost(s));
-    let means: Vec<Vector3<f64>> = known
-        .map(|s| imu.gyro.sum(s.clone()) / (s.len() as f64 * imu.period))
-        .collect();
+    let known = stands
+        .iter()
+        .filter(|dwell| !run.recording.imu.is_lost(&dwell.samples));
+    let means = known.map(|dwell| dwell.mean(Sensor::Gyro, run).output);
+    let means: Vec<Vector3<f64>> = means.collect();
     let bias = median_of_axes(&means).unwrap_or(prior.bias);
     let mut off: Vec<f64> = means.iter().map(|mean| (mean - bias).norm()).collect();
     let sigma = median(&mut off).map_or(f64::INFINITY, |off| SIGMA_OF_MEDIAN * off);
@@ -184,22 +164,22 @@ fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
 /// the scale factors of their axes differ.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
-    let stands = standstills(run, table).into_iter();
-    let stands: Vec<Range<usize>> = stands.map(|standstill| standstill.samples).collect();
+    let stands = standstills(run, table);
     // One alone does not tell how far off the bias is that it shows.
     let (true, Some(first), Some(last)) = (stands.len() > 1, table.time.first(), table.time.last())
     else {
         return Vec::new();
     };
     let bias = bias_at_rest(run, &stands);
-    let mut edges = vec![imu.edge(*first).clamp(0.0, imu.len() as f64) as usize];
-    edges.extend(stands.iter().map(|s| s.start.midpoint(s.end)));
-    edges.push(imu.edge(*last).clamp(0.0, imu.len() as f64) as usize);
+    let covered = |time: f64| imu.edge(time).clamp(0.0, imu.len() as f64) as usize;
+    let middle = |dwell: &Dwell| dwell.samples.start.midpoint(dwell.samples.end);
+    let mut edges = vec![covered(*first)];
+    edges.extend(stands.iter().map(middle));
+    edges.push(covered(*last));
     let between = edges.windows(2).map(|pair| pair[0]..pair[1]);
     let whole = between.filter(|samples| !samples.is_empty() && imu.unbroken(samples));
-    whole
-        .filter_map(|samples| of_samples(run, table, samples, bias))
-        .collect()
+    let moves = whole.filter_map(|samples| of_samples(run, table, samples, bias));
+    moves.collect()
 }
 
 /// What both logs say of these samples; none where readings are too far apart, or nothing turns.
@@ -222,29 +202,26 @@ fn of_samples(
         (time[0].midpoint(time[1]), time[1] - time[0], angle)
     });
     // Two readings of three components each, as where standstills are found.
-    let by_table = Way::of(steps, SIGMAS * run.table.reading_sigma * 6f64.sqrt(), 0.0);
+    let noise = SIGMAS * run.table.reading_sigma * 6f64.sqrt();
+    let [by_table, time, table_rate] = way(steps, noise, 0.0);
     // A move that the end of a log cuts is seen as far as both logs go.
     let covered = |time: f64| (imu.edge(time).max(0.0) as usize).clamp(samples.start, samples.end);
-    let (start, covered) = (covered(first), covered(first)..covered(last));
-    let parts = imu.gyro.parts(covered, samples_of(STEP, imu.period));
-    let steps = parts.scan(start, |start, part| {
-        let duration = part.len() as f64 * imu.period;
-        let time = imu.time(*start) + 0.5 * duration;
-        *start += part.len();
-        let sum: Vector3<f64> = part.iter().sum();
-        Some((time, duration, (sum - bias * duration).norm()))
-    });
+    let steps = turning::steps(imu, covered(first)..covered(last), bias);
+    let steps = steps.map(|(time, duration, turned)| (time, duration, turned.norm()));
     let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt()
         + 3f64.sqrt() * imu.pulse.gyro;
     // A bias from dwells has Earth rate in it, too.
     let zero = SIGMAS * run.instrument.prior.gyro.bias_sigma.norm() + 2.0 * ROTATION_RATE;
-    let by_gyros = Way::of(steps, noise, zero);
-    let is_resolved = by_gyros.fastest.max(by_table.fastest) * interval < SHORTER_WAY;
-    let longest = by_gyros.angle.max(by_table.angle);
+    let [by_gyros, time_by_gyros, gyro_rate] = way(steps, noise, zero);
+    let is_resolved = gyro_rate.max(table_rate) * interval < SHORTER_WAY;
+    let longest = by_gyros.max(by_table);
+    let tolerance = tolerance(run) * longest + zero * (end - begin) + table_rate * imu.period;
     (is_resolved && longest > SMALLEST).then_some(Move {
         gyros: by_gyros,
         table: by_table,
-        tolerance: tolerance(run) * longest + zero * (end - begin) + by_table.fastest * imu.period,
+        time,
+        late: time_by_gyros - time,
+        tolerance,
         zero: (off + 2.0 * ROTATION_RATE) * (end - begin),
         interval,
     })

@@ -28,16 +28,14 @@ pub fn order(run: &Run) -> Option<String> {
         + prior.installation_sigma.norm_squared()
         + (prior.bias_sigma / run.site.gravity).norm_squared()
         + 3.0 * run.table.position_sigma.powi(2);
-    let rests = rests(run).into_iter();
-    let ups: Vec<(Vector3<f64>, Matrix3<f64>)> = rests
-        .filter_map(|rest| Some((rest.force.normalize(), rest.dwell.position?.attitude)))
-        .collect();
+    let mut rests = rests(run);
+    rests.retain(|rest| rest.dwell.position.is_some());
     let left = |axes: &AxisOrder, reordered: Reading| {
-        let squares = ups.iter().map(|(force, attitude)| {
-            let up = reordered(attitude).tr_mul(&Vector3::z());
-            (axes.apply(force) - up).norm_squared()
+        let squares = rests.iter().filter_map(|rest| {
+            let up = reordered(&rest.dwell.position.as_ref()?.attitude).tr_mul(&Vector3::z());
+            Some((axes.apply(&rest.force.normalize()) - up).norm_squared())
         });
-        squares.sum::<f64>() + expected * ups.len() as f64
+        squares.sum::<f64>() + expected * rests.len() as f64
     };
     let as_stated = AxisOrder::all().map(|axes| left(&axes, |attitude| *attitude));
     let as_stated = as_stated.fold(f64::INFINITY, f64::min);
@@ -53,7 +51,7 @@ pub fn order(run: &Run) -> Option<String> {
     ];
     let likelier = others.map(|(words, order)| {
         let ratio = as_stated / left(&AxisOrder::IDENTITY, order);
-        (1.5 * ups.len() as f64 * ratio.ln(), words)
+        (1.5 * rests.len() as f64 * ratio.ln(), words)
     });
     let limit = (others.len() as f64 / FALSE_ALARM).ln();
     let (log_ratio, words) = likelier.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -61,7 +59,7 @@ pub fn order(run: &Run) -> Option<String> {
         format!(
             "The table's quaternions {words} (the accelerometers' gravity in {} dwells is 10^{:.0} times more \
              likely so).",
-            ups.len(),
+            rests.len(),
             log_ratio / std::f64::consts::LN_10
         )
     })

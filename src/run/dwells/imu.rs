@@ -127,10 +127,7 @@ fn output_at_rest(run: &Run, gyro: &Windows) -> Option<Vector3<f64>> {
     let prior = &run.instrument.prior.gyro;
     let limit = (prior.bias_sigma * BIAS_SIGMAS)
         .add_scalar(ROTATION_RATE + STILL_RATE + STILL_SIGMAS * gyro.sigma);
-    let could_rest = |mean: &Vector3<f64>| {
-        let off = (mean - prior.bias).abs();
-        off.iter().zip(&limit).all(|(off, limit)| off <= limit)
-    };
+    let could_rest = |mean: &Vector3<f64>| (mean - prior.bias).abs() <= limit;
     let means = gyro.means.iter().copied();
     median_of_axes(&means.filter(could_rest).collect::<Vec<_>>())
 }

@@ -4,7 +4,6 @@ use std::fmt;
 use std::ops::Range;
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use super::rest::Rest;
 use super::turn::{Turn, zero};
@@ -61,40 +60,31 @@ pub enum Verdict {
     },
 }
 
-/// A section whose label the record contradicts, and what was made of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ContradictedLabel {
-    /// Its label.
-    pub label: String,
-    /// When it begins, s.
-    pub start: f64,
-    /// What the record says, after `section … `.
-    pub said: String,
-    /// Whether it was used, as far as the record does what the label says.
-    pub used: bool,
-}
-
-impl fmt::Display for ContradictedLabel {
+impl fmt::Display for LabelCheck {
+    /// What label and record disagree in, and whether the section is used nevertheless.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let used = match self.used {
+        let Segment { label, start, .. } = &self.segment;
+        let said = self.disagreement.as_deref().unwrap_or_default();
+        let used = match self.as_labelled.is_some() {
             true => "used with other borders",
             false => "not used",
         };
-        let (label, start, said) = (&self.label, self.start, &self.said);
         write!(f, "`{label}` at {start:.1} s {said} ({used})")
     }
 }
 
-/// Verdict, disagreement and samples as labelled of a [`LabelCheck`].
-type Checked = (Verdict, Option<String>, Option<Range<usize>>);
-
 /// Every labelled section against what the record does at these rests.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     let standstills = standstills(run);
+    let record = Record {
+        run,
+        rests,
+        standstills,
+    };
     let check = |segment: &Segment| {
         let (verdict, disagreement, as_labelled) = match segment.motion {
-            Some(LabelledMotion::Stands { up }) => position(run, rests, &standstills, segment, &up),
-            Some(LabelledMotion::Turns { axis, angle }) => turn(run, rests, segment, &axis, angle),
+            Some(LabelledMotion::Stands { up }) => record.position(segment, &up),
+            Some(LabelledMotion::Turns { axis, angle }) => record.turn(segment, &axis, angle),
             None => {
                 let nothing = "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect";
                 (Verdict::Unknown, Some(nothing.to_owned()), None)
@@ -110,98 +100,94 @@ pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     run.recording.segments.iter().map(check).collect()
 }
 
-/// A section that is labelled as a position.
-fn position(
-    run: &Run,
-    rests: &[Rest],
-    standstills: &[Range<usize>],
-    segment: &Segment,
-    up: &Vector3<f64>,
-) -> Checked {
-    // Samples of it in which it stands, where it turns in the others.
-    let standing = run.standing_in(&segment.samples, standstills);
-    let turns = standing.is_some();
-    let section = Dwell::of(standing.unwrap_or_else(|| segment.samples.clone()));
-    let off = section.force(run).angle(up);
-    let moving = moving(run, rests, &segment.samples);
-    let verdict = Verdict::Position { off, moving };
-    if off >= OTHER_AXIS {
+/// What labels are held against.
+struct Record<'a> {
+    run: &'a Run,
+    rests: &'a [Rest],
+    standstills: Vec<Range<usize>>,
+}
+
+/// Verdict, disagreement and samples as labelled of a [`LabelCheck`].
+type Checked = (Verdict, Option<String>, Option<Range<usize>>);
+
+impl Record<'_> {
+    /// A section that is labelled as a position.
+    fn position(&self, segment: &Segment, up: &Vector3<f64>) -> Checked {
+        // Samples of it in which it stands, where it turns in the others.
+        let standing = self.run.standing_in(&segment.samples, &self.standstills);
+        let turns = standing.is_some();
+        let section = Dwell::of(standing.unwrap_or_else(|| segment.samples.clone()));
+        let off = section.force(self.run).angle(up);
+        let moving = self.moving(&segment.samples);
+        let verdict = Verdict::Position { off, moving };
+        if off >= OTHER_AXIS {
+            let words = format!(
+                "has another axis up, {:.0}° off the label's: correct the label or body_axes",
+                off / DEGREE
+            );
+            return (verdict, Some(words), None);
+        }
+        let is_still = moving <= MOVING * (segment.end - segment.start) && !turns;
+        let words = (!is_still).then(|| format!("is not still for {moving:.1} s: shorten it"));
+        (verdict, words, Some(section.samples))
+    }
+
+    /// A section that is labelled as a turn by an angle.
+    fn turn(&self, segment: &Segment, axis: &Vector3<f64>, labelled: f64) -> Checked {
+        let (imu, samples) = (&self.run.recording.imu, segment.samples.clone());
+        let zero = zero(self.run, self.rests, samples.start);
+        let found = Turn::of(self.run, samples.clone(), &zero);
+        let off = (found.axis * found.angle.signum()).angle(axis);
+        let angle = |samples: &Range<usize>| {
+            imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
+        };
+        let within = angle(&samples).dot(axis);
+        let verdict = Verdict::Turn {
+            angle: within,
+            off: off.min(std::f64::consts::PI - off),
+        };
+        let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance(self.run);
+        let length = samples_of(END, imu.period).min(samples.len());
+        let (first, last) = (samples.start + length, samples.end - length);
+        let turns = |end: Range<usize>| angle(&end).norm() / length as f64 / imu.period > TURNING;
+        // Beyond sections laid end to end lies something else.
+        let whole = match imu.continuous {
+            true => self.to_rests(&samples),
+            false => samples.clone(),
+        };
+        let to_rests = angle(&whole).dot(axis);
+        let is_more = !imu.continuous || (to_rests - within).abs() > LOST;
+        if is_more && (turns(samples.start..first) || turns(last..samples.end)) {
+            let words =
+                "starts or ends during the turn: extend it until the sensor is still at both ends";
+            let as_labelled = (as_said(to_rests) && whole != samples).then_some(whole);
+            return (verdict, Some(words.to_owned()), as_labelled);
+        }
+        if as_said(within) {
+            return (verdict, None, Some(samples));
+        }
         let words = format!(
-            "has another axis up, {:.0}° off the label's: correct the label or body_axes",
-            off / DEGREE
+            "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, \
+             or the gyros' scale",
+            within / DEGREE,
+            labelled / DEGREE
         );
-        return (verdict, Some(words), None);
+        (verdict, Some(words), None)
     }
-    let is_still = moving <= MOVING * (segment.end - segment.start) && !turns;
-    let words = (!is_still).then(|| format!("is not still for {moving:.1} s: shorten it"));
-    (verdict, words, Some(section.samples))
-}
 
-/// A section that is labelled as a turn by an angle.
-fn turn(
-    run: &Run,
-    rests: &[Rest],
-    segment: &Segment,
-    axis: &Vector3<f64>,
-    labelled: f64,
-) -> Checked {
-    let (imu, samples) = (&run.recording.imu, segment.samples.clone());
-    let zero = zero(run, rests, samples.start);
-    let angle = |samples: &Range<usize>| {
-        imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
-    };
-    let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance(run);
-    let found = Turn::of(run, samples.clone(), &zero);
-    let off = (found.axis * found.angle.signum()).angle(axis);
-    let within = angle(&samples).dot(axis);
-    let verdict = Verdict::Turn {
-        angle: within,
-        off: off.min(std::f64::consts::PI - off),
-    };
-    let length = samples_of(END, imu.period).min(samples.len());
-    let ends = [
-        samples.start..samples.start + length,
-        samples.end - length..samples.end,
-    ];
-    let turns = |end: &Range<usize>| angle(end).norm() / length as f64 / imu.period > TURNING;
-    // Beyond sections laid end to end lies something else.
-    let whole = match imu.continuous {
-        true => to_rests(rests, &samples),
-        false => samples.clone(),
-    };
-    let to_rests = angle(&whole).dot(axis);
-    if ends.iter().any(turns) && (!imu.continuous || (to_rests - within).abs() > LOST) {
-        let words =
-            "starts or ends during the turn: extend it until the sensor is still at both ends";
-        let as_labelled = (as_said(to_rests) && whole != samples).then_some(whole);
-        return (verdict, Some(words.to_owned()), as_labelled);
+    /// Some samples and those between them and the rests before and after.
+    fn to_rests(&self, samples: &Range<usize>) -> Range<usize> {
+        let mut dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
+        let before = dwells.clone().rfind(|dwell| dwell.start < samples.start);
+        let after = dwells.find(|dwell| dwell.end > samples.end);
+        before.map_or(samples.start, |dwell| dwell.end.min(samples.start))
+            ..after.map_or(samples.end, |dwell| dwell.start.max(samples.end))
     }
-    if as_said(within) {
-        return (verdict, None, Some(samples));
+
+    /// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.
+    fn moving(&self, samples: &Range<usize>) -> f64 {
+        let dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
+        let standing: usize = dwells.map(|dwell| common(dwell, samples).len()).sum();
+        samples.len().saturating_sub(standing) as f64 * self.run.recording.imu.period
     }
-    let words = format!(
-        "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, or the gyros' scale",
-        within / DEGREE,
-        labelled / DEGREE
-    );
-    (verdict, Some(words), None)
-}
-
-/// Some samples and those between them and the rests before and after.
-fn to_rests(rests: &[Rest], samples: &Range<usize>) -> Range<usize> {
-    let dwells = || rests.iter().map(|rest| &rest.dwell.samples);
-    let before = dwells().filter(|dwell| dwell.start < samples.start);
-    let after = dwells().filter(|dwell| dwell.end > samples.end);
-    let begin = before.map(|dwell| dwell.end.min(samples.start)).max();
-    let end = after.map(|dwell| dwell.start.max(samples.end)).min();
-    begin.unwrap_or(samples.start)..end.unwrap_or(samples.end)
-}
-
-/// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.
-fn moving(run: &Run, rests: &[Rest], samples: &Range<usize>) -> f64 {
-    let standing = rests
-        .iter()
-        .map(|rest| common(&rest.dwell.samples, samples).len());
-    let moving = samples.len().saturating_sub(standing.sum());
-    moving as f64 * run.recording.imu.period
 }

@@ -7,10 +7,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::rest::Rest;
 use crate::attitude::{exp, log};
 use crate::imu::Sensor;
-use crate::navigation::samples_of;
 use crate::recording::LabelledMotion;
 use crate::run::Run;
-use crate::run::turning::{SMALLEST, STEP};
+use crate::run::turning::{SMALLEST, steps};
 use crate::units::DEGREE;
 
 /// Turns about one axis go along it for this part of their way at least …
@@ -41,23 +40,25 @@ pub struct Turn {
     pub rotation: Matrix3<f64>,
     /// The rest before it, by its place among the rests; the next one comes after.
     pub from: Option<usize>,
+    /// Angle between up as the gyros carry it over the turn and as the accelerometers see it after, rad.
+    pub off_gravity: Option<f64>,
+    /// Angle between the turn by the gyros and by the table, rad.
+    pub off_table: Option<f64>,
 }
 
 impl Turn {
-    /// What these samples turn by, with this output as zero, rad/s; the rest before is not said.
+    /// Of these samples, with this output as zero, rad/s.
     pub fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
-        let period = run.recording.imu.period;
-        let length = samples_of(STEP, period);
+        let imu = &run.recording.imu;
         let mut attitude = Matrix3::identity();
+        for increment in imu.gyro.within(samples.clone()) {
+            attitude *= exp(increment - zero * imu.period);
+        }
         let (mut sum, mut way, mut fastest) = (Vector3::zeros(), 0.0, 0.0f64);
-        for step in run.recording.imu.gyro.parts(samples.clone(), length) {
-            let turned = step.iter().sum::<Vector3<f64>>() - zero * (step.len() as f64 * period);
-            for increment in step.iter() {
-                attitude *= exp(increment - zero * period);
-            }
+        for (_, duration, turned) in steps(imu, samples.clone(), *zero) {
             sum += turned;
             way += turned.norm();
-            fastest = fastest.max(turned.amax() / (step.len() as f64 * period));
+            fastest = fastest.max(turned.amax() / duration);
         }
         let off = log(&(exp(sum) * attitude.transpose())).norm();
         let single = sum.norm() > ALONG * way && off < ONE_AXIS + APART * way;
@@ -73,22 +74,9 @@ impl Turn {
             fastest,
             rotation: attitude,
             from: None,
+            off_gravity: None,
+            off_table: None,
         }
-    }
-
-    /// Angle between up as the gyros carry it over the turn and as the accelerometers see it after, rad.
-    pub fn off_gravity(&self, rests: &[Rest]) -> Option<f64> {
-        let from = self.from?;
-        let carried = self.rotation.tr_mul(&rests.get(from)?.force);
-        Some(carried.angle(&rests.get(from + 1)?.force))
-    }
-
-    /// Angle between the turn by the gyros and by the table, rad.
-    pub fn off_table(&self, rests: &[Rest]) -> Option<f64> {
-        let from = self.from?;
-        let attitude = |rest: usize| Some(rests.get(rest)?.dwell.position.as_ref()?.attitude);
-        let said = attitude(from)?.tr_mul(&attitude(from + 1)?);
-        Some(log(&(self.rotation * said.transpose())).norm())
     }
 
     /// The body axis that it is about, if it is about one.
@@ -113,27 +101,33 @@ pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
 /// What turns from rest to rest, or in sections labelled as turns.
 pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
     let imu = &run.recording.imu;
-    let between = rests.windows(2).enumerate().map(|(from, pair)| {
-        let samples = pair[0].dwell.samples.end..pair[1].dwell.samples.start;
-        (Some(from), samples)
-    });
-    let segments = run.recording.segments.iter();
-    let labelled = segments.filter(|of| matches!(of.motion, Some(LabelledMotion::Turns { .. })));
-    let labelled = labelled.map(|segment| (None, segment.samples.clone()));
-    let all: Vec<(Option<usize>, Range<usize>)> = match imu.continuous {
-        true => between.collect(),
-        false => labelled.collect(),
-    };
-    let turns = all.into_iter().filter_map(|(from, samples)| {
+    let turn = |samples: Range<usize>| {
         // What was lost on the way may be any turn.
         let known = !samples.is_empty() && !imu.is_lost(&samples);
         let zero = zero(run, rests, samples.start);
-        known.then(|| Turn {
-            from,
-            ..Turn::of(run, samples, &zero)
+        let turn = known.then(|| Turn::of(run, samples, &zero));
+        turn.filter(|turn| turn.angle.abs() > SMALLEST || turn.fastest > SMALLEST)
+    };
+    let between = rests.windows(2).enumerate().filter_map(|(from, pair)| {
+        let turn = turn(pair[0].dwell.samples.end..pair[1].dwell.samples.start)?;
+        let attitude = |rest: &Rest| Some(rest.dwell.position.as_ref()?.attitude);
+        let by_table = attitude(&pair[0]).zip(attitude(&pair[1]));
+        let carried = turn.rotation.tr_mul(&pair[0].force);
+        Some(Turn {
+            from: Some(from),
+            off_gravity: Some(carried.angle(&pair[1].force)),
+            off_table: by_table
+                .map(|(before, after)| log(&(turn.rotation * after.tr_mul(&before))).norm()),
+            ..turn
         })
     });
-    turns
-        .filter(|turn| turn.angle.abs() > SMALLEST || turn.fastest > SMALLEST)
-        .collect()
+    let segments = run.recording.segments.iter();
+    let labelled = segments.filter_map(|segment| match segment.motion {
+        Some(LabelledMotion::Turns { .. }) => turn(segment.samples.clone()),
+        _ => None,
+    });
+    match imu.continuous {
+        true => between.collect(),
+        false => labelled.collect(),
+    }
 }
