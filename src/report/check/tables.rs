@@ -125,7 +125,7 @@ pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
             way_up(rest.up.axis, rest.up.down),
             degrees(rest.up.tilt),
         ];
-        row.extend(after(k).map_or([NONE; 4].map(str::to_owned), |turn| moved(turn)));
+        row.extend(after(k).map_or([NONE; 4].map(str::to_owned), moved));
         row
     };
     let headings = [
