@@ -166,8 +166,7 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);
     // One alone does not tell how far off the bias is that it shows.
-    let (true, Some(first), Some(last)) = (stands.len() > 1, table.time.first(), table.time.last())
-    else {
+    let ([_, _, ..], [first, .., last]) = (&stands[..], &table.time[..]) else {
         return Vec::new();
     };
     let bias = bias_at_rest(run, &stands);
