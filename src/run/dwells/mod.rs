@@ -41,9 +41,13 @@ impl Run {
             }
         }
         dwells.retain_mut(|dwell| {
-            let known = imu.stretches.iter().rev();
-            let known = known.map(|stretch| common(&stretch.samples, &dwell.samples));
-            dwell.samples = known.max_by_key(Range::len).unwrap_or_default();
+            for missing in imu.missing() {
+                // The longer part before or after it.
+                let known = [missing.end..imu.len(), 0..missing.start];
+                let parts = known.map(|known| common(&known, &dwell.samples));
+                let longer = parts.into_iter().max_by_key(Range::len);
+                dwell.samples = longer.unwrap_or_default();
+            }
             dwell.duration(imu) >= SHORTEST
         });
         dwells
