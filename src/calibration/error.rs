@@ -5,7 +5,7 @@ use thiserror::Error;
 use crate::calibration::start::mounting::Mounting;
 use crate::imu::Sensor;
 use crate::run::LONG_ENOUGH;
-use crate::run::motion::ContradictedLabel;
+use crate::run::motion::LabelCheck;
 
 /// Why a calibration cannot be had from a run. Each message says what was found, what was expected
 /// and what to do.
@@ -70,11 +70,11 @@ pub enum CalibrationError {
     /// No labelled section does what its label says.
     #[error(
         "no labelled section does what its label says, expected at least one: {}; correct [segments], or \
-         leave it out and let every dwell and turn count", .contradicted.iter().map(ContradictedLabel::to_string).collect::<Vec<_>>().join("; ")
+         leave it out and let every dwell and turn count", .contradicted.iter().map(LabelCheck::to_string).collect::<Vec<_>>().join("; ")
     )]
     LabelsContradicted {
         /// All of them.
-        contradicted: Vec<ContradictedLabel>,
+        contradicted: Vec<LabelCheck>,
     },
     /// Progress said so.
     #[error("stopped before the iterations ended; nothing was written")]

@@ -70,7 +70,9 @@ impl Linearisation {
             return triads;
         };
         let middle = 0.5 * (imu.time(samples.start) + imu.time(samples.end));
-        let state = thermal.state(&temperature.at(middle), &temperature.rate(middle));
+        let state = thermal
+            .range
+            .state(&temperature.at(middle), &temperature.rate(middle));
         PerSensor::from_fn(|sensor| {
             let coefficients = self.thermal.get(sensor);
             triads.get(sensor).warmed(coefficients, state.get(sensor))

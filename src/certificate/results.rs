@@ -22,7 +22,7 @@ impl Quantity {
     /// Symbol of the unit that it is shown in, and its size in SI.
     pub fn unit(self) -> (&'static str, f64) {
         match self {
-            Self::Term(term) => term.unit(),
+            Self::Term(term) => term.entry().unit,
             Self::Parameters(group) => match (group.kind(), group.sensor()) {
                 (ParameterKind::Scale, _) => ("ppm", PPM),
                 (ParameterKind::Installation, _) => ("″", ARCSEC),
@@ -128,9 +128,9 @@ pub(super) fn results(
 pub(super) fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
-        let record = calibration.terms.get(name)?;
+        let record = calibration.terms.get(&name)?;
         Some(Measured {
-            name: name.to_owned(),
+            name,
             quantity: Quantity::Term(Term::of(k)?),
             value: record.value,
             expanded: COVERAGE_FACTOR * record.sigma?,

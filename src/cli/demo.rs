@@ -145,14 +145,11 @@ fn static_positions(seed: Option<u64>) -> anyhow::Result<Simulated> {
 /// The closed form from the first part of each dwell that makes this part of the run's time.
 fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
     let imu = &problem.run().recording.imu;
-    let seconds = |dwell: &Dwell| dwell.samples.len() as f64 * imu.period;
-    let at_rest: f64 = problem.dwells().map(seconds).sum();
+    let at_rest: f64 = problem.dwells().map(|dwell| dwell.duration(imu)).sum();
     let moves = imu.duration() - at_rest;
     let part = (part * imu.duration() - moves) / at_rest;
     let dwells = problem.dwells();
-    let dwells: Vec<Dwell> = dwells
-        .map(|dwell| dwell.first_seconds(part * seconds(dwell), imu))
-        .collect();
+    let dwells: Vec<Dwell> = dwells.map(|dwell| dwell.first_part(part, imu)).collect();
     Ok(calibration::six_position_of(problem, &dwells)?)
 }
 

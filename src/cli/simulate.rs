@@ -120,10 +120,7 @@ fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
     let on = (0..TERM_PARAMETERS).filter(|&k| simulated.run.instrument.term_sigma[k] > 0.0);
     let term = |k: usize| {
         let (value, sigma) = (simulated.terms[k], None);
-        Some((
-            Term::parameter_name(k)?.to_owned(),
-            TermRecord { value, sigma },
-        ))
+        Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
     };
     on.filter_map(term).collect()
 }

@@ -221,7 +221,9 @@ impl Calibration {
                 "a row of covariance for each coefficient, one of cross for each parameter",
             );
         }
-        let anywhere = thermal.state(&PerSensor::default(), &PerSensor::default());
+        let anywhere = thermal
+            .range
+            .state(&PerSensor::default(), &PerSensor::default());
         match self.in_state(&anywhere) {
             Ok(_) => Ok(()),
             Err(found) => error(

@@ -223,7 +223,7 @@ fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
     for term in Term::ALL {
         let meaning = "1σ of each of its parameters";
         if let Some(fields) = terms.table(term.name(), &["sigma"])? {
-            let unit = term.unit().1;
+            let unit = term.entry().unit.1;
             let most = (term.entry().largest / unit).round();
             let given = fields.need("sigma", meaning)?.positive_to(most)?;
             for parameter in term.parameters() {

@@ -422,7 +422,7 @@ bias_sigma = {bias_sigma}
 fn terms_text(run: &Run) -> Option<String> {
     let on = Term::ALL.into_iter().filter_map(|term| {
         let sigma = run.instrument.term_sigma[term.parameters().start];
-        let (unit, in_si) = term.unit();
+        let (unit, in_si) = term.entry().unit;
         let line = || {
             format!(
                 "{} = {{ sigma = {:?} }} # {unit}\n",

@@ -86,10 +86,9 @@ impl AxisOrder {
         self.matrix().determinant() > 0.0
     }
 
-    /// Number of axes that do not stay as they are.
-    pub fn changed(&self) -> usize {
-        let changed = |&axis: &usize| self.source[axis] != axis || self.reversed[axis];
-        (0..3).filter(changed).count()
+    /// The axes that do not stay as they are.
+    pub fn changed(&self) -> impl Iterator<Item = usize> {
+        (0..3).filter(|&axis| self.source[axis] != axis || self.reversed[axis])
     }
 }
 

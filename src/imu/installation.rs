@@ -69,20 +69,17 @@ impl InstallationForm {
 
     /// The installation matrix of these angles (pure numbers, direction cosines or radians).
     pub fn matrix(self, angles: &SVector<f64, ANGLES>) -> Matrix3<f64> {
-        let mut c = Matrix3::identity();
+        let mut c = Matrix3::zeros();
         for angle in 0..self.angle_names().len() {
             c += self.slope(angle) * angles[angle];
         }
-        if self == Self::General {
-            for row in 0..3 {
-                let off: f64 = (0..3)
-                    .filter(|&column| column != row)
-                    .map(|column| c[(row, column)].powi(2))
-                    .sum();
+        for row in 0..3 {
+            c[(row, row)] = match self {
                 // Beyond a right angle no row of unit norm exists; a filter's step that
                 // far is caught by its cost, not here.
-                c[(row, row)] = (1.0 - off).max(0.0).sqrt();
-            }
+                Self::General => (1.0 - c.row(row).norm_squared()).max(0.0).sqrt(),
+                Self::SixAngle | Self::ThreeAngle => 1.0,
+            };
         }
         c
     }

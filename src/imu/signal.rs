@@ -55,17 +55,12 @@ impl Noise {
         let overlap = (one[1].min(other[1]) - one[0].max(other[0])).max(0.0);
         let white = self.random_walk.powi(2) * overlap;
         let bias = self.gauss_markov.map_or(0.0, |gauss_markov| {
-            let GaussMarkov {
-                sigma,
-                correlation_time: tau,
-            } = gauss_markov;
+            let (sigma, tau) = (gauss_markov.sigma, gauss_markov.correlation_time);
             // Between the spans each integral is a factor: nothing is lost of spans that are long or far
             // apart.
-            let (first, second) = if one[0] <= other[0] {
-                (one, other)
-            } else {
-                (other, one)
-            };
+            let mut spans = [one, other];
+            spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            let [first, second] = spans;
             let decayed = |time: f64| -(-time / tau).exp_m1();
             let double_integral = if second[0] >= first[1] {
                 let apart = (-(second[0] - first[1]) / tau).exp();
@@ -102,11 +97,8 @@ impl NoiseSource {
     /// A source for samples of this period in s; the Gauss–Markov bias starts from its stationary
     /// distribution.
     pub fn new(noise: Noise, period: f64, rng: &mut impl Rng) -> Self {
-        let bias = noise
-            .gauss_markov
-            .map_or_else(Vector3::zeros, |gauss_markov| {
-                normal(rng) * gauss_markov.sigma
-            });
+        let of_bias = noise.gauss_markov;
+        let bias = of_bias.map_or_else(Vector3::zeros, |of| normal(rng) * of.sigma);
         Self {
             noise,
             period,

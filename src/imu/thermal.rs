@@ -8,7 +8,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::{InstallationForm, PARAMETERS, ParameterKind, PerSensor, Sensor, Triad};
+use super::{PARAMETERS, PerSensor, Sensor, Triad};
 
 /// Highest order of the polynomials.
 pub const HIGHEST_ORDER: usize = 5;
@@ -66,21 +66,23 @@ impl ThermalRange {
         values
     }
 
+    /// Whether a temperature lies within it, except for the noise of its sensor, K.
+    pub fn contains(&self, temperature: f64, tolerance: f64) -> bool {
+        (self.lowest - tolerance..=self.highest + tolerance).contains(&temperature)
+    }
+}
+
+impl PerSensor<ThermalRange> {
     /// Both triads' functions at temperatures in °C that change by these rates in K/s.
     pub fn state(
-        ranges: &PerSensor<Self>,
+        &self,
         temperatures: &PerSensor<[f64; 3]>,
         rates: &PerSensor<[f64; 3]>,
     ) -> ThermalState {
         PerSensor::from_fn(|sensor| {
             let (t, rate) = (temperatures.get(sensor), rates.get(sensor));
-            [0, 1, 2].map(|axis| ranges.get(sensor).values(t[axis], rate[axis]))
+            [0, 1, 2].map(|axis| self.get(sensor).values(t[axis], rate[axis]))
         })
-    }
-
-    /// Whether a temperature lies within it, except for the noise of its sensor, K.
-    pub fn contains(&self, temperature: f64, tolerance: f64) -> bool {
-        (self.lowest - tolerance..=self.highest + tolerance).contains(&temperature)
     }
 }
 
@@ -96,22 +98,11 @@ fn legendre(x: f64) -> [f64; HIGHEST_ORDER + 1] {
 }
 
 impl Triad {
-    /// The axis whose temperature a parameter follows: that of its output.
-    pub fn axis(form: InstallationForm, parameter: usize) -> Option<usize> {
-        match Self::kind(parameter) {
-            ParameterKind::Scale => Some(parameter),
-            ParameterKind::Installation => {
-                let (row, _) = form.angle_names().get(parameter - 3)?;
-                Some(*row)
-            }
-            ParameterKind::Bias => Some(parameter - (PARAMETERS - 3)),
-        }
-    }
-
     /// The triad where the functions of temperature have these values on its axes.
     pub fn warmed(&self, coefficients: &ThermalCoefficients, values: &[ThermalValues; 3]) -> Self {
         let mut v = self.to_vector();
         for (parameter, of) in coefficients.row_iter().enumerate() {
+            // A parameter follows the temperature of the axis whose output it is of.
             if let Some(axis) = Self::axis(self.form, parameter) {
                 v[parameter] += of.transpose().dot(&values[axis]);
             }
@@ -130,26 +121,16 @@ pub struct ThermalModel {
 }
 
 impl ThermalModel {
-    /// Both triads' functions at temperatures in °C that change by so many K/s.
-    pub fn state(
-        &self,
-        temperatures: &PerSensor<[f64; 3]>,
-        rates: &PerSensor<[f64; 3]>,
-    ) -> ThermalState {
-        ThermalRange::state(&self.range, temperatures, rates)
-    }
-
     /// Triad, parameter and function of each coefficient that is on.
     pub fn on(&self) -> impl Iterator<Item = (Sensor, usize, usize)> + '_ {
-        let all = Sensor::ALL.into_iter().flat_map(|sensor| {
-            let functions = (0..THERMAL_FUNCTIONS).map(move |function| (sensor, function));
-            functions.flat_map(|(sensor, function)| {
-                (0..PARAMETERS).map(move |parameter| (sensor, parameter, function))
-            })
-        });
-        all.filter(|&(sensor, parameter, function)| {
-            self.sigma.get(sensor)[(parameter, function)] > 0.0
-        })
+        // Column by column.
+        let of_triad = move |sensor| {
+            let places =
+                (0..PARAMETERS * THERMAL_FUNCTIONS).map(|k| (k % PARAMETERS, k / PARAMETERS));
+            let on = places.filter(move |&place| self.sigma.get(sensor)[place] > 0.0);
+            on.map(move |(parameter, function)| (sensor, parameter, function))
+        };
+        Sensor::ALL.into_iter().flat_map(of_triad)
     }
 }
 
@@ -157,27 +138,23 @@ impl ThermalModel {
 /// power on.
 pub fn powers(range: &ThermalRange, coefficients: &ThermalValues) -> [f64; HIGHEST_ORDER] {
     // Newton's divided differences at as many temperatures as there are coefficients, and the reference.
-    let nodes: [f64; HIGHEST_ORDER + 1] = std::array::from_fn(|k| {
-        let span = range.highest - range.lowest;
-        span.max(1.0) * (k as f64) / HIGHEST_ORDER as f64
-    });
-    let at = |by: f64| {
-        let mut values = range.values(range.reference + by, 0.0);
-        values[RATE] = 0.0;
-        coefficients.dot(&values)
-    };
+    const NODES: usize = HIGHEST_ORDER + 1;
+    let span = (range.highest - range.lowest).max(1.0);
+    let node = |k: usize| span * (k as f64) / HIGHEST_ORDER as f64;
+    let last = node(HIGHEST_ORDER);
     let vandermonde =
-        SMatrix::<f64, { HIGHEST_ORDER + 1 }, { HIGHEST_ORDER + 1 }>::from_fn(|row, column| {
-            (nodes[row] / nodes[HIGHEST_ORDER]).powi(column as i32)
-        });
-    let values = SVector::<f64, { HIGHEST_ORDER + 1 }>::from_fn(|row, _| at(nodes[row]));
+        SMatrix::<f64, NODES, NODES>::from_fn(|row, column| (node(row) / last).powi(column as i32));
+    let values = SVector::<f64, NODES>::from_fn(|row, _| {
+        coefficients.dot(&range.values(range.reference + node(row), 0.0))
+    });
     let scaled = vandermonde.lu().solve(&values).unwrap_or_default();
-    std::array::from_fn(|k| scaled[k + 1] / nodes[HIGHEST_ORDER].powi(k as i32 + 1))
+    std::array::from_fn(|k| scaled[k + 1] / last.powi(k as i32 + 1))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imu::InstallationForm;
     use approx::assert_relative_eq;
 
     const RANGE: ThermalRange = ThermalRange {

@@ -78,31 +78,24 @@ impl Triad {
     /// holds the derivative for any input. Parameters that the form does not have get zeros.
     pub fn response(&self) -> [SMatrix<f64, 3, 4>; PARAMETERS] {
         let c = self.installation();
+        let scale = Matrix3::from_diagonal(&self.scale);
         let mut response = [SMatrix::<f64, 3, 4>::zeros(); PARAMETERS];
         for axis in 0..3 {
-            response[SCALE + axis]
-                .fixed_view_mut::<1, 3>(axis, 0)
-                .copy_from(&c.row(axis));
+            let mut of_scale = response[SCALE + axis].fixed_view_mut::<1, 3>(axis, 0);
+            of_scale.copy_from(&c.row(axis));
             response[BIAS + axis][(axis, 3)] = 1.0;
         }
         for angle in 0..self.form.angle_names().len() {
-            let derivative =
-                Matrix3::from_diagonal(&self.scale) * self.form.derivative(&self.angles, angle);
-            response[INSTALLATION + angle]
-                .fixed_view_mut::<3, 3>(0, 0)
-                .copy_from(&derivative);
+            let mut of_angle = response[INSTALLATION + angle].fixed_columns_mut::<3>(0);
+            of_angle.copy_from(&(scale * self.form.derivative(&self.angles, angle)));
         }
         response
     }
 
     /// The parameters as a vector.
     pub fn to_vector(&self) -> TriadVector {
-        let mut v = TriadVector::zeros();
-        v.fixed_rows_mut::<3>(SCALE).copy_from(&self.scale);
-        v.fixed_rows_mut::<ANGLES>(INSTALLATION)
-            .copy_from(&self.angles);
-        v.fixed_rows_mut::<3>(BIAS).copy_from(&self.bias);
-        v
+        let parts = self.scale.iter().chain(&self.angles).chain(&self.bias);
+        TriadVector::from_iterator(parts.copied())
     }
 
     /// The triad of a parameter vector.
@@ -135,7 +128,7 @@ impl Triad {
 
     /// Which parameters a form has.
     pub fn has_parameter(form: InstallationForm, parameter: usize) -> bool {
-        !(INSTALLATION + form.angle_names().len()..BIAS).contains(&parameter)
+        Self::axis(form, parameter).is_some()
     }
 
     /// What a parameter is.
@@ -147,6 +140,18 @@ impl Triad {
         }
     }
 
+    /// The axis whose output a parameter is of; `None` if the form does not have the parameter.
+    pub fn axis(form: InstallationForm, parameter: usize) -> Option<usize> {
+        match Self::kind(parameter) {
+            ParameterKind::Scale => Some(parameter - SCALE),
+            ParameterKind::Installation => {
+                let angle = form.angle_names().get(parameter - INSTALLATION);
+                angle.map(|&(row, _)| row)
+            }
+            ParameterKind::Bias => Some(parameter - BIAS),
+        }
+    }
+
     /// The name of a parameter in files, such as `gyro.installation.xy`; `None` if the form does not
     /// have it, or no form has.
     pub fn parameter_name(
@@ -154,14 +159,14 @@ impl Triad {
         form: InstallationForm,
         parameter: usize,
     ) -> Option<String> {
-        let sensor = sensor.name();
+        let (sensor, axis) = (sensor.name(), AXES.get(Self::axis(form, parameter)?)?);
         Some(match Self::kind(parameter) {
-            ParameterKind::Scale => format!("{sensor}.scale.{}", AXES[parameter - SCALE]),
+            ParameterKind::Scale => format!("{sensor}.scale.{axis}"),
             ParameterKind::Installation => {
-                let &(row, column) = form.angle_names().get(parameter - INSTALLATION)?;
-                format!("{sensor}.installation.{}{}", AXES[row], AXES[column])
+                let (_, column) = form.angle_names()[parameter - INSTALLATION];
+                format!("{sensor}.installation.{axis}{}", AXES[column])
             }
-            ParameterKind::Bias => format!("{sensor}.bias.{}", AXES.get(parameter - BIAS)?),
+            ParameterKind::Bias => format!("{sensor}.bias.{axis}"),
         })
     }
 }
@@ -206,15 +211,14 @@ impl Prior {
 
     /// 1σ of each parameter; zero for those that the form does not have.
     pub fn sigma(&self, form: InstallationForm) -> TriadVector {
-        let mut sigma = TriadVector::zeros();
-        sigma
-            .fixed_rows_mut::<3>(SCALE)
-            .copy_from(&self.scale_sigma);
-        for (angle, &(row, _)) in form.angle_names().iter().enumerate() {
-            sigma[INSTALLATION + angle] = self.installation_sigma[row];
-        }
-        sigma.fixed_rows_mut::<3>(BIAS).copy_from(&self.bias_sigma);
-        sigma
+        TriadVector::from_fn(|parameter, _| {
+            let of_axes = match Triad::kind(parameter) {
+                ParameterKind::Scale => self.scale_sigma,
+                ParameterKind::Installation => self.installation_sigma,
+                ParameterKind::Bias => self.bias_sigma,
+            };
+            Triad::axis(form, parameter).map_or(0.0, |axis| of_axes[axis])
+        })
     }
 }
 

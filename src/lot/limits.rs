@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::function::erf::erfc;
 
-use super::unit::Sample;
+use super::quantity::Sample;
 
 /// What units must be, and how sure that must be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,6 +5,7 @@
 
 mod limits;
 mod outlier;
+mod quantity;
 mod spread;
 mod statistics;
 #[cfg(test)]
@@ -14,20 +15,20 @@ mod unit;
 
 use nalgebra::Vector3;
 
-use crate::calibration::result::Calibration;
-use crate::calibration::result::frame::{Canonical, free_parameters};
-use crate::imu::{BodyFrame, Nominal, ParameterKind, PerSensor, Sensor, Triad};
-use crate::statistics::median;
+use crate::calibration::result::frame::Canonical;
+use crate::imu::{BodyFrame, Nominal, PerSensor};
+use crate::statistics::median_of_axes;
 
 use limits::{checks, overall};
 use statistics::of_all;
-use unit::{axes, noise_at_rest};
+use unit::noise_at_rest;
 
 pub use limits::{Check, Limit, Specification, Verdict, probability_outside};
+pub use quantity::{Quantity, Sample};
 pub use spread::{Scatter, Spread};
 pub use statistics::{FALSE_ALARM, FALSE_TREND, Statistics};
 pub use trend::{Against, Trend};
-pub use unit::{Calibrated, Quantity, Row, Sample, Unit};
+pub use unit::{Calibrated, Row, Unit};
 
 /// What the units say together.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,34 +51,27 @@ pub struct Lot {
 impl Lot {
     /// Brings units together, and holds them against limits where they are given.
     pub fn new(units: Vec<Unit>, specification: Option<Specification>) -> Self {
-        let usable: Vec<Result<&Calibrated, String>> = units.iter().map(usable).collect();
-        let output = common_output(usable.iter().flatten().map(|of| &of.calibration));
-        let alike = |of: &&Calibrated| output.is_none() || of.calibration.unit.as_ref() == output;
-        let compared: Vec<&Calibrated> = usable.iter().flatten().copied().filter(alike).collect();
-        let accelerometer =
+        let output = common_output(&units);
+        let usable: Vec<_> = units.iter().map(|unit| usable(unit, output)).collect();
+        let compared: Vec<&Calibrated> = usable.iter().flatten().copied().collect();
+        let by_accelerometers =
             |of: &&Calibrated| of.calibration.body_frame == BodyFrame::Accelerometer;
-        let body_frame = match compared.iter().any(accelerometer) {
+        let body_frame = match compared.iter().any(by_accelerometers) {
             true => BodyFrame::Accelerometer,
             false => BodyFrame::Table,
         };
         let nominal = PerSensor::from_fn(|sensor| {
-            Nominal(Vector3::from_fn(|axis, _| {
-                let stated = compared.iter().map(|of| of.nominal.get(sensor)[axis]);
-                median(&mut stated.collect::<Vec<_>>()).unwrap_or(1.0)
-            }))
+            let stated = compared.iter().map(|of| (*of.nominal.get(sensor)).into());
+            let middle = median_of_axes(&stated.collect::<Vec<_>>());
+            Nominal(middle.unwrap_or(Vector3::repeat(1.0)))
         });
         let shared_gravity = shared_gravity(&compared);
         let canonical = |(unit, usable): (&Unit, Result<&Calibrated, String>)| {
-            let calibrated = usable?;
-            if !alike(&calibrated) {
-                return Err(other_output(calibrated, output));
-            }
-            Canonical::new(&unit.name, &calibrated.calibration, &nominal, body_frame)
+            Canonical::new(&unit.name, &usable?.calibration, &nominal, body_frame)
                 .map_err(|error| error.to_string())
         };
-        let canonical: Vec<_> = units.iter().zip(usable.clone()).map(canonical).collect();
-        let rows = units.into_iter().zip(canonical);
-        let rows = rows.map(|(unit, canonical)| {
+        let canonical: Vec<_> = units.iter().zip(usable).map(canonical).collect();
+        let rows = units.into_iter().zip(canonical).map(|(unit, canonical)| {
             let mut row = Row {
                 noise: noise_at_rest(&unit, &nominal),
                 unit,
@@ -92,19 +86,12 @@ impl Lot {
             row
         });
         let rows: Vec<Row> = rows.collect();
-        let parameters = free_parameters(body_frame).into_iter();
-        let noise = axes().map(|(sensor, axis)| Quantity::Noise(sensor, axis));
-        let quantities: Vec<Quantity> = parameters.map(Quantity::Parameter).chain(noise).collect();
-        let statistics = of_all(&rows, &quantities, |quantity| match quantity {
-            Quantity::Parameter(index) if is_accel_scale(index) => shared_gravity.unwrap_or(0.0),
-            _ => 0.0,
-        });
         Self {
+            statistics: of_all(&rows, body_frame, shared_gravity.unwrap_or(0.0)),
             rows,
             body_frame,
             nominal,
             shared_gravity,
-            statistics,
             specification,
         }
     }
@@ -123,37 +110,37 @@ impl Lot {
     }
 }
 
-/// What was calibrated and may be used.
-fn usable(unit: &Unit) -> Result<&Calibrated, String> {
+/// What was calibrated and may be compared with units of this output.
+fn usable<'a>(
+    unit: &'a Unit,
+    output: Option<&PerSensor<String>>,
+) -> Result<&'a Calibrated, String> {
     let calibrated = unit.calibrated.as_ref().map_err(Clone::clone)?;
-    match calibrated.calibration.converged {
-        Some(false) => Err("not converged; values and σ may not be used".to_owned()),
-        _ => Ok(calibrated),
+    let own = calibrated.calibration.unit.as_ref();
+    if calibrated.calibration.converged == Some(false) {
+        return Err("not converged; values and σ may not be used".to_owned());
     }
+    if output.is_none() || own == output {
+        return Ok(calibrated);
+    }
+    let [own, of_lot] = [own, output].map(|of| match of {
+        Some(unit) => format!("`{}` and `{}`", unit.gyro, unit.accel),
+        None => "not stated".to_owned(),
+    });
+    Err(format!(
+        "outputs are {own}, those of most units of the lot {of_lot}; give units of one type"
+    ))
 }
 
 /// The output that most units have, the first of them where several are as many.
-fn common_output<'a>(
-    calibrations: impl Iterator<Item = &'a Calibration>,
-) -> Option<&'a PerSensor<String>> {
-    let stated: Vec<&PerSensor<String>> = calibrations.filter_map(|c| c.unit.as_ref()).collect();
-    let count = |of: &PerSensor<String>| stated.iter().filter(|other| **other == of).count();
-    let most = stated.iter().map(|of| count(of)).max()?;
-    stated.iter().copied().find(|of| count(of) == most)
-}
-
-fn other_output(calibrated: &Calibrated, output: Option<&PerSensor<String>>) -> String {
-    let words = |of: Option<&PerSensor<String>>| {
-        of.map_or_else(
-            || "not stated".to_owned(),
-            |unit| format!("`{}` and `{}`", unit.gyro, unit.accel),
-        )
-    };
-    format!(
-        "outputs are {}, those of most units of the lot {}; give units of one type",
-        words(calibrated.calibration.unit.as_ref()),
-        words(output)
-    )
+fn common_output(units: &[Unit]) -> Option<&PerSensor<String>> {
+    let usable = units.iter().filter_map(|unit| usable(unit, None).ok());
+    let stated: Vec<_> = usable
+        .filter_map(|of| of.calibration.unit.as_ref())
+        .collect();
+    // Of those that are as many the last is taken.
+    let count = |of: &&PerSensor<String>| stated.iter().filter(|other| *other == of).count();
+    stated.iter().rev().copied().max_by_key(count)
 }
 
 /// Relative 1σ of gravity, if all have it from the same place.
@@ -161,9 +148,4 @@ fn shared_gravity(all: &[&Calibrated]) -> Option<f64> {
     let first = all.first()?.calibration.gravity?;
     let same = all.iter().all(|of| of.calibration.gravity == Some(first));
     (same && first.sigma_m_s2 > 0.0).then(|| first.sigma_m_s2 / first.m_s2)
-}
-
-fn is_accel_scale(index: usize) -> bool {
-    let (sensor, of_triad) = crate::calibration::sensor_and_parameter(index);
-    sensor == Sensor::Accel && Triad::kind(of_triad) == ParameterKind::Scale
 }

@@ -1,9 +1,11 @@
 //! One quantity over all units.
 
 use super::outlier::outliers;
+use super::quantity::{Quantity, Sample};
 use super::spread::{Scatter, scatter};
 use super::trend::{Against, Trend, trend};
-use super::unit::{Quantity, Row, Sample};
+use super::unit::Row;
+use crate::imu::BodyFrame;
 
 /// False-alarm rate of outliers, and of spreads called real: for all quantities of a lot at once.
 pub const FALSE_ALARM: f64 = 0.01;
@@ -27,27 +29,24 @@ pub struct Statistics {
     pub trends: Vec<Trend>,
 }
 
-/// Statistics of every quantity that two units have. `shared` is the 1σ of an error that all units have in
-/// common.
-pub fn of_all(
-    rows: &[Row],
-    quantities: &[Quantity],
-    shared: impl Fn(Quantity) -> f64,
-) -> Vec<Statistics> {
-    let count = quantities.len() as f64;
-    let alarm = FALSE_ALARM / count;
-    let false_trend = FALSE_TREND / count / Against::ALL.len() as f64;
-    let of = |&quantity: &Quantity| {
-        let shared = shared(quantity);
-        let common = shared * shared;
-        let (places, samples): (Vec<usize>, Vec<(f64, f64)>) = rows
-            .iter()
-            .enumerate()
-            .filter_map(|(place, row)| {
-                let Sample { value, sigma } = row.sample(quantity)?;
-                Some((place, (value, (sigma * sigma - common).max(0.0))))
-            })
-            .unzip();
+/// Statistics of every quantity that two units have. `gravity` is the relative 1σ of gravity that all share.
+pub fn of_all(rows: &[Row], body_frame: BodyFrame, gravity: f64) -> Vec<Statistics> {
+    let quantities = Quantity::all(body_frame);
+    let alarm = FALSE_ALARM / quantities.len() as f64;
+    let false_trend = FALSE_TREND / quantities.len() as f64 / Against::ALL.len() as f64;
+    let of = |quantity: Quantity| {
+        let shared = if quantity.follows_gravity() {
+            gravity
+        } else {
+            0.0
+        };
+        let sample = |(place, row): (usize, &Row)| {
+            let Sample { value, sigma } = row.sample(quantity)?;
+            let own = (sigma * sigma - shared * shared).max(0.0);
+            Some((place, (value, own)))
+        };
+        let samples = rows.iter().enumerate().filter_map(sample);
+        let (places, samples): (Vec<usize>, Vec<(f64, f64)>) = samples.unzip();
         let apart = outliers(&samples, alarm);
         let of_lot: Vec<usize> = (0..samples.len()).filter(|k| !apart.contains(k)).collect();
         let without: Vec<(f64, f64)> = of_lot.iter().map(|&k| samples[k]).collect();
@@ -73,5 +72,5 @@ pub fn of_all(
             scatter,
         })
     };
-    quantities.iter().filter_map(of).collect()
+    quantities.into_iter().filter_map(of).collect()
 }

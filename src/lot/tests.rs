@@ -7,7 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::calibration::result::{GravityRecord, TriadRecord};
+use crate::calibration::result::{Calibration, GravityRecord, TriadRecord};
+use crate::imu::Sensor;
 use crate::noise::RestNoise;
 use crate::units::PPM;
 

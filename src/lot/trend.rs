@@ -55,15 +55,14 @@ fn days(date: &str) -> Option<f64> {
     // Algorithms*).
     let (month, day) = (i64::from(date.month), i64::from(date.day));
     let year = i64::from(date.year) - i64::from(month <= 2);
-    let (era, of_era) = (year.div_euclid(400), year.rem_euclid(400));
+    let leap_days = year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
     let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
-    let whole = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
-    let seconds = stamp.time.map_or(0.0, |time| {
-        f64::from(time.hour) * 3600.0
-            + f64::from(time.minute) * 60.0
-            + f64::from(time.second.unwrap_or_default())
+    let whole = (365 * year + leap_days + of_year - 719_468) as f64;
+    let part = stamp.time.map_or(0.0, |time| {
+        let minutes = 60.0 * f64::from(time.hour) + f64::from(time.minute);
+        (60.0 * minutes + f64::from(time.second.unwrap_or_default())) / DAY
     });
-    Some(whole as f64 + seconds / DAY)
+    Some(whole + part)
 }
 
 /// A weighted line through values: `(place, value, weight)`; `None` if it is within chance.

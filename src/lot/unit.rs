@@ -1,49 +1,13 @@
-//! One unit of a lot, and the quantities that are compared between units.
+//! One unit of a lot.
 
 use std::collections::BTreeMap;
 
 use super::limits::{Check, Verdict};
-use crate::calibration::parameter_name;
+use super::quantity::{Quantity, Sample, axes};
 use crate::calibration::result::Calibration;
 use crate::calibration::result::frame::Canonical;
-use crate::imu::{AXES, InstallationForm, Nominal, PerSensor, Sensor};
+use crate::imu::{Nominal, PerSensor, Sensor};
 use crate::noise::RestNoise;
-
-/// Every axis of both triads.
-pub fn axes() -> impl Iterator<Item = (Sensor, usize)> {
-    let axes = |sensor| (0..AXES.len()).map(move |axis| (sensor, axis));
-    Sensor::ALL.into_iter().flat_map(axes)
-}
-
-/// A number that every unit has one of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// A parameter of both triads by its index, in the general form.
-    Parameter(usize),
-    /// The natural logarithm of an axis' white-noise density at rest.
-    Noise(Sensor, usize),
-}
-
-impl Quantity {
-    /// Its name in files, such as `gyro.scale.x` or `gyro.noise.x`.
-    pub fn name(self) -> String {
-        match self {
-            Self::Parameter(index) => {
-                parameter_name(InstallationForm::General, index).unwrap_or_default()
-            }
-            Self::Noise(sensor, axis) => format!("{}.noise.{}", sensor.name(), AXES[axis]),
-        }
-    }
-}
-
-/// A unit's value with its 1σ.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    /// Normalised, in SI.
-    pub value: f64,
-    /// Zero where none is claimed.
-    pub sigma: f64,
-}
 
 /// A unit with what came of it.
 #[derive(Debug, Clone, PartialEq)]

@@ -221,7 +221,7 @@ fn term_sigma(terms: &BTreeMap<TermName, TermFile>) -> TermVector {
     let mut all = TermVector::zeros();
     for (&TermName(term), given) in terms {
         for parameter in term.parameters() {
-            all[parameter] = given.sigma.0 * term.unit().1;
+            all[parameter] = given.sigma.0 * term.entry().unit.1;
         }
     }
     all

@@ -50,14 +50,11 @@ pub fn overlapping(increments: impl Iterator<Item = f64>, period: f64, sizes: &[
     let integral: Vec<f64> = std::iter::once(0.0).chain(rises).collect();
     let point = |&size: &usize| {
         let time = size as f64 * period;
-        let count = integral
-            .len()
-            .checked_sub(2 * size)
-            .filter(|count| *count > 0)?;
         let places = integral.windows(2 * size + 1);
+        let count = places.len();
         let squares = places.map(|w| (w[2 * size] - 2.0 * w[size] + w[0]).powi(2));
         let mean_square = squares.sum::<f64>() / count as f64;
-        (size > 0).then(|| (time, mean_square / (2.0 * time * time)))
+        (size > 0 && count > 0).then(|| (time, mean_square / (2.0 * time * time)))
     };
     let (tau, variance) = sizes.iter().filter_map(point).unzip();
     Curve { tau, variance }

@@ -55,13 +55,12 @@ pub enum StretchError {
 }
 
 fn known(labels: &[String]) -> String {
-    if labels.is_empty() {
-        return "the run has no [segments]: leave --segment out, or add them to run.toml"
-            .to_owned();
-    }
     let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
     quoted.dedup();
-    format!("there are {}", quoted.join(", "))
+    match quoted.join(", ").as_str() {
+        "" => "the run has no [segments]: leave --segment out, or add them to run.toml".to_owned(),
+        quoted => format!("there are {quoted}"),
+    }
 }
 
 impl Stretch {

@@ -46,18 +46,23 @@ impl Scale {
 }
 
 /// A quantity that noise figures state.
-struct Quantity {
-    sensor: Sensor,
-    name: &'static str,
+#[derive(Debug, PartialEq)]
+pub struct Quantity {
+    /// Of which triad.
+    pub sensor: Sensor,
+    /// Such as `angle random walk`.
+    pub name: &'static str,
     conventions: &'static [Convention],
 }
 
 /// A unit of a quantity, and who uses it.
-struct Convention {
-    unit: &'static str,
+#[derive(Debug, PartialEq)]
+pub struct Convention {
+    /// Its symbol.
+    pub unit: &'static str,
     scale: Scale,
     /// What it is called, and by whom. Keys of programs, in backticks, name the unit, too.
-    meaning: &'static str,
+    pub meaning: &'static str,
     /// Other ways to write the unit, normalised.
     also: &'static [&'static str],
 }
@@ -157,10 +162,8 @@ static QUANTITIES: [Quantity; 6] = [
 /// A noise figure in every convention.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversion {
-    /// Of which triad.
-    pub sensor: Sensor,
-    /// What the figure states, such as `angle random walk`.
-    pub quantity: &'static str,
+    /// What the figure states.
+    pub quantity: &'static Quantity,
     /// The figure as it was taken.
     pub given: Line,
     /// Sample rate in Hz.
@@ -170,15 +173,7 @@ pub struct Conversion {
 }
 
 /// A noise figure in one convention.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
-    /// How many.
-    pub value: f64,
-    /// Of what.
-    pub unit: &'static str,
-    /// What it is called, and by whom.
-    pub meaning: &'static str,
-}
+pub type Line = (f64, &'static Convention);
 
 /// A figure that could not be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -223,20 +218,13 @@ pub fn convert(value: f64, unit: &str, rate: Option<f64>) -> Result<Conversion, 
             None => ConversionError::Unknown { unit },
         });
     };
-    let line = |row: &Convention, value| Line {
-        value,
-        unit: row.unit,
-        meaning: row.meaning,
-    };
     let rows = quantity.conventions.iter();
+    let lines = rows.filter_map(|row| Some((row.scale.value(strength, rate)?, row)));
     Ok(Conversion {
-        sensor: quantity.sensor,
-        quantity: quantity.name,
-        given: line(given, value),
+        quantity,
+        given: (value, given),
         rate,
-        lines: rows
-            .filter_map(|row| Some(line(row, row.scale.value(strength, rate)?)))
-            .collect(),
+        lines: lines.collect(),
     })
 }
 
@@ -264,14 +252,9 @@ fn normalised(unit: &str) -> String {
 
 fn hint(unit: &str) -> String {
     let wanted = normalised(unit);
-    let likeness = |row: &Convention| {
-        let names = row.names();
-        names
-            .map(|name| strsim::normalized_damerau_levenshtein(&wanted, &name))
-            .fold(0.0, f64::max)
-    };
+    let likeness = |name: String| strsim::normalized_damerau_levenshtein(&wanted, &name);
     all()
-        .map(|(_, row)| (likeness(row), row.unit))
+        .flat_map(|(_, row)| row.names().map(|name| (likeness(name), row.unit)))
         .filter(|(likeness, _)| *likeness >= 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
@@ -295,8 +278,8 @@ mod tests {
     use super::*;
 
     fn value(conversion: &Conversion, unit: &str) -> f64 {
-        let line = conversion.lines.iter().find(|line| line.unit == unit);
-        line.unwrap_or_else(|| panic!("no {unit}")).value
+        let line = conversion.lines.iter().find(|(_, row)| row.unit == unit);
+        line.unwrap_or_else(|| panic!("no {unit}")).0
     }
 
     fn assert_close(found: f64, expected: f64) {
@@ -372,10 +355,10 @@ mod tests {
         let walk = convert(1e-4, "accelerometer_random_walk", None).unwrap();
         assert_close(value(&walk, "µg/√h"), 1e-4 * 60.0 / 9.806_65e-6);
         let floor = convert(1.0, "deg/h", None).unwrap();
-        assert_eq!(floor.quantity, "gyro bias instability");
+        assert_eq!(floor.quantity.name, "gyro bias instability");
         assert_close(value(&floor, "rad/s"), 4.848_137e-6);
         let samples = convert(1.0, "deg/h", Some(100.0)).unwrap();
-        assert_eq!(samples.quantity, "angle random walk");
+        assert_eq!(samples.quantity.name, "angle random walk");
         assert_close(value(&samples, "°/h/√Hz"), 0.1);
     }
 
@@ -384,7 +367,7 @@ mod tests {
         for quantity in &QUANTITIES {
             for convention in quantity.conventions {
                 let conversion = convert(3.0, convention.unit, Some(50.0)).unwrap();
-                assert_close(value(&conversion, conversion.given.unit), 3.0);
+                assert_close(value(&conversion, conversion.given.1.unit), 3.0);
             }
         }
     }

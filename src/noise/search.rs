@@ -43,12 +43,6 @@ const BELOW_95: f64 = 1.645;
 const NEAR: usize = 3;
 /// The octaves at the short end of a curve, in points, whose departure is looked for by itself.
 const SHORT_ENDS: [usize; 2] = [2, 4];
-/// What a filter models as a Gauss–Markov process.
-const VARYING: [Process; 3] = [
-    Process::BiasInstability,
-    Process::RateRandomWalk,
-    Process::MARKOV,
-];
 
 impl Clusters {
     /// What the mean of some curves over these clusters shows; `None` if they are of others, too short or
@@ -59,10 +53,8 @@ impl Clusters {
     /// all, and one octave more for a remainder just below notice. What no start helps is taken as it is, with
     /// a misfit.
     pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
-        if curves
-            .iter()
-            .any(|of| of.variance.len() != self.sizes().len())
-        {
+        let is_of_these = |of: &&Curve| of.variance.len() == self.sizes().len();
+        if !curves.iter().all(is_of_these) {
             return None;
         }
         let curve = mean(curves);
@@ -97,12 +89,12 @@ impl Clusters {
 
 /// As how many equal ones the averaged curves count at each cluster time.
 fn shares(curves: &[&Curve]) -> Vec<f64> {
-    let points = curves.iter().map(|curve| curve.variance.len()).min();
     let share = |point: usize| {
         let at = || curves.iter().map(|curve| curve.variance[point]);
         at().sum::<f64>().powi(2) / at().map(|v| v * v).sum::<f64>()
     };
-    (0..points.unwrap_or(0)).map(share).collect()
+    let points = curves.first().map_or(0, |curve| curve.tau.len());
+    (0..points).map(share).collect()
 }
 
 /// A curve that is searched.
@@ -135,7 +127,7 @@ impl Candidate {
 
     fn has_time(&self) -> bool {
         let mut processes = self.mixture.iter();
-        processes.any(|(process, _)| process.same_kind(Process::MARKOV))
+        processes.any(|(process, _)| process.correlation_time().is_some())
     }
 
     fn chi_square(&self) -> f64 {
@@ -280,11 +272,12 @@ impl<'a> Search<'a> {
     fn is_possible(&self, mixture: &[(Process, f64)]) -> bool {
         let (tau, variance) = (self.tau(), self.variance());
         let is_there = |&(process, strength): &(Process, f64)| {
-            let share =
-                |(&tau, v): (&f64, &f64)| (strength * process.allan_variance(tau) / v).abs();
-            let most = tau.iter().zip(variance).map(share).fold(0.0, f64::max);
+            let is_part = |(&tau, v): (&f64, &f64)| {
+                (strength * process.allan_variance(tau) / v).abs() >= 1e-6
+            };
             // What a bandwidth takes away from the integral of white noise falls with the same slope.
-            most >= 1e-6 && (strength >= 0.0 || process == Process::Quantisation)
+            tau.iter().zip(variance).any(is_part)
+                && (strength >= 0.0 || process == Process::Quantisation)
         };
         // A Gauss–Markov process that is most of the shortest cluster time is no bias, but the output's own noise,
         // whose bandwidth is less than that of the samples.
@@ -400,17 +393,15 @@ impl<'a> Search<'a> {
 
     /// With the nearest Gauss–Markov process in the place of whatever varies.
     fn for_filter(&self, best: &Candidate) -> Option<Vec<Found>> {
-        let is_varying = |process: &Process| VARYING.iter().any(|of| of.same_kind(*process));
+        use Process::{BiasInstability, GaussMarkov, RateRandomWalk};
         let mut others = best.processes();
-        others.retain(|process| !is_varying(process));
-        let is_near = |of: &Vec<Process>| match of.split_last() {
-            Some((last, rest)) => last.same_kind(Process::MARKOV) && rest == others,
-            None => false,
-        };
+        others.retain(|of| !matches!(of, BiasInstability | RateRandomWalk | GaussMarkov { .. }));
         let mixture = if others.len() == best.mixture.len() {
             best.mixture.clone()
         } else {
-            let nearest = self.least(self.combinations().filter(is_near), |of| of.unlikelihood)?;
+            let markov = self.clusters.markov(self.tau()[0]);
+            let near = markov.map(|process| [&others[..], &[process]].concat());
+            let nearest = self.least(near, |of| of.unlikelihood)?;
             self.refined(nearest).mixture
         };
         found(&self.weighted(&mixture)?, &mixture)

@@ -150,19 +150,20 @@ fn knocks(values: &[f64]) -> usize {
 /// within those of the axes, else the root of the axes' mean square. The mean separates processes better, and a
 /// process that it alone finds takes from the others.
 pub fn within(mut mean: Identified, axes: &[&Identified]) -> Identified {
-    let found: Vec<&[Found]> = axes.iter().map(|axis| axis.found.as_slice()).collect();
-    hold(&mut mean.found, &found);
-    let for_filter: Vec<&[Found]> = axes.iter().map(|axis| axis.for_filter.as_slice()).collect();
-    hold(&mut mean.for_filter, &for_filter);
+    if axes.is_empty() {
+        return mean;
+    }
+    hold(&mut mean.found, axes, |of| &of.found);
+    hold(&mut mean.for_filter, axes, |of| &of.for_filter);
     let Identified { found, hidden, .. } = &mut mean;
     hidden.retain(|hidden| of_kind(found, hidden.process).is_none());
     mean
 }
 
-fn hold(own: &mut Vec<Found>, axes: &[&[Found]]) {
+fn hold(own: &mut Vec<Found>, axes: &[&Identified], found: fn(&Identified) -> &Vec<Found>) {
     for process in Process::SLOPES.into_iter().chain([Process::MARKOV]) {
-        let of_axes: Option<Vec<&Found>> = axes.iter().map(|of| of_kind(of, process)).collect();
-        let Some(of_axes) = of_axes.filter(|of| !of.is_empty()) else {
+        let of_axes = axes.iter().map(|axis| of_kind(found(axis), process));
+        let Some(of_axes) = of_axes.collect::<Option<Vec<_>>>() else {
             continue;
         };
         let is_between = |own: &Found, value: fn(&Found) -> f64| {

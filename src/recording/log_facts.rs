@@ -124,6 +124,11 @@ impl ColumnFacts {
             unit,
         }
     }
+
+    /// The step as a rate, rad/s or m/s², of samples of this length, s.
+    pub fn step_rate(&self, period: f64) -> Option<f64> {
+        Some((self.step? * self.unit / period).abs())
+    }
 }
 
 impl ColumnFacts {

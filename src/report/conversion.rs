@@ -7,30 +7,30 @@ use crate::noise::conventions::{Conversion, Line};
 
 /// How the figure was taken, and a line for each convention.
 pub fn document(conversion: &Conversion) -> Document {
-    let given = &conversion.given;
+    let (value, given) = conversion.given;
     let at = conversion
         .rate
         .map_or(String::new(), |rate| format!(" at {rate} Hz"));
-    let mut document = Document::new(format!("{} {}{at}", given.value, given.unit));
+    let mut document = Document::new(format!("{value} {}{at}", given.unit));
     document.lead = vec![format!("Read as {}. The same is:", given.meaning)];
-    let name = |line: &Line| format!("{:>11} {}", digits(line.value), line.unit);
-    let rows = conversion
-        .lines
-        .iter()
-        .map(|line| (name(line), line.meaning));
+    let row = |&(value, of): &Line| {
+        let name = format!("{:>11} {}", digits(value), of.unit);
+        (name, of.meaning)
+    };
+    let rows = conversion.lines.iter().map(row);
     document.both(Facts::new("", rows));
     document.data = json!({
-        "quantity": conversion.quantity,
-        "sensor": conversion.sensor.name(),
-        "given": data(given),
+        "quantity": conversion.quantity.name,
+        "sensor": conversion.quantity.sensor.name(),
+        "given": data(&conversion.given),
         "rate_hz": conversion.rate,
         "figures": conversion.lines.iter().map(data).collect::<Value>(),
     });
     document
 }
 
-fn data(line: &Line) -> Value {
-    json!({ "value": line.value, "unit": line.unit, "meaning": line.meaning })
+fn data(&(value, of): &Line) -> Value {
+    json!({ "value": value, "unit": of.unit, "meaning": of.meaning })
 }
 
 /// Five digits, with a power of ten where that is shorter.

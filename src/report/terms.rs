@@ -26,7 +26,7 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
 /// Symbol and SI value of the unit that its parameters are shown in.
 pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
-        ErrorTerm::Instrument(term) => term.unit(),
+        ErrorTerm::Instrument(term) => term.entry().unit,
         ErrorTerm::TableBase | ErrorTerm::TableAxes(_) | ErrorTerm::GaussMarkovBias => {
             ("″", ARCSEC)
         }

@@ -5,10 +5,13 @@
 //! the files' units and axes end in [`crate::formats`].
 
 mod doubts;
+mod dwell;
 mod dwells;
 pub mod motion;
+mod turning;
 
-pub use dwells::{Dwell, LONG_ENOUGH, MeanOutput, Position};
+pub use dwell::{Dwell, MeanOutput, Position};
+pub use dwells::imu::LONG_ENOUGH;
 
 use serde::{Deserialize, Serialize};
 

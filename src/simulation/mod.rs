@@ -278,14 +278,15 @@ impl Scenario {
     }
 
     fn geometry(&self, imperfection: &Imperfection) -> SVector<f64, TABLE_GEOMETRY> {
-        let axes = self.table.axes.iter().map(|axis| axis.direction);
-        let tilts = axes.clone().zip(&imperfection.tilt).skip(1);
-        let tilts = tilts.flat_map(|(axis, tilt)| across(&axis).map(|a| a.dot(tilt)));
-        let harmonics = axes.zip(&imperfection.harmonics);
-        let wobble = harmonics.clone().flat_map(|(axis, harmonics)| {
-            harmonics.map(|turn| across(&axis).map(|across| across.dot(&turn)))
+        let directions = self.table.axes.iter().map(|axis| axis.direction);
+        let axes = directions.zip(&imperfection.axes);
+        let tilts = axes.clone().skip(1);
+        let tilts = tilts.flat_map(|(axis, of)| across(&axis).map(|across| across.dot(&of.tilt)));
+        let wobble = axes.clone().flat_map(|(axis, of)| {
+            of.harmonics
+                .map(|turn| across(&axis).map(|across| across.dot(&turn)))
         });
-        let encoder = harmonics.flat_map(|(axis, harmonics)| harmonics.map(|turn| axis.dot(&turn)));
+        let encoder = axes.flat_map(|(axis, of)| of.harmonics.map(|turn| axis.dot(&turn)));
         let mut geometry = TableGeometry {
             base: imperfection.base,
             ..TableGeometry::default()

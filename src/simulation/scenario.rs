@@ -151,7 +151,7 @@ impl Scenario {
             ErrorTerm::TableAxes(kind) => {
                 let errors = &mut self.table.errors;
                 if errors.of_axes(kind) == 0.0 {
-                    errors.set_of_axes(kind, usual_axis_error(kind, errors.position));
+                    *errors.of_axes_mut(kind) = usual_axis_error(kind, errors.position);
                 }
             }
             ErrorTerm::Instrument(term) => {

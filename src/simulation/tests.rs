@@ -121,7 +121,8 @@ fn level_and_north_errors_move_the_truth_but_not_the_reading() {
     let [read, of_crooked] =
         [&plain, &crooked].map(|made| made.run.recording.table.as_ref().unwrap());
     assert_eq!(read.attitude, of_crooked.attitude);
-    assert!(!plain.run.table.geometry.any() && crooked.run.table.geometry.any());
+    assert_eq!(plain.run.table.geometry, TableGeometry::default());
+    assert_ne!(crooked.run.table.geometry, TableGeometry::default());
     assert_ne!(
         plain.run.recording.imu.accel,
         crooked.run.recording.imu.accel

@@ -5,7 +5,7 @@ use crate::calibration::{
     CalibrationError, Estimate, Group, Mounting, OBSERVED_BELOW, Options, Problem,
 };
 use crate::calibration::{bound, coarse_start, parameter_name, sensor_and_parameter, six_position};
-use crate::imu::{BodyFrame, InstallationForm, PerSensor, Sensor, TermVector};
+use crate::imu::{BodyFrame, InstallationForm, TermVector};
 use crate::run::motion::{self, LabelCheck, Rest, Turn};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
@@ -23,29 +23,20 @@ pub struct Survey {
     pub turns: Vec<Turn>,
     /// Labelled sections against what was found.
     pub labels: Vec<LabelCheck>,
-    /// What each method could see.
-    pub methods: Vec<MethodOutlook>,
+    /// What each method could see: what is to be expected, or why nothing is.
+    pub methods: Vec<(Path, Result<Expected, String>)>,
     /// A mounting that the record shows in place of the stated one.
     pub mounting: Option<Mounting>,
-    /// How long it stands.
-    pub standing: Standing,
-    /// Step of each axis' grid, rad/s or m/s², where the file's values lie on one.
-    pub steps: PerSensor<[Option<f64>; 3]>,
+    /// How long it stands in all, s.
+    pub standing: f64,
+    /// Length of the longest dwell, s.
+    pub longest: f64,
     /// Directions of up that are further apart than [`APART`].
     pub directions: usize,
 }
 
 /// Directions nearer to each other than this, rad, count as one.
 pub const APART: f64 = 15.0 * DEGREE;
-
-/// How long the instrument stands.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Standing {
-    /// In all, s.
-    pub total: f64,
-    /// In the longest dwell, s.
-    pub longest: f64,
-}
 
 /// A way to a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,15 +63,6 @@ impl Path {
     }
 }
 
-/// What a method could see.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MethodOutlook {
-    /// The method.
-    pub path: Path,
-    /// What is to be expected, or why nothing is.
-    pub expected: Result<Expected, String>,
-}
-
 /// σ to be expected, in the general installation form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
@@ -94,22 +76,19 @@ impl Survey {
     /// Looks at a run.
     pub fn of(run: &Run) -> Self {
         let rests = motion::rests(run);
-        let durations = || rests.iter().map(|rest| rest.duration(run));
+        let durations = || {
+            rests
+                .iter()
+                .map(|rest| rest.dwell.duration(&run.recording.imu))
+        };
+        let expected = |path| (path, expected(run, path).map_err(|error| error.to_string()));
         Self {
             turns: motion::turns(run, &rests),
             labels: motion::checks(run, &rests),
-            methods: Path::ALL
-                .map(|path| MethodOutlook {
-                    path,
-                    expected: expected(run, path),
-                })
-                .into(),
+            methods: Path::ALL.map(expected).into(),
             mounting: Mounting::contradicted(&Problem::new(run, &Options::default())),
-            standing: Standing {
-                total: durations().sum(),
-                longest: durations().fold(0.0, f64::max),
-            },
-            steps: PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| step(run, sensor, axis))),
+            standing: durations().sum(),
+            longest: durations().fold(0.0, f64::max),
             directions: directions(&rests),
             rests,
         }
@@ -137,28 +116,20 @@ fn directions(rests: &[Rest]) -> usize {
     known.len()
 }
 
-/// A step of the file's values as a rate.
-fn step(run: &Run, sensor: Sensor, axis: usize) -> Option<f64> {
-    let column = &run.recording.imu.log.as_ref()?.columns.get(sensor)[axis];
-    Some((column.step? * column.unit / run.recording.imu.period).abs())
-}
-
-fn expected(run: &Run, path: Path) -> Result<Expected, String> {
-    let expected = match path {
+fn expected(run: &Run, path: Path) -> Result<Expected, CalibrationError> {
+    let aiding = match path {
         Path::SixPosition => {
-            let problem = Problem::new(run, &Options::default());
-            six_position(&problem)
-                .map(|closed| summary(run, closed.reference.body_frame(), &closed.estimate))
+            let closed = six_position(&Problem::new(run, &Options::default()))?;
+            let body_frame = closed.reference.body_frame();
+            return Ok(summary(run, body_frame, &closed.estimate));
         }
-        Path::TableAiding if run.recording.table.is_none() => Err(CalibrationError::NoTable),
-        Path::TableAiding => filtered(run, Aiding::Table),
-        Path::VelocityAiding => filtered(run, Aiding::Velocity),
+        Path::TableAiding if run.recording.table.is_none() => {
+            return Err(CalibrationError::NoTable);
+        }
+        Path::TableAiding => Aiding::Table,
+        Path::VelocityAiding => Aiding::Velocity,
     };
-    expected.map_err(|error| error.to_string())
-}
-
-/// What the filter ends with, linearised where it would begin.
-fn filtered(run: &Run, aiding: Aiding) -> Result<Expected, CalibrationError> {
+    // What the filter ends with, linearised where it would begin.
     let problem = Problem::new(run, &Options::default().aiding(aiding));
     let start = coarse_start(&problem)?;
     let bound = bound(&problem, &start.at.triads, &TermVector::zeros())?;
@@ -177,13 +148,10 @@ fn summary(run: &Run, body_frame: BodyFrame, estimate: &Estimate) -> Expected {
         let (sensor, of_triad) = sensor_and_parameter(k);
         sigma[k] > OBSERVED_BELOW * prior.get(sensor)[of_triad]
     };
+    let unobserved = estimate.estimated().filter(hidden);
     Expected {
         sigma: Group::all().map(group).collect(),
-        unobserved: estimate
-            .estimated()
-            .filter(hidden)
-            .filter_map(|k| parameter_name(FORM, k))
-            .collect(),
+        unobserved: unobserved.filter_map(|k| parameter_name(FORM, k)).collect(),
     }
 }
 

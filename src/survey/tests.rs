@@ -102,12 +102,8 @@ fn what_a_run_lacks_is_not_promised() {
     let run = demo();
     let of = |run: &Run, path| {
         let survey = Survey::of(run);
-        survey
-            .methods
-            .into_iter()
-            .find(|m| m.path == path)
-            .unwrap()
-            .expected
+        let mut methods = survey.methods.into_iter();
+        methods.find(|(of, _)| *of == path).unwrap().1
     };
     assert!(of(&run, Path::TableAiding).unwrap().unobserved.is_empty());
     let mut alone = run.clone();

@@ -32,6 +32,9 @@ impl Kinematics {
     }
 }
 
+/// Rotation vectors that go with each of [`phases`] of an angle, rad.
+type Harmonics = [Vector3<f64>; PHASES];
+
 /// The joints that move during one stretch of a path, and what is fixed around them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
@@ -46,7 +49,7 @@ struct Joint {
     axis: Vector3<f64>,
     from: f64,
     profile: Profile,
-    harmonics: [Vector3<f64>; PHASES],
+    harmonics: Harmonics,
     behind: Matrix3<f64>,
 }
 
@@ -61,10 +64,9 @@ impl Chain {
 
     /// A body that turns about an axis of its own.
     pub fn about_body_axis(attitude: Matrix3<f64>, axis: Vector3<f64>, profile: Profile) -> Self {
-        Self {
-            base: attitude,
-            joints: vec![Joint::new(axis, 0.0, profile, [Vector3::zeros(); PHASES])],
-        }
+        let mut chain = Self::still(attitude);
+        chain.turn(axis, 0.0, profile, Default::default());
+        chain
     }
 
     /// A table whose axes turn from these angles along these profiles; without profiles it stands.
@@ -75,20 +77,13 @@ impl Chain {
         profiles: &[Profile],
     ) -> Self {
         let mut chain = Self::still(exp(imperfection.base));
-        let parts = table
-            .axes
-            .iter()
-            .zip(angles)
-            .zip(imperfection.tilt.iter().zip(&imperfection.harmonics));
-        for (i, ((axis, &from), (tilt, &harmonics))) in parts.enumerate() {
-            chain.fix(&exp(*tilt));
+        let axes = table.axes.iter().zip(&imperfection.axes).zip(angles);
+        for (i, ((axis, errors), &from)) in axes.enumerate() {
+            chain.fix(&exp(errors.tilt));
             match profiles.get(i).filter(|profile| profile.duration() > 0.0) {
-                Some(&profile) => {
-                    let joint = Joint::new(axis.direction, from, profile, harmonics);
-                    chain.joints.push(joint);
-                }
+                Some(&profile) => chain.turn(axis.direction, from, profile, errors.harmonics),
                 None => {
-                    for (harmonic, value) in harmonics.iter().zip(phases(from)) {
+                    for (harmonic, value) in errors.harmonics.iter().zip(phases(from)) {
                         chain.fix(&exp(harmonic * value));
                     }
                     chain.fix(&exp(axis.direction * from));
@@ -97,6 +92,16 @@ impl Chain {
         }
         chain.fix(&table.mount);
         chain
+    }
+
+    fn turn(&mut self, axis: Vector3<f64>, from: f64, profile: Profile, harmonics: Harmonics) {
+        self.joints.push(Joint {
+            axis,
+            from,
+            profile,
+            harmonics,
+            behind: Matrix3::identity(),
+        });
     }
 
     fn fix(&mut self, rotation: &Matrix3<f64>) {
@@ -112,22 +117,15 @@ impl Chain {
 
     /// How long the slowest joint takes, s.
     pub fn duration(&self) -> f64 {
-        self.joints
-            .iter()
-            .map(|joint| joint.profile.duration())
-            .fold(0.0, f64::max)
+        let durations = self.joints.iter().map(|joint| joint.profile.duration());
+        durations.fold(0.0, f64::max)
     }
 
-    /// Times in s since the start at which derivatives of the rate jump, in order.
-    pub fn breaks(&self) -> Vec<f64> {
-        let mut breaks: Vec<f64> = self
-            .joints
-            .iter()
-            .flat_map(|joint| joint.profile.breaks())
-            .chain([0.0])
-            .collect();
-        breaks.sort_by(f64::total_cmp);
-        breaks
+    /// Times in s since the start at which derivatives of the rate jump.
+    pub fn breaks(&self) -> impl Iterator<Item = f64> {
+        let start = (!self.stands()).then_some(0.0);
+        let of_joints = self.joints.iter().flat_map(|joint| joint.profile.breaks());
+        start.into_iter().chain(of_joints)
     }
 
     /// The state so many seconds after the start.
@@ -140,7 +138,7 @@ impl Chain {
         for joint in &self.joints {
             let turned = joint.profile.at(time);
             let angle = joint.from + turned.angle;
-            if joint.harmonics != [Vector3::zeros(); PHASES] {
+            if joint.harmonics != Harmonics::default() {
                 joint.stray(&mut state, angle, &turned);
             }
             state.turn(&joint.axis, angle, turned.rate, turned.acceleration);
@@ -151,21 +149,6 @@ impl Chain {
 }
 
 impl Joint {
-    fn new(
-        axis: Vector3<f64>,
-        from: f64,
-        profile: Profile,
-        harmonics: [Vector3<f64>; PHASES],
-    ) -> Self {
-        Self {
-            axis,
-            from,
-            profile,
-            harmonics,
-            behind: Matrix3::identity(),
-        }
-    }
-
     /// Goes on through its harmonics.
     fn stray(&self, state: &mut Kinematics, angle: f64, turned: &Turned) {
         // Cosine and sine of the angle, then of twice the angle, with their derivatives.
@@ -174,13 +157,10 @@ impl Joint {
         let curvatures = [-c, -s, -4.0 * c2, -4.0 * s2];
         for (k, value) in [c, s, c2, s2].into_iter().enumerate() {
             if self.harmonics[k] != Vector3::zeros() {
+                let rate = slopes[k] * turned.rate;
                 let along_path = curvatures[k] * turned.rate * turned.rate;
-                state.turn(
-                    &self.harmonics[k],
-                    value,
-                    slopes[k] * turned.rate,
-                    slopes[k] * turned.acceleration + along_path,
-                );
+                let acceleration = slopes[k] * turned.acceleration + along_path;
+                state.turn(&self.harmonics[k], value, rate, acceleration);
             }
         }
     }

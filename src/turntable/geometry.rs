@@ -39,29 +39,30 @@ impl AxisError {
     /// Every kind, in the order of their errors.
     pub const ALL: [Self; 3] = [Self::Tilt, Self::Wobble, Self::Encoder];
 
+    /// Indices among the errors of the axes of those on one axis, the outermost being number zero.
+    fn of_axis(self, axis: usize) -> Range<usize> {
+        const WOBBLE: usize = ACROSS * (AXES - 1);
+        const ENCODER: usize = WOBBLE + AXES * PHASES * ACROSS;
+        let from = |start, each| start + axis * each..start + (axis + 1) * each;
+        match self {
+            // The outermost axis has none.
+            Self::Tilt => ACROSS * axis.saturating_sub(1)..ACROSS * axis,
+            Self::Wobble => from(WOBBLE, PHASES * ACROSS),
+            Self::Encoder => from(ENCODER, PHASES),
+        }
+    }
+
     /// Indices of its errors among those of the axes.
     pub fn range(self) -> Range<usize> {
-        let wobble = ACROSS * (AXES - 1);
-        let encoder = wobble + AXES * PHASES * ACROSS;
-        match self {
-            Self::Tilt => 0..wobble,
-            Self::Wobble => wobble..encoder,
-            Self::Encoder => encoder..AXIS_ERRORS,
-        }
+        self.of_axis(0).start..self.of_axis(AXES - 1).end
     }
 
     /// The same 1σ for its errors on a table with this many axes.
     pub fn of_table(self, axes: usize, sigma: f64) -> SVector<f64, AXIS_ERRORS> {
-        let (first, each) = match self {
-            Self::Tilt => (1, ACROSS),
-            Self::Wobble => (0, PHASES * ACROSS),
-            Self::Encoder => (0, PHASES),
-        };
         let mut all = SVector::<f64, AXIS_ERRORS>::zeros();
-        let range = self.range();
-        let has = (axes.min(AXES).saturating_sub(first) * each).min(range.len());
-        all.rows_range_mut(range.start..range.start + has)
-            .fill(sigma);
+        for axis in 0..axes.min(AXES) {
+            all.rows_range_mut(self.of_axis(axis)).fill(sigma);
+        }
         all
     }
 }
@@ -87,11 +88,6 @@ impl Default for TableGeometry {
 }
 
 impl TableGeometry {
-    /// Whether there are any.
-    pub fn any(&self) -> bool {
-        *self != Self::default()
-    }
-
     /// Whether there are any of a kind.
     pub fn has(&self, kind: AxisError) -> bool {
         self.axes.rows_range(kind.range()).amax() > 0.0
@@ -99,8 +95,7 @@ impl TableGeometry {
 
     /// Of the base about East, North and Up, then of each error of the axes.
     pub fn vector(&self) -> SVector<f64, TABLE_GEOMETRY> {
-        let mut all = self.base.iter().chain(&self.axes).copied();
-        SVector::from_fn(|_, _| all.next().unwrap_or(0.0))
+        SVector::from_iterator(self.base.iter().chain(&self.axes).copied())
     }
 }
 
@@ -113,19 +108,16 @@ pub fn table_geometry_name(k: usize) -> Option<String> {
     let Some(k) = k.checked_sub(BASE.len()) else {
         return Some(format!("table.base.{}", BASE[k]));
     };
-    let kind = AxisError::ALL
+    let (kind, axis) = AxisError::ALL
         .into_iter()
-        .find(|kind| kind.range().contains(&k))?;
-    let k = k - kind.range().start;
+        .flat_map(|kind| (0..AXES).map(move |axis| (kind, axis)))
+        .find(|(kind, axis)| kind.of_axis(*axis).contains(&k))?;
+    let (name, k) = (AXIS[axis], k - kind.of_axis(axis).start);
+    let (phase, side) = (PHASE[k / ACROSS], 1 + k % ACROSS);
     Some(match kind {
-        AxisError::Tilt => format!("table.{}.tilt_{}", AXIS[1 + k / ACROSS], 1 + k % ACROSS),
-        AxisError::Wobble => format!(
-            "table.{}.wobble_{}_{}",
-            AXIS[k / (PHASES * ACROSS)],
-            PHASE[k / ACROSS % PHASES],
-            1 + k % ACROSS
-        ),
-        AxisError::Encoder => format!("table.{}.encoder_{}", AXIS[k / PHASES], PHASE[k % PHASES]),
+        AxisError::Tilt => format!("table.{name}.tilt_{side}"),
+        AxisError::Wobble => format!("table.{name}.wobble_{phase}_{side}"),
+        AxisError::Encoder => format!("table.{name}.encoder_{}", PHASE[k]),
     })
 }
 
@@ -140,21 +132,18 @@ pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
     let mut carried = Matrix3::identity();
     for (number, &(direction, angle)) in axes.iter().flatten().enumerate() {
         let across = across(&direction).map(|across| carried * across);
-        let along = carried * direction;
-        let mut set = |kind: AxisError, k: usize, turn: Vector3<f64>| {
-            response.set_column(kind.range().start + k, &turn);
-        };
-        for (side, &across) in across.iter().enumerate() {
-            if let Some(inner) = number.checked_sub(1) {
-                set(AxisError::Tilt, ACROSS * inner + side, across);
+        let (along, phases) = ([carried * direction], phases(angle));
+        for (kind, values, directions) in [
+            (AxisError::Tilt, &[1.0][..], &across[..]),
+            (AxisError::Wobble, &phases, &across),
+            (AxisError::Encoder, &phases, &along),
+        ] {
+            let turns = values
+                .iter()
+                .flat_map(|value| directions.iter().map(move |turn| turn * *value));
+            for (k, turn) in kind.of_axis(number).zip(turns) {
+                response.set_column(k, &turn);
             }
-            for (phase, value) in phases(angle).into_iter().enumerate() {
-                let k = (PHASES * number + phase) * ACROSS + side;
-                set(AxisError::Wobble, k, across * value);
-            }
-        }
-        for (phase, value) in phases(angle).into_iter().enumerate() {
-            set(AxisError::Encoder, PHASES * number + phase, along * value);
         }
         carried *= exp(direction * angle);
     }

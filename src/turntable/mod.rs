@@ -21,7 +21,7 @@ pub use geometry::{
 pub use motion::Motion;
 pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
 pub use profile::{Profile, Turned};
-pub use table::{Axis, Imperfection, Table, TableAccuracy, TableErrors};
+pub use table::{Axis, AxisImperfection, Imperfection, Table, TableAccuracy, TableErrors};
 
 /// Why a table cannot be driven along a path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

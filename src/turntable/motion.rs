@@ -37,40 +37,44 @@ impl Motion {
         path: &Path,
         imperfection: &Imperfection,
     ) -> Result<Self, TableError> {
+        let mut motion = Self {
+            stretches: Vec::new(),
+            breaks: Vec::new(),
+        };
         match &path.moves {
             Moves::Axes { start, steps } => {
-                axis_count(table, start, || "start".into())?;
+                axis_count(table, start, "start".to_owned())?;
                 let mut angles = start.clone();
                 let still = |angles: &[f64]| Chain::of_table(table, imperfection, angles, &[]);
-                let mut motion = Self::standing(path.first_dwell, still(&angles));
-                for (i, step) in steps.iter().enumerate() {
-                    let profiles = axes_profiles(table, step, i + 1)?;
-                    motion.go(Chain::of_table(table, imperfection, &angles, &profiles));
+                motion.push(path.first_dwell, still(&angles));
+                for (number, step) in (1..).zip(steps) {
+                    let profiles = profiles(table, step, number)?;
+                    let moving = Chain::of_table(table, imperfection, &angles, &profiles);
+                    motion.push(moving.duration(), moving);
                     for (angle, by) in angles.iter_mut().zip(&step.angles) {
                         *angle += by;
                     }
-                    motion.stand(step.dwell, still(&angles));
+                    motion.push(step.dwell, still(&angles));
                 }
-                Ok(motion)
             }
+            Moves::Body { .. } if imperfection.moves_axes() => return Err(TableError::AxesUnknown),
             Moves::Body { start, steps } => {
-                if imperfection.moves_axes() {
-                    return Err(TableError::AxesUnknown);
-                }
                 let base = exp(imperfection.base);
                 let mut attitude = *start;
-                let mut motion = Self::standing(path.first_dwell, Chain::still(base * attitude));
-                for (i, step) in steps.iter().enumerate() {
+                motion.push(path.first_dwell, Chain::still(base * attitude));
+                for (number, step) in (1..).zip(steps) {
                     let vector = step.rotation.vector(&attitude);
-                    let profile = body_profile(table, step, vector.norm(), i + 1)?;
+                    let profile = body_profile(table, step, vector.norm(), number)?;
                     let axis = vector.try_normalize(0.0).unwrap_or_default();
-                    motion.go(Chain::about_body_axis(base * attitude, axis, profile));
+                    let moving = Chain::about_body_axis(base * attitude, axis, profile);
+                    motion.push(moving.duration(), moving);
                     attitude *= exp(vector);
-                    motion.stand(step.dwell, Chain::still(base * attitude));
+                    motion.push(step.dwell, Chain::still(base * attitude));
                 }
-                Ok(motion)
             }
         }
+        motion.breaks.sort_by(f64::total_cmp);
+        Ok(motion)
     }
 
     /// How long the path takes, s.
@@ -113,80 +117,45 @@ impl Motion {
         &self.stretches[begun.saturating_sub(1)]
     }
 
-    /// Begins at rest. That is kept even if it takes no time: there is always an attitude.
-    fn standing(duration: f64, chain: Chain) -> Self {
-        let mut motion = Self {
-            stretches: Vec::new(),
-            breaks: Vec::new(),
-        };
-        motion.push(duration, 0, chain);
-        motion
-    }
-
-    fn stand(&mut self, duration: f64, chain: Chain) {
-        if duration > 0.0 {
-            self.push(duration, 0, chain);
-        }
-    }
-
-    fn go(&mut self, chain: Chain) {
-        let duration = chain.duration();
-        if duration > 0.0 {
-            let start = self.duration();
+    /// Adds a stretch that takes time. The first, at rest, is kept even if it takes none: there is always an
+    /// attitude.
+    fn push(&mut self, duration: f64, chain: Chain) {
+        let last = self.stretches.last();
+        let (start, position) = last.map_or((0.0, 0), |last| (last.end, last.position));
+        if duration > 0.0 || last.is_none() {
             self.breaks
-                .extend(chain.breaks().iter().map(|after| start + after));
-            self.push(duration, 1, chain);
+                .extend(chain.breaks().map(|after| start + after));
+            self.stretches.push(Stretch {
+                start,
+                end: start + duration,
+                position: position + usize::from(!chain.stands()),
+                chain,
+            });
         }
     }
+}
 
-    fn push(&mut self, duration: f64, positions: usize, chain: Chain) {
-        let (start, position) = self
-            .stretches
-            .last()
-            .map_or((0.0, 0), |last| (last.end, last.position));
-        self.stretches.push(Stretch {
-            start,
-            end: start + duration,
-            position: position + positions,
-            chain,
-        });
+fn axis_count(table: &Table, angles: &[f64], place: String) -> Result<(), TableError> {
+    match (angles.len(), table.axes.len()) {
+        (found, expected) if found == expected => Ok(()),
+        (found, expected) => Err(TableError::AxisCount {
+            place,
+            found,
+            expected,
+        }),
     }
 }
 
-fn axis_count(
-    table: &Table,
-    angles: &[f64],
-    place: impl FnOnce() -> String,
-) -> Result<(), TableError> {
-    if angles.len() == table.axes.len() {
-        Ok(())
-    } else {
-        Err(TableError::AxisCount {
-            place: place(),
-            found: angles.len(),
-            expected: table.axes.len(),
-        })
-    }
-}
-
-fn axes_profiles(
-    table: &Table,
-    step: &AxesStep,
-    number: usize,
-) -> Result<Vec<Profile>, TableError> {
-    axis_count(table, &step.angles, || format!("step {number}"))?;
-    table
-        .axes
-        .iter()
-        .zip(&step.angles)
-        .map(|(axis, &angle)| {
-            let profile = Profile::limited(angle, step.rate, step.acceleration);
-            if angle != 0.0 {
-                within(axis, number, profile.peak_rate(), step.acceleration)?;
-            }
-            Ok(profile)
-        })
-        .collect()
+fn profiles(table: &Table, step: &AxesStep, number: usize) -> Result<Vec<Profile>, TableError> {
+    axis_count(table, &step.angles, format!("step {number}"))?;
+    let of_axis = |(axis, &angle): (&Axis, &f64)| {
+        let profile = Profile::limited(angle, step.rate, step.acceleration);
+        if angle != 0.0 {
+            within(axis, number, profile.peak_rate(), step.acceleration)?;
+        }
+        Ok(profile)
+    };
+    table.axes.iter().zip(&step.angles).map(of_axis).collect()
 }
 
 fn body_profile(

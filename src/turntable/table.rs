@@ -69,20 +69,16 @@ pub struct TableErrors {
 
 impl TableErrors {
     /// 1σ of each error of the axes of a kind.
-    pub fn of_axes(&self, kind: AxisError) -> f64 {
-        match kind {
-            AxisError::Tilt => self.nonorthogonality,
-            AxisError::Wobble => self.wobble_harmonics,
-            AxisError::Encoder => self.encoder_harmonics,
-        }
+    pub fn of_axes(mut self, kind: AxisError) -> f64 {
+        *self.of_axes_mut(kind)
     }
 
-    /// Sets that.
-    pub fn set_of_axes(&mut self, kind: AxisError, sigma: f64) {
+    /// The same, to be changed.
+    pub fn of_axes_mut(&mut self, kind: AxisError) -> &mut f64 {
         match kind {
-            AxisError::Tilt => self.nonorthogonality = sigma,
-            AxisError::Wobble => self.wobble_harmonics = sigma,
-            AxisError::Encoder => self.encoder_harmonics = sigma,
+            AxisError::Tilt => &mut self.nonorthogonality,
+            AxisError::Wobble => &mut self.wobble_harmonics,
+            AxisError::Encoder => &mut self.encoder_harmonics,
         }
     }
 }
@@ -92,11 +88,18 @@ impl TableErrors {
 pub struct Imperfection {
     /// Rotation vector of the base, East-North-Up, rad: `C_base = exp([base×])`.
     pub base: Vector3<f64>,
-    /// For each axis, the rotation vector in rad that tilts it in the frame of the next one outwards.
-    pub tilt: Vec<Vector3<f64>>,
-    /// For each axis, the rotation vectors in rad that go with each of [`super::phases`] of its angle: across
-    /// it a wobble, along it what its encoder does not read.
-    pub harmonics: Vec<[Vector3<f64>; PHASES]>,
+    /// Those of each axis.
+    pub axes: Vec<AxisImperfection>,
+}
+
+/// The errors of one axis, as rotation vectors in rad in the frame of the next one outwards.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AxisImperfection {
+    /// A constant tilt.
+    pub tilt: Vector3<f64>,
+    /// What goes with each of [`super::phases`] of its angle: across it a wobble, along it what its encoder
+    /// does not read.
+    pub harmonics: [Vector3<f64>; PHASES],
 }
 
 impl Imperfection {
@@ -104,63 +107,48 @@ impl Imperfection {
     pub fn none(table: &Table) -> Self {
         Self {
             base: Vector3::zeros(),
-            tilt: vec![Vector3::zeros(); table.axes.len()],
-            harmonics: vec![[Vector3::zeros(); PHASES]; table.axes.len()],
+            axes: vec![AxisImperfection::default(); table.axes.len()],
         }
     }
 
     /// A table as its 1σ say, made from independent standard normal numbers.
     pub fn draw(table: &Table, mut normal: impl FnMut() -> f64) -> Self {
         let errors = &table.errors;
-        let mut across = |direction: &Vector3<f64>, sigma: f64| {
-            let any = Vector3::from_fn(|_, _| normal()) * sigma;
-            any - direction * direction.dot(&any)
-        };
-        // The tilt of the outermost axis is the level of the base.
-        let tilt = table
-            .axes
-            .iter()
-            .enumerate()
-            .map(|(i, axis)| {
-                let sigma = if i == 0 { 0.0 } else { errors.nonorthogonality };
-                across(&axis.direction, sigma)
-            })
-            .collect();
-        let wobble: Vec<Vector3<f64>> = table
-            .axes
-            .iter()
-            .map(|axis| {
-                across(&axis.direction, 1.0)
-                    .try_normalize(0.0)
-                    .unwrap_or_default()
-                    * errors.wobble
-            })
-            .collect();
-        let base = Vector3::new(
-            normal() * errors.level,
-            normal() * errors.level,
-            normal() * errors.north,
-        );
-        let drawn = table.axes.iter().zip(wobble).map(|(axis, once)| {
-            let mut of_axis = [0; PHASES].map(|_| {
-                let any = Vector3::from_fn(|_, _| normal());
-                let along = axis.direction * axis.direction.dot(&any);
-                (any - along) * errors.wobble_harmonics + along * errors.encoder_harmonics
-            });
-            of_axis[SINE] += once;
-            of_axis
-        });
-        let harmonics = drawn.collect();
-        Self {
-            base,
-            tilt,
-            harmonics,
+        let mut any = || Vector3::from_fn(|_, _| normal());
+        let across =
+            |any: Vector3<f64>, axis: &Axis| any - axis.direction * axis.direction.dot(&any);
+        let mut imperfection = Self::none(table);
+        let axes = || table.axes.iter();
+        for (number, (axis, own)) in axes().zip(&mut imperfection.axes).enumerate() {
+            // The tilt of the outermost axis is the level of the base.
+            let sigma = if number == 0 {
+                0.0
+            } else {
+                errors.nonorthogonality
+            };
+            own.tilt = across(any() * sigma, axis);
         }
+        for (axis, own) in axes().zip(&mut imperfection.axes) {
+            let direction = across(any(), axis).try_normalize(0.0).unwrap_or_default();
+            own.harmonics[SINE] = direction * errors.wobble;
+        }
+        let of_base = Vector3::new(errors.level, errors.level, errors.north);
+        imperfection.base = any().component_mul(&of_base);
+        for (axis, own) in axes().zip(&mut imperfection.axes) {
+            for harmonic in &mut own.harmonics {
+                let any = any();
+                let along = axis.direction * axis.direction.dot(&any);
+                *harmonic +=
+                    (any - along) * errors.wobble_harmonics + along * errors.encoder_harmonics;
+            }
+        }
+        imperfection
     }
 
     /// Whether any axis is tilted, wobbles, or has an encoder that reads wrongly.
     pub fn moves_axes(&self) -> bool {
-        let any = |vectors: &[Vector3<f64>]| vectors.iter().any(|v| *v != Vector3::zeros());
-        any(&self.tilt) || self.harmonics.iter().any(|harmonics| any(harmonics))
+        self.axes
+            .iter()
+            .any(|of| *of != AxisImperfection::default())
     }
 }

@@ -180,9 +180,7 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
         let value = simulated.terms[parameter];
         assert!(value != 0.0);
         let name = Term::parameter_name(parameter).unwrap();
-        record
-            .terms
-            .insert(name.to_owned(), TermRecord { value, sigma: None });
+        record.terms.insert(name, TermRecord { value, sigma: None });
     }
     let imperfection = Imperfection::none(&scenario.table);
     let motion = Motion::new(&scenario.table, &scenario.path, &imperfection).unwrap();

@@ -12,13 +12,16 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// Where circles are not allowed: a circle is one of theirs if a module of it is.
-const ROOMS: [&str; 7] = [
+const ROOMS: [&str; 10] = [
     "calibration",
     "certificate",
     "imu",
+    "lot",
     "navigation",
     "noise",
     "report",
+    "run",
+    "survey",
     "turntable",
 ];
 
@@ -417,8 +420,8 @@ fn no_module_imports_one_that_imports_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs");
     let modules = Crate::read(&root);
     for room in ROOMS {
-        let of_room = |path: &&Names| path.first().is_some_and(|first| first == room);
-        assert!(modules.0.keys().filter(of_room).count() > 5, "{room}");
+        let of_room = |path: &Names| path.first().is_some_and(|first| first == room);
+        assert!(modules.0.keys().any(of_room), "{room}");
     }
     let of_rooms = |circle: &&Circle| {
         let mut members = circle.members.iter().filter_map(|path| path.first());

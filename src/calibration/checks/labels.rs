@@ -1,21 +1,26 @@
 //! Whether labelled sections can be used.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::finding::Finding;
-use crate::run::motion::ContradictedLabel;
+use crate::run::motion::LabelCheck;
 
 /// Sections whose labels the record contradicts, if there are any.
-pub fn contradicted(contradicted: &[ContradictedLabel]) -> Option<Finding> {
-    let each: Vec<String> = contradicted
-        .iter()
-        .map(ContradictedLabel::to_string)
-        .collect();
+pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
+    let each: Vec<String> = contradicted.iter().map(LabelCheck::to_string).collect();
     let text = format!(
         "Labels and record disagree. Section {}.",
         each.join("; section ")
     );
-    let figures = json!({ "contradicted": contradicted });
+    let figure = |check: &LabelCheck| {
+        json!({
+            "label": check.segment.label,
+            "start": check.segment.start,
+            "said": check.disagreement,
+            "used": check.as_labelled.is_some(),
+        })
+    };
+    let figures = json!({ "contradicted": contradicted.iter().map(figure).collect::<Value>() });
     (!contradicted.is_empty()).then(|| Finding::new("labels-contradicted", text, figures))
 }
 

@@ -54,7 +54,7 @@ impl AuxiliaryKind {
 pub fn auxiliary_name(index: usize) -> Option<String> {
     match AuxiliaryKind::of(index)? {
         AuxiliaryKind::Table(k) => table_geometry_name(k),
-        AuxiliaryKind::Term(_, parameter) => Term::parameter_name(parameter).map(str::to_owned),
+        AuxiliaryKind::Term(_, parameter) => Term::parameter_name(parameter),
     }
 }
 

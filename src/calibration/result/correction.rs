@@ -228,7 +228,7 @@ impl Correction {
             .and_then(|(record, temperature)| {
                 let thermal = record.temperature.as_ref()?;
                 let (t, rate) = (temperature.at(time), temperature.rate(time));
-                let there = record.in_state(&thermal.state(&t, &rate)).ok()?;
+                let there = record.in_state(&thermal.range.state(&t, &rate)).ok()?;
                 Some((Self::of_record(&there).ok()?, thermal.holds(&t)))
             });
         known.unwrap_or_else(|| (self.clone(), false))

@@ -13,7 +13,7 @@ use crate::calibration::pass::Own;
 use crate::calibration::several::thermal::Thermal;
 use crate::imu::{
     AXES, HIGHEST_ORDER, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients,
-    ThermalRange, ThermalState, ThermalValues, powers,
+    ThermalRange, ThermalValues, powers,
 };
 use crate::run::Run;
 
@@ -177,15 +177,6 @@ impl ThermalRecord {
             let all = temperatures.get(sensor).iter();
             all.copied().all(|t| range.contains(t, TOLERANCE))
         })
-    }
-
-    /// The functions of temperature, for axes at temperatures in °C with rates in K/s.
-    pub fn state(
-        &self,
-        temperatures: &PerSensor<[f64; 3]>,
-        rates: &PerSensor<[f64; 3]>,
-    ) -> ThermalState {
-        ThermalRange::state(&self.range, temperatures, rates)
     }
 }
 

@@ -107,7 +107,7 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     });
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
-    let state = state.map(|(thermal, at)| thermal.state(at, &PerSensor::default()));
+    let state = state.map(|(thermal, at)| thermal.range.state(at, &PerSensor::default()));
     let alone = |(start, by_headings), priors, initial_attitudes, estimate| Alone {
         name: run.recording.name.clone(),
         temperature: middle,

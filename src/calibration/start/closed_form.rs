@@ -23,7 +23,7 @@ use crate::calibration::problem::Problem;
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PerSensor, Sensor};
 use crate::run::motion::rests;
-use crate::run::{Aiding, Dwell, Run};
+use crate::run::{Aiding, Dwell};
 
 /// A reference vector within this cosine of a body axis makes a position of the six.
 const ALONG_AXIS: f64 = 0.9998;
@@ -166,13 +166,10 @@ pub fn six_position_of(
         reference: Reference::Table,
         positions: PerSensor::from_fn(|sensor| observed.get(sensor).known.len()),
         turns: 0,
-        standing_time: used.map(|(dwell, _)| duration(run, dwell)).sum(),
+        standing_time: used
+            .map(|(dwell, _)| dwell.duration(&run.recording.imu))
+            .sum(),
     })
-}
-
-/// s
-fn duration(run: &Run, dwell: &Dwell) -> f64 {
-    dwell.samples.len() as f64 * run.recording.imu.period
 }
 
 /// The positions whose input lies along a body axis, if all six are there, else all.
@@ -248,7 +245,7 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
         stretch
             .dwells
             .iter()
-            .map(|dwell| duration(stretch.run, dwell))
+            .map(|dwell| dwell.duration(&stretch.run.recording.imu))
     });
     let dwells = problem.dwells().count();
     Ok(ClosedForm {

@@ -16,7 +16,7 @@ use crate::attitude::{exp, skew};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::LabelledMotion;
-use crate::run::motion::{ContradictedLabel, Rest, checks};
+use crate::run::motion::{LabelCheck, Rest, checks};
 use crate::run::{Dwell, MeanOutput, Run};
 
 /// Turns are followed in steps this long, s: within one a hand turns by a few degrees.
@@ -61,7 +61,7 @@ impl Section {
 pub struct Used {
     pub sections: Vec<Section>,
     pub lost: Vec<String>,
-    pub contradicted: Vec<ContradictedLabel>,
+    pub contradicted: Vec<LabelCheck>,
 }
 
 impl Used {
@@ -76,16 +76,11 @@ impl Used {
                 found.lost.push(format!("`{}`", segment.label));
                 continue;
             }
-            let used = check.as_labelled;
+            let used = check.as_labelled.clone();
             // Borders that are drawn a little wide do no harm.
             let as_stated = used.as_ref() == Some(&segment.samples);
-            if let Some(said) = check.disagreement.filter(|_| !as_stated) {
-                found.contradicted.push(ContradictedLabel {
-                    label: segment.label.clone(),
-                    start: segment.start,
-                    said,
-                    used: used.is_some(),
-                });
+            if check.disagreement.is_some() && !as_stated {
+                found.contradicted.push(check);
             }
             let section = used.map(|samples| Section::new(run, samples, motion));
             found.sections.extend(section);

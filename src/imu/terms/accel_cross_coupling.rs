@@ -1,10 +1,9 @@
 //! Output of an accelerometer with the product of specific force along two axes.
 
-use super::accel_second_order;
-use super::entry::{Columns, Effect, Sensed, TermEntry};
+use nalgebra::RowVector3;
 
-/// The two components of specific force that are multiplied, in the order of the parameters.
-const PRODUCTS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+use super::accel_second_order;
+use super::entry::{TermEntry, set_rows};
 
 pub const ENTRY: TermEntry = TermEntry {
     name: "accel-cross-coupling",
@@ -12,25 +11,17 @@ pub const ENTRY: TermEntry = TermEntry {
     help: "Accelerometers: products of specific force along two axes",
     adds: "q times the product of these two of f along its axis to f",
     // Accelerometer, then the components that are multiplied.
-    parameters: &[
-        "accel.cross_coupling.x.xy",
-        "accel.cross_coupling.x.xz",
-        "accel.cross_coupling.x.yz",
-        "accel.cross_coupling.y.xy",
-        "accel.cross_coupling.y.xz",
-        "accel.cross_coupling.y.yz",
-        "accel.cross_coupling.z.xy",
-        "accel.cross_coupling.z.xz",
-        "accel.cross_coupling.z.yz",
-    ],
-    effect: Effect::Linear(response),
+    parameters: (
+        "accel.cross_coupling",
+        &[
+            ".x.xy", ".x.xz", ".x.yz", ".y.xy", ".y.xz", ".y.yz", ".z.xy", ".z.xz", ".z.yz",
+        ],
+    ),
+    response: |sensed, _, columns| {
+        let f = sensed.force;
+        set_rows(columns, |_| {
+            RowVector3::new(f.x * f.y, f.x * f.z, f.y * f.z)
+        });
+    },
     ..accel_second_order::ENTRY
 };
-
-fn response(sensed: &Sensed, columns: &mut Columns) {
-    for axis in 0..3 {
-        for (k, &(one, other)) in PRODUCTS.iter().enumerate() {
-            columns[(axis, 3 * axis + k)] = sensed.force[one] * sensed.force[other];
-        }
-    }
-}

@@ -1,6 +1,6 @@
 //! Output of an accelerometer with the square of specific force along its axis.
 
-use super::entry::{Effect, TermEntry, per_axis};
+use super::entry::{PER_AXIS, TermEntry};
 use crate::imu::Sensor;
 use crate::units::{MICRO_G, STANDARD_GRAVITY};
 
@@ -15,8 +15,7 @@ pub const ENTRY: TermEntry = TermEntry {
     d_si_unit: "\\second\\tothe{2}\\metre\\tothe{-1}",
     usual_sigma: 100.0,
     largest: 1.0 / STANDARD_GRAVITY,
-    parameters: per_axis!("accel.second_order"),
-    effect: Effect::Linear(|sensed, columns| {
-        columns.set_diagonal(&sensed.force.map(|f| f.powi(2)))
-    }),
+    parameters: ("accel.second_order", &PER_AXIS),
+    response: |sensed, _, columns| columns.set_diagonal(&sensed.force.map(|f| f.powi(2))),
+    added: None,
 };

@@ -1,6 +1,6 @@
 //! Output of an accelerometer with the third power of specific force along its axis.
 
-use super::entry::{Effect, TermEntry, per_axis};
+use super::entry::{PER_AXIS, TermEntry};
 use crate::imu::Sensor;
 use crate::units::{MICRO_G, STANDARD_GRAVITY};
 
@@ -18,8 +18,7 @@ pub const ENTRY: TermEntry = TermEntry {
     d_si_unit: "\\second\\tothe{4}\\metre\\tothe{-2}",
     usual_sigma: 100.0,
     largest: 1.0 / (STANDARD_GRAVITY * STANDARD_GRAVITY),
-    parameters: per_axis!("accel.third_order"),
-    effect: Effect::Linear(|sensed, columns| {
-        columns.set_diagonal(&sensed.force.map(|f| f.powi(3)))
-    }),
+    parameters: ("accel.third_order", &PER_AXIS),
+    response: |sensed, _, columns| columns.set_diagonal(&sensed.force.map(|f| f.powi(3))),
+    added: None,
 };

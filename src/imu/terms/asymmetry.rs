@@ -1,6 +1,6 @@
 //! Another scale factor for one sign of the input than for the other, of either triad.
 
-use super::entry::{Effect, TermEntry, per_axis};
+use super::entry::{PER_AXIS, TermEntry};
 use crate::imu::Sensor;
 use crate::units::PPM;
 
@@ -15,8 +15,9 @@ pub const ACCEL: TermEntry = TermEntry {
     d_si_unit: "\\one",
     usual_sigma: 100.0,
     largest: 1.0,
-    parameters: per_axis!("accel.asymmetry"),
-    effect: Effect::Linear(|sensed, columns| columns.set_diagonal(&sensed.force.abs())),
+    parameters: ("accel.asymmetry", &PER_AXIS),
+    response: |sensed, _, columns| columns.set_diagonal(&sensed.force.abs()),
+    added: None,
 };
 
 pub const GYRO: TermEntry = TermEntry {
@@ -25,7 +26,7 @@ pub const GYRO: TermEntry = TermEntry {
     help: "Gyros: another scale factor in each sense of turn",
     adds: "q |w| along its axis to w",
     sensor: Sensor::Gyro,
-    parameters: per_axis!("gyro.asymmetry"),
-    effect: Effect::Linear(|sensed, columns| columns.set_diagonal(&sensed.rate.abs())),
+    parameters: ("gyro.asymmetry", &PER_AXIS),
+    response: |sensed, _, columns| columns.set_diagonal(&sensed.rate.abs()),
     ..ACCEL
 };

@@ -1,6 +1,6 @@
 //! How a term is called, and what it does.
 
-use nalgebra::Vector3;
+use nalgebra::{RowVector3, Vector3};
 
 use crate::imu::Sensor;
 use crate::units::DEGREE;
@@ -45,36 +45,27 @@ pub struct TermEntry {
     /// A parameter beyond this makes of gravity, or of a turn at [`REFERENCE_RATE`], as much again, as no
     /// instrument does, in SI.
     pub largest: f64,
-    /// The names of its parameters in files.
-    pub parameters: &'static [&'static str],
-    /// Its equation.
-    pub effect: Effect,
+    /// The names of its parameters in files: what all begin with, and how each ends.
+    pub parameters: (&'static str, &'static [&'static str]),
+    /// `∂t/∂q`, t(q) being what it adds to the input of its triad in rad/s or m/s²: a column for each parameter.
+    pub response: fn(&Sensed, &[f64], &mut Columns),
+    /// `t(q)` itself, where that is not in proportion to its parameters.
+    pub added: Option<Added>,
 }
 
-/// What a term adds to the input of its triad, rad/s or m/s².
-pub enum Effect {
-    /// In proportion to its parameters: `∂t/∂q`, a column each.
-    Linear(fn(&Sensed, &mut Columns)),
-    /// In another way.
-    Nonlinear {
-        /// `t(q)`.
-        added: fn(&Sensed, &[f64]) -> Vector3<f64>,
-        /// `∂t/∂q` at these parameters, a column each.
-        response: fn(&Sensed, &[f64], &mut Columns),
-    },
-}
+/// What a term adds to the input of its triad at these parameters, rad/s or m/s².
+pub type Added = fn(&Sensed, &[f64]) -> Vector3<f64>;
 
 /// The columns of a term in a [`super::TermResponse`].
 pub type Columns<'a> = nalgebra::MatrixViewMut3xX<'a, f64>;
 
-/// The names of one parameter per axis.
-macro_rules! per_axis {
-    ($stem:literal) => {
-        &[
-            concat!($stem, ".x"),
-            concat!($stem, ".y"),
-            concat!($stem, ".z"),
-        ]
-    };
+/// Fills the columns of a term that has three parameters on each axis, which act on no other.
+pub fn set_rows(columns: &mut Columns, row: impl Fn(usize) -> RowVector3<f64>) {
+    for axis in 0..columns.ncols() / 3 {
+        let mut own = columns.fixed_view_mut::<1, 3>(axis, 3 * axis);
+        own.copy_from(&row(axis));
+    }
 }
-pub(super) use per_axis;
+
+/// Ends of the names of one parameter per axis.
+pub const PER_AXIS: [&str; 3] = [".x", ".y", ".z"];

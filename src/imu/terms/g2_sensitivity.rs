@@ -5,7 +5,7 @@
 //! Products of two components are not in it. Neither is |f|², which stays the same in every dwell on Earth and
 //! so is part of the bias.
 
-use super::entry::{Effect, REFERENCE_RATE, TermEntry, per_axis};
+use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};
 use crate::imu::Sensor;
 use crate::units::{DEG_PER_H, STANDARD_GRAVITY};
 
@@ -22,8 +22,7 @@ pub const ENTRY: TermEntry = TermEntry {
     // M² ΔC g² / H: with 50 g, 0.1 kg m²/s and 2 % of 10⁻⁶ m/N that is 0.01 °/h, of which ten times are usual.
     usual_sigma: 0.1,
     largest: REFERENCE_RATE / (STANDARD_GRAVITY * STANDARD_GRAVITY),
-    parameters: per_axis!("gyro.g2_sensitivity"),
-    effect: Effect::Linear(|sensed, columns| {
-        columns.set_diagonal(&sensed.force.map(|f| f.powi(2)));
-    }),
+    parameters: ("gyro.g2_sensitivity", &PER_AXIS),
+    response: |sensed, _, columns| columns.set_diagonal(&sensed.force.map(|f| f.powi(2))),
+    added: None,
 };

@@ -1,6 +1,6 @@
 //! Bias of the gyros with specific force, along and across their axes.
 
-use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{REFERENCE_RATE, TermEntry, set_rows};
 use crate::imu::Sensor;
 use crate::units::{DEG_PER_H, STANDARD_GRAVITY};
 
@@ -15,24 +15,12 @@ pub const ENTRY: TermEntry = TermEntry {
     d_si_unit: "\\radian\\second\\metre\\tothe{-1}",
     usual_sigma: 1.0,
     largest: REFERENCE_RATE / STANDARD_GRAVITY,
-    parameters: &[
-        "gyro.g_sensitivity.xx",
-        "gyro.g_sensitivity.xy",
-        "gyro.g_sensitivity.xz",
-        "gyro.g_sensitivity.yx",
-        "gyro.g_sensitivity.yy",
-        "gyro.g_sensitivity.yz",
-        "gyro.g_sensitivity.zx",
-        "gyro.g_sensitivity.zy",
-        "gyro.g_sensitivity.zz",
-    ],
-    effect: Effect::Linear(response),
+    parameters: (
+        "gyro.g_sensitivity",
+        &[
+            ".xx", ".xy", ".xz", ".yx", ".yy", ".yz", ".zx", ".zy", ".zz",
+        ],
+    ),
+    response: |sensed, _, columns| set_rows(columns, |_| sensed.force.transpose()),
+    added: None,
 };
-
-fn response(sensed: &Sensed, columns: &mut Columns) {
-    for axis in 0..3 {
-        for (column, &f) in sensed.force.iter().enumerate() {
-            columns[(axis, 3 * axis + column)] = f;
-        }
-    }
-}

@@ -1,7 +1,7 @@
 //! Scale factor of a gyro that changes with the magnitude of its rate: odd in the rate, of second and
 //! third order.
 
-use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};
 use super::gyro_second_order;
 
 pub const ENTRY: TermEntry = TermEntry {
@@ -9,19 +9,22 @@ pub const ENTRY: TermEntry = TermEntry {
     title: "gyro nonlinearity",
     help: "Gyros: scale factor that changes with the magnitude of angular rate",
     adds: "q |w| w / r (odd quadratic), q w^3 / r^2 (third order) along its axis to w, r = 100 deg/s",
-    parameters: &[
-        "gyro.odd_quadratic.x",
-        "gyro.odd_quadratic.y",
-        "gyro.odd_quadratic.z",
-        "gyro.third_order.x",
-        "gyro.third_order.y",
-        "gyro.third_order.z",
-    ],
-    effect: Effect::Linear(response),
+    parameters: (
+        "gyro",
+        &[
+            ".odd_quadratic.x",
+            ".odd_quadratic.y",
+            ".odd_quadratic.z",
+            ".third_order.x",
+            ".third_order.y",
+            ".third_order.z",
+        ],
+    ),
+    response,
     ..gyro_second_order::ENTRY
 };
 
-fn response(sensed: &Sensed, columns: &mut Columns) {
+fn response(sensed: &Sensed, _: &[f64], columns: &mut Columns) {
     for (axis, &w) in sensed.rate.iter().enumerate() {
         let relative = w / REFERENCE_RATE;
         columns[(axis, axis)] = w * relative.abs();

@@ -1,7 +1,7 @@
 //! Output of a gyro with the square of its rate: even in the rate, as an asymmetry is.
 
 use super::asymmetry;
-use super::entry::{Effect, REFERENCE_RATE, TermEntry, per_axis};
+use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};
 use crate::units::PPM;
 
 pub const ENTRY: TermEntry = TermEntry {
@@ -10,9 +10,9 @@ pub const ENTRY: TermEntry = TermEntry {
     help: "Gyros: square of angular rate",
     adds: "q w^2 / r along its axis to w, r = 100 deg/s",
     unit: ("ppm at 100 °/s", PPM),
-    parameters: per_axis!("gyro.second_order"),
-    effect: Effect::Linear(|sensed, columns| {
-        columns.set_diagonal(&sensed.rate.map(|w| w * (w / REFERENCE_RATE)));
-    }),
+    parameters: ("gyro.second_order", &PER_AXIS),
+    response: |sensed, _, columns| {
+        columns.set_diagonal(&sensed.rate.map(|w| w * (w / REFERENCE_RATE)))
+    },
     ..asymmetry::GYRO
 };

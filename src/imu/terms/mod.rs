@@ -8,11 +8,12 @@
 //! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
 //! scale factor); IEEE Std 528-2019 (gyros: acceleration-squared sensitivity); Savage, *Strapdown Analytics*, 2nd ed., §8.1.4 (size effect, time offset).
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::Sensor;
+
 mod entry;
-mod sensed;
 
 mod accel_cross_coupling;
 mod accel_second_order;
@@ -84,7 +85,7 @@ const FIRST: [usize; Term::ALL.len() + 1] = {
     let mut first = [0; Term::ALL.len() + 1];
     let mut k = 0;
     while k < Term::ALL.len() {
-        first[k + 1] = first[k] + Term::ALL[k].entry().parameters.len();
+        first[k + 1] = first[k] + Term::ALL[k].entry().parameters.1.len();
         k += 1;
     }
     first
@@ -103,15 +104,17 @@ impl Term {
         self.entry().name
     }
 
-    /// The unit of its parameters in files and reports: its name, and its value in SI.
-    pub fn unit(self) -> (&'static str, f64) {
-        self.entry().unit
+    /// Those of a triad.
+    fn of_sensor(sensor: Sensor) -> impl Iterator<Item = Self> {
+        let all = Self::ALL.into_iter();
+        all.filter(move |term| term.entry().sensor == sensor)
     }
 
     /// 1σ of each of its parameters where nothing better is known, in SI: ten times what precise
     /// instruments have.
     pub fn usual_sigma(self) -> f64 {
-        self.entry().usual_sigma * self.unit().1
+        let entry = self.entry();
+        entry.usual_sigma * entry.unit.1
     }
 
     /// Indices of its parameters.
@@ -126,15 +129,43 @@ impl Term {
     }
 
     /// The name of a parameter in files; `None` beyond the last.
-    pub fn parameter_name(parameter: usize) -> Option<&'static str> {
+    pub fn parameter_name(parameter: usize) -> Option<String> {
         let term = Self::of(parameter)?;
-        let names = term.entry().parameters;
-        names.get(parameter - term.parameters().start).copied()
+        let (stem, ends) = term.entry().parameters;
+        let end = ends[parameter - term.parameters().start];
+        Some(format!("{stem}{end}"))
     }
 
     /// The parameter of a name in files.
     pub fn parameter_named(name: &str) -> Option<usize> {
-        (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k) == Some(name))
+        (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k).as_deref() == Some(name))
+    }
+}
+
+impl Sensed {
+    /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².
+    pub fn added(&self, sensor: Sensor, q: &TermVector) -> Vector3<f64> {
+        let mut linear = self.response(sensor, q);
+        let mut others = Vector3::zeros();
+        for term in Term::of_sensor(sensor) {
+            if let Some(added) = term.entry().added {
+                linear.columns_range_mut(term.parameters()).fill(0.0);
+                others += added(self, &q.as_slice()[term.parameters()]);
+            }
+        }
+        linear * q + others
+    }
+
+    /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter, where the parameters are
+    /// these.
+    pub fn response(&self, sensor: Sensor, q: &TermVector) -> TermResponse {
+        let mut response = TermResponse::zeros();
+        for term in Term::of_sensor(sensor) {
+            let own = term.parameters();
+            let columns = &mut response.columns_mut(own.start, own.len());
+            (term.entry().response)(self, &q.as_slice()[own], columns);
+        }
+        response
     }
 }
 

@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use super::*;
-use crate::imu::Sensor;
 use crate::units::{DEG_PER_H, STANDARD_GRAVITY};
 
 /// With nothing special about it.
@@ -19,7 +18,7 @@ fn any() -> Sensed {
 #[test]
 fn every_parameter_has_a_term_a_name_and_a_triad_that_responds() {
     let sensed = any();
-    let mut names: Vec<&str> = (0..TERM_PARAMETERS)
+    let mut names: Vec<String> = (0..TERM_PARAMETERS)
         .map_while(Term::parameter_name)
         .collect();
     names.sort();
@@ -115,7 +114,7 @@ fn an_asymmetry_adds_the_same_in_both_senses_of_turn_and_a_nonlinearity_the_oppo
 #[test]
 fn a_gyro_that_yields_under_load_drifts_by_as_much_up_as_down_and_not_across() {
     let mut q = TermVector::zeros();
-    let [deg_per_h_per_g2, g] = [Term::G2Sensitivity.unit().1, STANDARD_GRAVITY];
+    let [deg_per_h_per_g2, g] = [Term::G2Sensitivity.entry().unit.1, STANDARD_GRAVITY];
     q[Term::G2Sensitivity.parameters().start + 2] = 0.3 * deg_per_h_per_g2;
     let drift = |force: Vector3<f64>| Sensed { force, ..any() }.added(Sensor::Gyro, &q);
     for (force, drifts) in [

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::entry::{Columns, Effect, REFERENCE_RATE, Sensed, TermEntry};
+use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};
 use crate::attitude::exp;
 use crate::imu::Sensor;
 
@@ -18,8 +18,9 @@ pub const ENTRY: TermEntry = TermEntry {
     d_si_unit: "\\second",
     usual_sigma: 10.0,
     largest: 1.0 / REFERENCE_RATE,
-    parameters: &["accel.time_offset"],
-    effect: Effect::Nonlinear { added, response },
+    parameters: ("accel.time_offset", &[""]),
+    response,
+    added: Some(added),
 };
 
 fn added(sensed: &Sensed, q: &[f64]) -> Vector3<f64> {

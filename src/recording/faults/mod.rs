@@ -238,7 +238,7 @@ fn last_digit(values: &[f64]) -> f64 {
 }
 
 /// Runs of rows or samples that are so.
-fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+pub fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for row in (0..count).filter(|&row| is(row)) {
         match ranges.last_mut() {

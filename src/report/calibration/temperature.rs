@@ -39,7 +39,10 @@ pub(super) fn add(document: &mut Document, outcome: &Outcome) {
 /// All axes at a temperature that does not change.
 fn at(thermal: &Thermal, temperature: f64) -> ThermalState {
     let everywhere = PerSensor::from_fn(|_| [temperature; 3]);
-    thermal.model.state(&everywhere, &PerSensor::default())
+    thermal
+        .model
+        .range
+        .state(&everywhere, &PerSensor::default())
 }
 
 /// Change of all parameters from those at the reference, and σ of what they are then.

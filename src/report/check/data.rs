@@ -10,7 +10,7 @@ use crate::imu::{AXES, Sensor};
 use crate::recording::{Fault, LabelledMotion};
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
-use crate::survey::{MethodOutlook, Survey};
+use crate::survey::{Expected, Path, Survey};
 use crate::units::DEGREE;
 
 pub(super) fn data(run: &Run, survey: &Survey) -> Value {
@@ -35,19 +35,15 @@ pub(super) fn data(run: &Run, survey: &Survey) -> Value {
         "table_readings": run.recording.table.as_ref().map_or(0, |table| table.time.len()),
         "unit": run.instrument.unit,
     });
-    if let Some(log) = log(run, survey) {
+    if let Some(log) = log(run) {
         data["log"] = log;
     }
     data["faults"] = imu.faults.iter().map(|of| fault(run, of)).collect();
     data["fault_samples"] = json!(fault_samples);
-    data["standing_s"] = survey.standing.total.into();
-    data["longest_dwell_s"] = survey.standing.longest.into();
+    data["standing_s"] = survey.standing.into();
+    data["longest_dwell_s"] = survey.longest.into();
     data["dwells"] = survey.rests.iter().map(|rest| dwell(run, rest)).collect();
-    data["turns"] = survey
-        .turns
-        .iter()
-        .map(|of| turn(run, survey, of))
-        .collect();
+    data["turns"] = survey.turns.iter().map(|of| turn(run, of)).collect();
     data["ways_up"] = json!(ways);
     data["up_directions"] = survey.directions.into();
     data["segments"] = survey.labels.iter().map(section).collect();
@@ -67,12 +63,11 @@ fn degrees(angle: f64) -> f64 {
     angle / DEGREE
 }
 
-fn log(run: &Run, survey: &Survey) -> Option<Value> {
+fn log(run: &Run) -> Option<Value> {
     let log = run.recording.imu.log.as_ref()?;
     let columns = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let steps = survey.steps.get(sensor);
-        let columns = log.columns.get(sensor).iter().zip(steps).zip(AXES);
-        columns.map(move |((column, step_si), axis)| {
+        let columns = log.columns.get(sensor).iter().zip(AXES);
+        columns.map(move |(column, axis)| {
             json!({
                 "name": column.name,
                 "sensor": sensor.name(),
@@ -82,7 +77,7 @@ fn log(run: &Run, survey: &Survey) -> Option<Value> {
                 "largest": column.largest,
                 "at_largest": column.at_largest,
                 "step": column.step,
-                "step_si": step_si,
+                "step_si": column.step_rate(run.recording.imu.period),
             })
         })
     });
@@ -115,7 +110,7 @@ fn fault(run: &Run, fault: &Fault) -> Value {
 }
 
 fn dwell(run: &Run, rest: &Rest) -> Value {
-    let [start, end] = rest.times(run);
+    let [start, end] = rest.dwell.times(run);
     let mut data = json!({
         "start_s": start,
         "end_s": end,
@@ -128,7 +123,7 @@ fn dwell(run: &Run, rest: &Rest) -> Value {
     data
 }
 
-fn turn(run: &Run, survey: &Survey, turn: &Turn) -> Value {
+fn turn(run: &Run, turn: &Turn) -> Value {
     let imu = &run.recording.imu;
     let mut data = json!({
         "start_s": imu.time(turn.samples.start),
@@ -138,13 +133,9 @@ fn turn(run: &Run, survey: &Survey, turn: &Turn) -> Value {
         "axis": <[f64; 3]>::from(turn.axis),
         "angle_deg": degrees(turn.angle),
         "fastest_deg_s": degrees(turn.fastest),
-        "off_gravity_deg": turn.off_gravity(&survey.rests).map(degrees),
+        "off_gravity_deg": turn.off_gravity.map(degrees),
     });
-    put(
-        &mut data,
-        "off_table_deg",
-        turn.off_table(&survey.rests).map(degrees),
-    );
+    put(&mut data, "off_table_deg", turn.off_table.map(degrees));
     data
 }
 
@@ -172,9 +163,9 @@ fn section(check: &LabelCheck) -> Value {
 }
 
 /// RMS 1σ by group, or why there is none.
-fn method(method: &MethodOutlook) -> Value {
-    let name = method.path.words();
-    match &method.expected {
+fn method((path, expected): &(Path, Result<Expected, String>)) -> Value {
+    let name = path.words();
+    match expected {
         Ok(expected) => {
             let sigma = expected.sigma.iter();
             let sigma: Map<String, Value> = sigma

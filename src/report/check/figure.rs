@@ -35,7 +35,7 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
     };
     let rests = survey.rests.iter();
     let dwells: Vec<_> = rests
-        .map(|rest| rest.times(run))
+        .map(|rest| rest.dwell.times(run))
         .map(|[from, to]| from..to)
         .collect();
     let tags: Vec<(f64, String)> = match sensor {
@@ -70,7 +70,7 @@ fn of_turn(run: &Run, turn: &Turn) -> (f64, String) {
 }
 
 fn of_dwell(run: &Run, k: usize, rest: &Rest) -> (f64, String) {
-    let [from, to] = rest.times(run);
+    let [from, to] = rest.dwell.times(run);
     let up = match rest.up.is_upright() {
         true => format!(" {}", words::way_up(rest.up.axis, rest.up.down)),
         false => String::new(),

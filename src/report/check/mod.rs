@@ -26,7 +26,7 @@ pub fn document(run: &Run, survey: &Survey) -> Document {
     document.warnings.heading = "What to look at".to_owned();
     document.warnings.items = words::findings(run, survey);
     document.page(figure::figure(run, survey));
-    document.both(tables::columns(run, survey));
+    document.both(tables::columns(run));
     document.both(tables::faults(run));
     document.both(tables::dwells(run, survey));
     document.both(tables::labels(survey));

@@ -14,7 +14,7 @@ use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 /// Faults beyond so many are not listed one by one.
 const LISTED: usize = 20;
 
-pub(super) fn columns(run: &Run, survey: &Survey) -> Table {
+pub(super) fn columns(run: &Run) -> Table {
     let headings = [
         "column",
         "body axis",
@@ -28,9 +28,8 @@ pub(super) fn columns(run: &Run, survey: &Survey) -> Table {
     ];
     let rows = run.recording.imu.log.iter().flat_map(|log| {
         Sensor::ALL.into_iter().flat_map(|sensor| {
-            let steps = survey.steps.get(sensor);
-            let columns = log.columns.get(sensor).iter().zip(steps).zip(AXES);
-            columns.map(move |((column, &rate), axis)| {
+            let columns = log.columns.get(sensor).iter().zip(AXES);
+            columns.map(move |(column, axis)| {
                 let (unit, symbol) = match sensor {
                     Sensor::Gyro => (DEG_PER_H, "°/h"),
                     Sensor::Accel => (MICRO_G, "µg"),
@@ -44,7 +43,7 @@ pub(super) fn columns(run: &Run, survey: &Survey) -> Table {
                     count(column.at_largest),
                     run.instrument.unit.get(sensor).as_str(),
                     or_dash(column.step, three_digits),
-                    or_dash(rate, |rate| format!(
+                    or_dash(column.step_rate(run.recording.imu.period), |rate| format!(
                         "{} {symbol}",
                         three_digits(rate / unit)
                     )),
@@ -116,7 +115,7 @@ pub(super) fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
 pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
     let after = |k: usize| survey.turns.iter().find(|turn| turn.from == Some(k));
     let row = |(k, rest): (usize, &Rest)| {
-        let [begin, end] = rest.times(run);
+        let [begin, end] = rest.dwell.times(run);
         let mut row = cells![
             (k + 1).to_string(),
             value(begin, 1.0),
@@ -126,7 +125,7 @@ pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
             way_up(rest.up.axis, rest.up.down),
             degrees(rest.up.tilt),
         ];
-        row.extend(after(k).map_or([NONE; 4].map(str::to_owned), |turn| moved(turn, survey)));
+        row.extend(after(k).map_or([NONE; 4].map(str::to_owned), moved));
         row
     };
     let headings = [
@@ -151,7 +150,7 @@ pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
         )
 }
 
-fn moved(turn: &Turn, survey: &Survey) -> [String; 4] {
+fn moved(turn: &Turn) -> [String; 4] {
     let about = match turn.body_axis() {
         Some(axis) => AXES[axis].to_string(),
         None if turn.single => direction(turn),
@@ -162,7 +161,7 @@ fn moved(turn: &Turn, survey: &Survey) -> [String; 4] {
     } else {
         degrees(turn.angle.abs())
     };
-    let off = or_dash(turn.off_gravity(&survey.rests), degrees);
+    let off = or_dash(turn.off_gravity, degrees);
     [about, by, value(turn.fastest / DEGREE, 1.0), off]
 }
 
@@ -213,10 +212,10 @@ pub(super) fn methods(survey: &Survey) -> Table {
          begin; the closed form's from its equations. Error terms are not in it.",
     );
     let mut rows = Vec::new();
-    for method in &survey.methods {
-        let words = method.path.words();
+    for (path, expected) in &survey.methods {
+        let words = path.words();
         let mut row = cells![words];
-        match &method.expected {
+        match expected {
             Ok(expected) => {
                 let shown = |&(group, mean): &(Group, Option<f64>)| {
                     or_dash(mean, |mean| sigma(mean / group.unit_value()))

@@ -60,8 +60,8 @@ pub(super) fn signed(angle: f64) -> String {
 pub(super) fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
         "Stationary for {} s in all, at most {} s at a time; {}.",
-        three_digits(survey.standing.total),
-        three_digits(survey.standing.longest),
+        three_digits(survey.standing),
+        three_digits(survey.longest),
         match (&run.recording.table, run.recording.segments.len()) {
             (Some(table), _) => format!("table log of {} readings", count(table.time.len())),
             (None, 0) => "no table log, no labelled sections".to_owned(),
@@ -162,18 +162,8 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     let far = |turn: &Turn, off: Option<f64>| {
         off.is_some_and(|off| off > WRONG_ANGLE.max(WRONG_PART * turn.angle.abs()))
     };
-    let by_table = places(
-        survey
-            .turns
-            .iter()
-            .map(|turn| far(turn, turn.off_table(rests))),
-    );
-    let by_gravity = places(
-        survey
-            .turns
-            .iter()
-            .map(|turn| far(turn, turn.off_gravity(rests))),
-    );
+    let by_table = places(survey.turns.iter().map(|turn| far(turn, turn.off_table)));
+    let by_gravity = places(survey.turns.iter().map(|turn| far(turn, turn.off_gravity)));
     for (wrong, by) in [
         (by_table, "the table's log"),
         (by_gravity, "gravity's direction"),
@@ -274,7 +264,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
         survey
             .methods
             .iter()
-            .filter_map(|method| method.expected.as_ref().ok())
+            .filter_map(|(_, expected)| expected.as_ref().ok())
     };
     let Some(first) = expected().next() else {
         return vec![

@@ -5,30 +5,25 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::earth::ROTATION_RATE;
+use crate::imu::Sensor;
 use crate::recording::{TableLog, nanoseconds};
-use crate::run::Run;
 use crate::run::dwells::table::standstills;
+use crate::run::turning::{self, SCALE_SIGMAS as SIGMAS, SMALLEST, STEP, tolerance};
+use crate::run::{Dwell, Run};
 use crate::statistics::{SIGMA_OF_MEDIAN, median, median_of_axes};
 use crate::units::{DEGREE, PPM};
 
-/// A move that differs by more than this part of it is another one …
-const OTHER_ANGLE: f64 = 0.1;
-/// … or that many σ of the gyros' scale and bias.
-const SIGMAS: f64 = 5.0;
 /// Between two readings a table that turns by less has turned the shorter way, rad.
 const SHORTER_WAY: f64 = 1.0;
-/// The way of the gyros is measured in steps this long, s, so that noise adds little to it.
-const STEP: f64 = 0.1;
-/// What turns by less has not turned, rad.
-const SMALLEST: f64 = 1.0 * DEGREE;
 
 /// A move from one dwell to the next.
-#[derive(Debug, Clone, Copy)]
 struct Move {
-    /// How far it goes, and when, by the gyros.
-    gyros: Way,
-    /// The same by the table.
-    table: Way,
+    /// How far it goes by the gyros and by the table, one way and the other, rad.
+    gyros: f64,
+    table: f64,
+    /// When, by the table, and by how much later by the gyros, s.
+    time: f64,
+    late: f64,
     /// By how much the ways of the same move may differ, rad.
     tolerance: f64,
     /// By how much a bias that dwells tell makes them differ, rad.
@@ -37,43 +32,18 @@ struct Move {
     interval: f64,
 }
 
-impl Move {
-    fn is_another(&self) -> bool {
-        (self.gyros.angle - self.table.angle).abs() > self.tolerance
-    }
-
-    /// By how much the gyros are later, s.
-    fn late(&self) -> f64 {
-        self.gyros.middle - self.table.middle
-    }
-}
-
-/// Steps of a move, summed.
-#[derive(Debug, Clone, Copy, Default)]
-struct Way {
-    /// In all, one way and the other, rad.
-    angle: f64,
-    /// Mean time of it, s.
-    middle: f64,
-    /// Rate, rad/s.
-    fastest: f64,
-}
-
-impl Way {
-    /// Of steps with their times in the middle, durations in s and angles in rad, except those at rest: they
-    /// turn by less than `noise` and by less than rate `zero` makes.
-    fn of(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> Self {
-        let mut way = Self::default();
-        for (time, duration, angle) in steps {
-            way.fastest = way.fastest.max(angle / duration);
-            if angle > noise + zero * duration {
-                way.middle += angle * time;
-                way.angle += angle;
-            }
+/// The angle of some steps in all, rad, their mean time, s, and the fastest rate, rad/s. Steps: time in the middle and
+/// duration, s, and angle, rad. Those are at rest that turn by less than `noise` and less than rate `zero` makes.
+fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [f64; 3] {
+    let (mut all, mut moment, mut fastest) = (0.0, 0.0, 0.0f64);
+    for (time, duration, angle) in steps {
+        fastest = fastest.max(angle / duration);
+        if angle > noise + zero * duration {
+            moment += angle * time;
+            all += angle;
         }
-        way.middle /= way.angle.max(f64::MIN_POSITIVE);
-        way
     }
+    [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
 /// Moves that the gyros make by another angle than the table, or at another time; else a scale that all of them
@@ -82,9 +52,9 @@ impl Way {
 /// Rows that one log has lost, clocks that drift apart and a log of another run all show there, however the
 /// samples are stamped.
 pub fn clock(run: &Run) -> Option<String> {
-    let table = run.recording.table.as_ref()?;
-    let moves = moves(run, table);
-    let mut others = moves.iter().filter(|m| m.is_another());
+    let moves = moves(run, run.recording.table.as_ref()?);
+    let is_another = |m: &&Move| (m.gyros - m.table).abs() > m.tolerance;
+    let mut others = moves.iter().filter(is_another);
     if let Some(first) = others.next() {
         return Some(format!(
             "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: {:.1}° \
@@ -92,14 +62,14 @@ pub fn clock(run: &Run) -> Option<String> {
              not of one run or clock. Otherwise check gyro_unit, scale and the unit of the table's angles.",
             1 + others.count(),
             moves.len(),
-            first.table.middle,
-            first.gyros.angle / DEGREE,
-            first.table.angle / DEGREE
+            first.time,
+            first.gyros / DEGREE,
+            first.table / DEGREE
         ));
     }
     let interval = moves.iter().map(|m| m.interval).fold(0.0, f64::max);
     let resolved = interval + run.recording.imu.period;
-    match moves.iter().any(|m| m.late().abs() > resolved) {
+    match moves.iter().any(|m| m.late.abs() > resolved) {
         true => other_times(&moves, resolved, run.recording.imu.period),
         false => scale(run, &moves),
     }
@@ -107,16 +77,12 @@ pub fn clock(run: &Run) -> Option<String> {
 
 /// What moves at other times have in common: an offset, a jump, or a drift of the clocks.
 fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
-    let (first, last) = (moves.first()?, moves.last()?);
     let by = |late: f64| match late > 0.0 {
         true => format!("{late:.2} s later"),
         false => format!("{:.2} s earlier", -late),
     };
-    let low = moves.iter().map(Move::late).fold(f64::INFINITY, f64::min);
-    let high = moves
-        .iter()
-        .map(Move::late)
-        .fold(f64::NEG_INFINITY, f64::max);
+    let late = || moves.iter().map(|m| m.late);
+    let (low, high) = (late().reduce(f64::min)?, late().reduce(f64::max)?);
     if high - low <= resolved {
         return Some(format!(
             "The gyros turn {} than the table in all {} moves. Bring both logs to one clock.",
@@ -124,34 +90,35 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
             moves.len()
         ));
     }
-    let change = |pair: &[Move]| pair[1].late() - pair[0].late();
-    let jump = moves
+    let changes = moves
         .windows(2)
-        .max_by(|one, other| change(one).abs().total_cmp(&change(other).abs()))?;
-    if change(jump).abs() > 0.5 * (high - low) {
+        .map(|pair| (pair[1].late - pair[0].late, pair));
+    let (change, jump) = changes.max_by(|one, other| one.0.abs().total_cmp(&other.0.abs()))?;
+    if change.abs() > 0.5 * (high - low) {
         return Some(format!(
             "Between the moves at {:.1} s and {:.1} s the gyros begin to turn {} against the table: {} about {:.0} \
              rows there, or the table log jumps. Correct the log that is wrong.",
-            jump[0].table.middle,
-            jump[1].table.middle,
-            by(change(jump)),
-            match change(jump) < 0.0 {
+            jump[0].time,
+            jump[1].time,
+            by(change),
+            match change < 0.0 {
                 true => "the IMU log has lost",
                 false => "the IMU log repeats",
             },
-            change(jump).abs() / period
+            change.abs() / period
         ));
     }
-    let apart = (last.late() - first.late()) / (last.table.middle - first.table.middle);
-    let at = |of: &Move| nanoseconds((of.table.middle * 10.0).round() / 10.0);
+    let (first, last) = (moves.first()?, moves.last()?);
+    let apart = (last.late - first.late) / (last.time - first.time);
+    let at = |of: &Move| nanoseconds((of.time * 10.0).round() / 10.0);
     Some(format!(
         "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} \
          s, {} in that at {} s. Scale factors are wrong by as much. Check for rows that are lost or repeated all \
          along, sample_period_s and the stamps of both logs.",
         apart / PPM,
-        by(first.late()),
+        by(first.late),
         at(first),
-        by(last.late()),
+        by(last.late),
         at(last)
     ))
 }
@@ -162,13 +129,10 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     // The first and the last may be cut by the end of a log.
     let moves = moves.get(1..moves.len().saturating_sub(1))?;
     let sum = |of: fn(&Move) -> f64| moves.iter().map(of).sum::<f64>();
-    let (gyros, table) = (sum(|m| m.gyros.angle), sum(|m| m.table.angle));
-    if table <= 0.0 {
-        return None;
-    }
+    let (gyros, table) = (sum(|m| m.gyros), sum(|m| m.table));
     let sigma = run.instrument.prior.gyro.scale_sigma.amax();
     let off = gyros / table - 1.0;
-    (off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
+    (table > 0.0 && off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
         format!(
             "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of \
              [imu.prior.gyro] states {:.0} ppm. Check its scale and scale_sigma_ppm, and gyro_unit.",
@@ -182,13 +146,13 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
 
 /// Mean rates of the gyros while the table stands, the middle one of each axis: their biases, with a part of
 /// Earth rate, and how far off these may be, rad/s. The prior's may be wrong; stands are where the clocks are.
-fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
+fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     let prior = &run.instrument.prior.gyro;
-    let imu = &run.recording.imu;
-    let known = stands.iter().filter(|s| !s.is_empty() && !imu.is_lost(s));
-    let means: Vec<Vector3<f64>> = known
-        .map(|s| imu.gyro.sum(s.clone()) / (s.len() as f64 * imu.period))
-        .collect();
+    let known = stands
+        .iter()
+        .filter(|dwell| !run.recording.imu.is_lost(&dwell.samples));
+    let means = known.map(|dwell| dwell.mean(Sensor::Gyro, run).output);
+    let means: Vec<Vector3<f64>> = means.collect();
     let bias = median_of_axes(&means).unwrap_or(prior.bias);
     let mut off: Vec<f64> = means.iter().map(|mean| (mean - bias).norm()).collect();
     let sigma = median(&mut off).map_or(f64::INFINITY, |off| SIGMA_OF_MEDIAN * off);
@@ -200,30 +164,21 @@ fn bias_at_rest(run: &Run, stands: &[Range<usize>]) -> (Vector3<f64>, f64) {
 /// the scale factors of their axes differ.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
-    let stands: Vec<Range<usize>> = standstills(run, table)
-        .into_iter()
-        .map(|standstill| standstill.samples)
-        .collect();
+    let stands = standstills(run, table);
     // One alone does not tell how far off the bias is that it shows.
-    if stands.len() < 2 {
+    let ([_, _, ..], [first, .., last]) = (&stands[..], &table.time[..]) else {
         return Vec::new();
-    }
-    let covered = |time: Option<&f64>| {
-        let edge = imu.edge(time.copied().unwrap_or(0.0));
-        edge.clamp(0.0, imu.len() as f64) as usize
     };
-    let (first, last) = (covered(table.time.first()), covered(table.time.last()));
-    let (bias, off) = bias_at_rest(run, &stands);
-    let middles = stands.iter().map(|s| s.start.midpoint(s.end));
-    let edges: Vec<usize> = [first].into_iter().chain(middles).chain([last]).collect();
-    let between = edges.windows(2).filter_map(|edges| {
-        let samples = edges[0]..edges[1];
-        let is_whole = !samples.is_empty() && imu.unbroken(&samples) && !imu.is_lost(&samples);
-        is_whole
-            .then(|| of_samples(run, table, samples, (&bias, off)))
-            .flatten()
-    });
-    between.collect()
+    let bias = bias_at_rest(run, &stands);
+    let covered = |time: f64| imu.edge(time).clamp(0.0, imu.len() as f64) as usize;
+    let middle = |dwell: &Dwell| dwell.samples.start.midpoint(dwell.samples.end);
+    let mut edges = vec![covered(*first)];
+    edges.extend(stands.iter().map(middle));
+    edges.push(covered(*last));
+    let between = edges.windows(2).map(|pair| pair[0]..pair[1]);
+    let whole = between.filter(|samples| !samples.is_empty() && imu.unbroken(samples));
+    let moves = whole.filter_map(|samples| of_samples(run, table, samples, bias));
+    moves.collect()
 }
 
 /// What both logs say of these samples; none where readings are too far apart, or nothing turns.
@@ -231,52 +186,41 @@ fn of_samples(
     run: &Run,
     table: &TableLog,
     samples: Range<usize>,
-    (bias, off): (&Vector3<f64>, f64),
+    (bias, off): (Vector3<f64>, f64),
 ) -> Option<Move> {
     let imu = &run.recording.imu;
-    let prior = &run.instrument.prior.gyro;
     let (begin, end) = (imu.time(samples.start), imu.time(samples.end));
-    let readings =
-        table.time.partition_point(|&t| t < begin)..table.time.partition_point(|&t| t < end);
-    let (times, attitudes) = (&table.time[readings.clone()], &table.attitude[readings]);
+    let [from, to] = [begin, end].map(|edge| table.time.partition_point(|&time| time < edge));
+    let (times, attitudes) = (&table.time[from..to], &table.attitude[from..to]);
     let (first, last) = (*times.first()?, *times.last()?);
     let intervals = times.windows(2).map(|pair| pair[1] - pair[0]);
     let interval = intervals.fold((first - begin).max(end - last), f64::max);
     let steps = times.windows(2).zip(attitudes.windows(2));
-    let by_table = steps.map(|(time, attitude)| {
+    let steps = steps.map(|(time, attitude)| {
         let angle = attitude[1].angle_to(&attitude[0]);
         (time[0].midpoint(time[1]), time[1] - time[0], angle)
     });
     // Two readings of three components each, as where standstills are found.
-    let by_table = Way::of(
-        by_table,
-        SIGMAS * run.table.reading_sigma * 6f64.sqrt(),
-        0.0,
-    );
+    let noise = SIGMAS * run.table.reading_sigma * 6f64.sqrt();
+    let [by_table, time, table_rate] = way(steps, noise, 0.0);
     // A move that the end of a log cuts is seen as far as both logs go.
     let covered = |time: f64| (imu.edge(time).max(0.0) as usize).clamp(samples.start, samples.end);
-    let samples = covered(first)..covered(last);
-    let length = ((STEP / imu.period).round() as usize).max(1);
-    let starts = samples.clone().step_by(length);
-    let by_gyros = starts.map(|start| {
-        let part = start..(start + length).min(samples.end);
-        let duration = part.len() as f64 * imu.period;
-        let sum = imu.gyro.sum(part.clone());
-        let time = imu.time(part.start) + 0.5 * duration;
-        (time, duration, (sum - bias * duration).norm())
-    });
+    let steps = turning::steps(imu, covered(first)..covered(last), bias);
+    let steps = steps.map(|(time, duration, turned)| (time, duration, turned.norm()));
     let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt()
         + 3f64.sqrt() * imu.pulse.gyro;
     // A bias from dwells has Earth rate in it, too.
-    let zero = SIGMAS * prior.bias_sigma.norm() + 2.0 * ROTATION_RATE;
-    let by_gyros = Way::of(by_gyros, noise, zero);
-    let is_resolved = by_gyros.fastest.max(by_table.fastest) * interval < SHORTER_WAY;
-    let part = OTHER_ANGLE.max(SIGMAS * prior.scale_sigma.amax());
-    let longest = by_gyros.angle.max(by_table.angle);
+    let zero = SIGMAS * run.instrument.prior.gyro.bias_sigma.norm() + 2.0 * ROTATION_RATE;
+    let [by_gyros, time_by_gyros, gyro_rate] = way(steps, noise, zero);
+    let is_resolved = gyro_rate.max(table_rate) * interval < SHORTER_WAY;
+    let longest = by_gyros.max(by_table);
+    let tolerance = tolerance(run) * longest + zero * (end - begin) + table_rate * imu.period;
     (is_resolved && longest > SMALLEST).then_some(Move {
         gyros: by_gyros,
         table: by_table,
-        tolerance: part * longest + zero * (end - begin) + by_table.fastest * imu.period,
+        time,
+        late: time_by_gyros - time,
+        tolerance,
         zero: (off + 2.0 * ROTATION_RATE) * (end - begin),
         interval,
     })

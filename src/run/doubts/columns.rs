@@ -1,22 +1,27 @@
 //! Columns that no instrument gives.
 
+use nalgebra::Vector3;
 use statrs::function::erf::erf;
 
-use super::FALSE_ALARMS;
 use crate::imu::{AXES, Sensor};
 use crate::recording::Series;
 use crate::run::Run;
+use crate::statistics::FALSE_ALARM;
 
 /// Axes that give the same as another in every row.
 ///
 /// Two axes have noise of their own, so not even two that sense the same are alike. One that never changes may
 /// be at rest under coarse pulses.
 pub fn copied(run: &Run) -> Option<String> {
-    let pairs = listed(|sensor| {
-        let name = sensor.name();
-        let alike = alike(run.recording.imu.of(sensor)).into_iter();
-        let pair = move |[one, other]: [char; 2]| format!("{name} {one} and {name} {other}");
-        alike.map(pair).collect()
+    let pairs = listed(run, |sensor, rows| {
+        let alike = |&(one, other): &(usize, usize)| {
+            let same = |row: Vector3<f64>| row[one].abs() == row[other].abs();
+            rows.iter().all(same) && smallest_changes(rows)[one].is_finite()
+        };
+        let name = |axis: usize| format!("{} {}", sensor.name(), AXES[axis]);
+        let pairs = [(0, 1), (0, 2), (1, 2)].into_iter().filter(alike);
+        let words = pairs.map(|(one, other)| format!("{} and {}", name(one), name(other)));
+        words.collect()
     })?;
     Some(format!(
         "These columns are the same in every row: {pairs}. A column is named twice, or copied."
@@ -27,11 +32,15 @@ pub fn copied(run: &Run) -> Option<String> {
 /// the other axes of their triad lie.
 pub fn dead(run: &Run) -> Option<String> {
     let imu = &run.recording.imu;
-    let axes = listed(|sensor| {
+    let axes = listed(run, |sensor, rows| {
         let sigma = run.instrument.noise.get(sensor).random_walk * imu.period.sqrt();
-        let axes = without_noise(imu.of(sensor), sigma).into_iter();
-        let name = move |axis| format!("{} {axis}", sensor.name());
-        axes.map(name).collect()
+        let changes = smallest_changes(rows);
+        // Noise leaves a step by chance in each row anew, most seldom where the truth is in the middle of it.
+        let stays = erf(changes.min() / (8f64.sqrt() * sigma)).ln() * rows.len() as f64;
+        let is_beyond_chance = stays < (FALSE_ALARM / 6.0).ln();
+        let axes = (0..AXES.len()).filter(|&axis| is_beyond_chance && changes[axis].is_infinite());
+        let words = axes.map(|axis| format!("{} {}", sensor.name(), AXES[axis]));
+        words.collect()
     })?;
     Some(format!(
         "These columns never change ({} rows), although their noise should make them vary: {axes}. The axis is \
@@ -41,37 +50,23 @@ pub fn dead(run: &Run) -> Option<String> {
 }
 
 /// What is found in both triads; `None` if nothing is.
-fn listed(of: impl Fn(Sensor) -> Vec<String>) -> Option<String> {
-    let all: Vec<String> = Sensor::ALL.into_iter().flat_map(of).collect();
+fn listed(run: &Run, of: impl Fn(Sensor, &Series) -> Vec<String>) -> Option<String> {
+    let of_triad = |sensor| of(sensor, run.recording.imu.of(sensor));
+    let all: Vec<String> = Sensor::ALL.into_iter().flat_map(of_triad).collect();
     (!all.is_empty()).then(|| all.join(", "))
 }
 
-/// Of increments with this noise each.
-fn without_noise(rows: &Series, sigma: f64) -> Vec<char> {
-    let (mut before, mut step, mut changes) = (rows.at(0), f64::INFINITY, [false; 3]);
+/// The smallest change of each axis from one row to the next; infinite if it never changes.
+fn smallest_changes(rows: &Series) -> Vector3<f64> {
+    let (mut smallest, mut before) = (Vector3::repeat(f64::INFINITY), rows.at(0));
     for row in rows.iter() {
-        for axis in 0..3 {
-            let change = (row[axis] - before[axis]).abs();
-            if change > 0.0 {
-                changes[axis] = true;
-                step = step.min(change);
-            }
-        }
-        before = row;
+        let changes = (row - before).map(|change| match change == 0.0 {
+            true => f64::INFINITY,
+            false => change.abs(),
+        });
+        (smallest, before) = (smallest.inf(&changes), row);
     }
-    // Noise leaves a step by chance in each row anew, most seldom where the truth is in the middle of it.
-    let stays = erf(step / (8f64.sqrt() * sigma)).ln() * rows.len() as f64;
-    let is_dead = |axis: &usize| !changes[*axis] && stays < FALSE_ALARMS.ln();
-    (0..3).filter(is_dead).map(|axis| AXES[axis]).collect()
-}
-
-fn alike(rows: &Series) -> Vec<[char; 2]> {
-    let first = rows.at(0);
-    let changes = |axis: usize| rows.iter().any(|row| row[axis] != first[axis]);
-    let same = |one: usize, other: usize| rows.iter().all(|row| row[one].abs() == row[other].abs());
-    let pairs = [[0, 1], [0, 2], [1, 2]].into_iter();
-    let alike = pairs.filter(|&[one, other]| changes(one) && same(one, other));
-    alike.map(|pair| pair.map(|axis| AXES[axis])).collect()
+    smallest
 }
 
 #[cfg(test)]

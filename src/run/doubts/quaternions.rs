@@ -1,10 +1,12 @@
 //! Quaternions of the table in another order, or of the inverse rotation.
 
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::FALSE_ALARMS;
-use crate::imu::{AxisOrder, Sensor};
-use crate::run::{Aiding, Run};
+use crate::attitude::{matrix, quaternion};
+use crate::imu::AxisOrder;
+use crate::run::Run;
+use crate::run::motion::rests;
+use crate::statistics::FALSE_ALARM;
 
 /// The attitude that a reading means, from the one that it was taken for.
 type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
@@ -26,20 +28,14 @@ pub fn order(run: &Run) -> Option<String> {
         + prior.installation_sigma.norm_squared()
         + (prior.bias_sigma / run.site.gravity).norm_squared()
         + 3.0 * run.table.position_sigma.powi(2);
-    let dwells = run.dwells(Aiding::Table);
-    let ups: Vec<(Vector3<f64>, Matrix3<f64>)> = dwells
-        .iter()
-        .filter_map(|dwell| {
-            let force = dwell.mean(Sensor::Accel, run).output - prior.bias;
-            Some((force.normalize(), dwell.position.as_ref()?.attitude))
-        })
-        .collect();
+    let mut rests = rests(run);
+    rests.retain(|rest| rest.dwell.position.is_some());
     let left = |axes: &AxisOrder, reordered: Reading| {
-        let squares = ups.iter().map(|(force, attitude)| {
-            let up = reordered(attitude).tr_mul(&Vector3::z());
-            (axes.apply(force) - up).norm_squared()
+        let squares = rests.iter().filter_map(|rest| {
+            let up = reordered(&rest.dwell.position.as_ref()?.attitude).tr_mul(&Vector3::z());
+            Some((axes.apply(&rest.force.normalize()) - up).norm_squared())
         });
-        squares.sum::<f64>() + expected * ups.len() as f64
+        squares.sum::<f64>() + expected * rests.len() as f64
     };
     let as_stated = AxisOrder::all().map(|axes| left(&axes, |attitude| *attitude));
     let as_stated = as_stated.fold(f64::INFINITY, f64::min);
@@ -53,16 +49,17 @@ pub fn order(run: &Run) -> Option<String> {
             |attitude| attitude.transpose(),
         ),
     ];
-    let log_ratios = others.map(|(words, order)| {
+    let likelier = others.map(|(words, order)| {
         let ratio = as_stated / left(&AxisOrder::IDENTITY, order);
-        (1.5 * ups.len() as f64 * ratio.ln(), words)
+        (1.5 * rests.len() as f64 * ratio.ln(), words)
     });
-    let (log_ratio, words) = log_ratios.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (log_ratio > -FALSE_ALARMS.ln()).then(|| {
+    let limit = (others.len() as f64 / FALSE_ALARM).ln();
+    let (log_ratio, words) = likelier.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (log_ratio > limit).then(|| {
         format!(
             "The table's quaternions {words} (the accelerometers' gravity in {} dwells is 10^{:.0} times more \
              likely so).",
-            ups.len(),
+            rests.len(),
             log_ratio / std::f64::consts::LN_10
         )
     })
@@ -70,10 +67,7 @@ pub fn order(run: &Run) -> Option<String> {
 
 /// The attitude if the columns taken for w, x, y, z are x, y, z, w.
 fn w_last(attitude: &Matrix3<f64>) -> Matrix3<f64> {
-    let rotation = Rotation3::from_matrix_unchecked(*attitude);
-    let q = UnitQuaternion::from_rotation_matrix(&rotation);
+    let q = quaternion(attitude);
     let columns = Quaternion::new(q.k, q.w, q.i, q.j);
-    UnitQuaternion::from_quaternion(columns)
-        .to_rotation_matrix()
-        .into_inner()
+    matrix(&UnitQuaternion::from_quaternion(columns))
 }

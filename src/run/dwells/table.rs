@@ -2,11 +2,16 @@
 
 use std::ops::Range;
 
-use super::{Dwell, Position, SHORTEST, STANDING_ANGLE, STANDING_SIGMAS};
 use crate::attitude::{log, mean};
 use crate::recording::TableLog;
 use crate::run::Run;
+use crate::run::dwell::{Dwell, Position, SHORTEST};
+use crate::units::ARCSEC;
 
+/// Readings of a table at rest differ by less than this many σ of their noise …
+const STANDING_SIGMAS: f64 = 6.0;
+/// … or this much, whatever the noise.
+const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
 /// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and one that stops still rings.
 const MARGIN: f64 = 0.2;
@@ -18,10 +23,21 @@ const CREEP_SIGMAS: f64 = 5.0;
 /// Readings at least this far apart tell a slow turn from a standstill, however dense the log, s.
 const APART: f64 = 0.05;
 
+/// How far two means of readings may differ, the sum of whose variances is this part of that of a reading.
+fn limit(run: &Run, share: f64) -> f64 {
+    STANDING_ANGLE.max(STANDING_SIGMAS * run.table.reading_sigma * share.sqrt())
+}
+
+/// Whether two dwells are at one position, as far as readings tell.
+pub fn same_reading(run: &Run, before: &Position, after: &Position) -> bool {
+    let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
+    log(&(after.attitude * before.attitude.transpose())).norm() < limit(run, share)
+}
+
 /// Stretches of the log whose readings stay.
 pub fn standstills(run: &Run, table: &TableLog) -> Vec<Dwell> {
     // Two readings of three components each.
-    let limit = STANDING_ANGLE.max(STANDING_SIGMAS * run.table.reading_sigma * 6f64.sqrt());
+    let limit = limit(run, 6.0);
     let mut dwells = Vec::new();
     let (mut first, mut before) = (0, 0);
     for next in 1..=table.time.len() {
@@ -44,56 +60,48 @@ fn dwell(run: &Run, table: &TableLog, standing: Range<usize>) -> Option<Dwell> {
     let settled = settled(table, run.table.reading_sigma, standing);
     // At either end of the log the table is not known to move.
     let margin = |at_end: bool| if at_end { 0.0 } else { MARGIN };
-    let begin = table.time.get(settled.start)? + margin(settled.start == 0);
-    let end =
-        table.time.get(settled.end.checked_sub(1)?)? - margin(settled.end == table.time.len());
-
-    let times = &table.time[settled.clone()];
-    let readings = settled.start + times.partition_point(|&t| t < begin)
-        ..settled.start + times.partition_point(|&t| t <= end);
+    let begin = table.time[settled.start] + margin(settled.start == 0);
+    let end = table.time[settled.end - 1] - margin(settled.end == table.time.len());
+    let readings = table.time.partition_point(|&time| time < begin)
+        ..table.time.partition_point(|&time| time <= end);
     // A stamp that misses a sample's edge by rounding must not cost the sample.
     let imu = &run.recording.imu;
-    let edge = |time: f64| imu.edge(time);
-    let sample = |k: f64| k.clamp(0.0, imu.len() as f64) as usize;
-    let samples = sample((edge(begin) - 1e-3).ceil())..sample((edge(end) + 1e-3).floor());
-    if samples.len() as f64 * imu.period < SHORTEST {
-        return None;
-    }
-    Some(Dwell {
-        samples,
+    let sample = |edge: f64| edge.clamp(0.0, imu.len() as f64) as usize;
+    let first = sample((imu.edge(begin) - 1e-3).ceil());
+    let dwell = Dwell {
+        samples: first..sample((imu.edge(end) + 1e-3).floor()),
         position: Some(Position {
             attitude: mean(table.attitude.get(readings.clone())?)?,
             readings,
         }),
-    })
+    };
+    (dwell.duration(imu) >= SHORTEST).then_some(dwell)
 }
 
 /// Cuts off the ends of a standstill at which the mean of the readings is not that of its middle.
 fn settled(table: &TableLog, reading_sigma: f64, standing: Range<usize>) -> Range<usize> {
+    let Range { mut start, mut end } = standing;
     let quarter = standing.len() / 4;
-    let middle = standing.start + quarter..standing.end - quarter;
-    let (first, last) = (table.time[standing.start], table.time[standing.end - 1]);
-    let interval = (last - first) / (standing.len() as f64 - 1.0);
+    let middle = start + quarter..end - quarter;
+    let interval = (table.time[end - 1] - table.time[start]) / (standing.len() as f64 - 1.0);
     let stretch = (CREEP_STRETCH / interval).round();
-    let Some(level) = mean(&table.attitude[middle.clone()]) else {
-        return standing;
-    };
     if !(stretch >= 1.0 && stretch <= quarter as f64) {
         return standing;
     }
+    let level = mean(&table.attitude[middle.clone()]);
+    let sigma = reading_sigma * (1.0 / stretch + 1.0 / middle.len() as f64).sqrt();
     let stretch = stretch as usize;
-    let sigma = reading_sigma * (1.0 / stretch as f64 + 1.0 / middle.len() as f64).sqrt();
     let creeps = |readings: Range<usize>| {
-        mean(&table.attitude[readings])
-            .is_some_and(|mean| log(&(mean * level.transpose())).norm() > CREEP_SIGMAS * sigma)
+        let found = mean(&table.attitude[readings]).zip(level);
+        found.is_some_and(|(mean, level)| {
+            log(&(mean * level.transpose())).norm() > CREEP_SIGMAS * sigma
+        })
     };
-    let mut settled = standing;
-    while settled.start + stretch <= middle.start && creeps(settled.start..settled.start + stretch)
-    {
-        settled.start += stretch;
+    while start + stretch <= middle.start && creeps(start..start + stretch) {
+        start += stretch;
     }
-    while settled.end >= middle.end + stretch && creeps(settled.end - stretch..settled.end) {
-        settled.end -= stretch;
+    while end >= middle.end + stretch && creeps(end - stretch..end) {
+        end -= stretch;
     }
-    settled
+    start..end
 }

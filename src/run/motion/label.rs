@@ -4,22 +4,19 @@ use std::fmt;
 use std::ops::Range;
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use super::rest::Rest;
 use super::turn::{Turn, zero};
-use crate::imu::Sensor;
+use crate::navigation::samples_of;
 use crate::recording::{LabelledMotion, Segment};
+use crate::run::Run;
+use crate::run::dwell::{Dwell, common};
 use crate::run::dwells::imu::standstills;
-use crate::run::{Dwell, Run};
+use crate::run::turning::tolerance;
 use crate::units::DEGREE;
 
 /// A label's axis further than this from the plumb line is another one, rad.
 const OTHER_AXIS: f64 = 30.0 * DEGREE;
-/// A turn that differs from its label by more than this part of it is another one.
-const OTHER_ANGLE: f64 = 0.1;
-/// … or that many σ of the gyros' scale.
-const SCALE_SIGMAS: f64 = 5.0;
 /// A section of a position may move for this part of its time.
 const MOVING: f64 = 0.05;
 /// A section that begins or ends at a faster rate begins or ends within a turn, rad/s …
@@ -63,31 +60,14 @@ pub enum Verdict {
     },
 }
 
-/// A section whose label the record contradicts, and what was made of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ContradictedLabel {
-    /// Its label.
-    pub label: String,
-    /// When it begins, s.
-    pub start: f64,
-    /// What the record says, after `section … `.
-    pub said: String,
-    /// Whether it was used, as far as the record does what the label says.
-    pub used: bool,
-}
-
-impl fmt::Display for ContradictedLabel {
+impl fmt::Display for LabelCheck {
+    /// What label and record disagree in, and whether the section is used nevertheless.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            label,
-            start,
-            said,
-            used,
-        } = self;
-        let used = if *used {
-            "used with other borders"
-        } else {
-            "not used"
+        let Segment { label, start, .. } = &self.segment;
+        let said = self.disagreement.as_deref().unwrap_or_default();
+        let used = match self.as_labelled.is_some() {
+            true => "used with other borders",
+            false => "not used",
         };
         write!(f, "`{label}` at {start:.1} s {said} ({used})")
     }
@@ -96,133 +76,118 @@ impl fmt::Display for ContradictedLabel {
 /// Every labelled section against what the record does at these rests.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     let standstills = standstills(run);
-    let check = |segment: &Segment| match segment.motion {
-        Some(LabelledMotion::Stands { up }) => position(run, rests, &standstills, segment, &up),
-        Some(LabelledMotion::Turns { axis, angle }) => turn(run, rests, segment, &axis, angle),
-        None => LabelCheck {
+    let record = Record {
+        run,
+        rests,
+        standstills,
+    };
+    let check = |segment: &Segment| {
+        let (verdict, disagreement, as_labelled) = match segment.motion {
+            Some(LabelledMotion::Stands { up }) => record.position(segment, &up),
+            Some(LabelledMotion::Turns { axis, angle }) => record.turn(segment, &axis, angle),
+            None => {
+                let nothing = "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect";
+                (Verdict::Unknown, Some(nothing.to_owned()), None)
+            }
+        };
+        LabelCheck {
             segment: segment.clone(),
-            verdict: Verdict::Unknown,
-            disagreement: Some(
-                "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect"
-                    .to_owned(),
-            ),
-            as_labelled: None,
-        },
+            verdict,
+            disagreement,
+            as_labelled,
+        }
     };
     run.recording.segments.iter().map(check).collect()
 }
 
-/// A section that is labelled as a position.
-fn position(
-    run: &Run,
-    rests: &[Rest],
-    standstills: &[Dwell],
-    segment: &Segment,
-    up: &Vector3<f64>,
-) -> LabelCheck {
-    // Samples of it in which it stands, where it turns in the others.
-    let standing = run.standing_in(&segment.samples, standstills);
-    let samples = standing.clone().unwrap_or_else(|| segment.samples.clone());
-    let section = Dwell::of(samples.clone());
-    let force = section.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias;
-    let (off, moving) = (force.angle(up), moving(run, rests, &segment.samples));
-    let is_still = moving <= MOVING * (segment.end - segment.start) && standing.is_none();
-    LabelCheck {
-        segment: segment.clone(),
-        verdict: Verdict::Position { off, moving },
-        disagreement: match off < OTHER_AXIS {
-            true if is_still => None,
-            true => Some(format!("is not still for {moving:.1} s: shorten it")),
-            false => Some(format!(
+/// What labels are held against.
+struct Record<'a> {
+    run: &'a Run,
+    rests: &'a [Rest],
+    standstills: Vec<Range<usize>>,
+}
+
+/// Verdict, disagreement and samples as labelled of a [`LabelCheck`].
+type Checked = (Verdict, Option<String>, Option<Range<usize>>);
+
+impl Record<'_> {
+    /// A section that is labelled as a position.
+    fn position(&self, segment: &Segment, up: &Vector3<f64>) -> Checked {
+        // Samples of it in which it stands, where it turns in the others.
+        let standing = self.run.standing_in(&segment.samples, &self.standstills);
+        let turns = standing.is_some();
+        let section = Dwell::of(standing.unwrap_or_else(|| segment.samples.clone()));
+        let off = section.force(self.run).angle(up);
+        let moving = self.moving(&segment.samples);
+        let verdict = Verdict::Position { off, moving };
+        if off >= OTHER_AXIS {
+            let words = format!(
                 "has another axis up, {:.0}° off the label's: correct the label or body_axes",
                 off / DEGREE
-            )),
-        },
-        as_labelled: (off < OTHER_AXIS).then_some(samples),
+            );
+            return (verdict, Some(words), None);
+        }
+        let is_still = moving <= MOVING * (segment.end - segment.start) && !turns;
+        let words = (!is_still).then(|| format!("is not still for {moving:.1} s: shorten it"));
+        (verdict, words, Some(section.samples))
     }
-}
 
-/// A section that is labelled as a turn by an angle.
-fn turn(
-    run: &Run,
-    rests: &[Rest],
-    segment: &Segment,
-    axis: &Vector3<f64>,
-    labelled: f64,
-) -> LabelCheck {
-    let (imu, samples) = (&run.recording.imu, segment.samples.clone());
-    let zero = zero(run, rests, samples.start);
-    let length = ((END / imu.period).round() as usize)
-        .max(1)
-        .min(samples.len());
-    let ends = [
-        samples.start..samples.start + length,
-        samples.end - length..samples.end,
-    ];
-    let turns =
-        |end: Range<usize>| angle(run, end, &zero).norm() / length as f64 / imu.period > TURNING;
-    // Beyond sections laid end to end lies something else.
-    let whole = match imu.continuous {
-        true => to_rests(rests, &samples),
-        false => samples.clone(),
-    };
-    let within = angle(run, samples.clone(), &zero).dot(axis);
-    let to_rests = angle(run, whole.clone(), &zero).dot(axis);
-    let is_cut =
-        ends.into_iter().any(turns) && (!imu.continuous || (to_rests - within).abs() > LOST);
-    let tolerance = OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.max());
-    let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance;
-    let found = Turn::of(run, samples.clone(), &zero);
-    let off = (found.axis * found.angle.signum()).angle(axis);
-    LabelCheck {
-        segment: segment.clone(),
-        verdict: Verdict::Turn {
+    /// A section that is labelled as a turn by an angle.
+    fn turn(&self, segment: &Segment, axis: &Vector3<f64>, labelled: f64) -> Checked {
+        let (imu, samples) = (&self.run.recording.imu, segment.samples.clone());
+        let zero = zero(self.run, self.rests, samples.start);
+        let found = Turn::of(self.run, samples.clone(), &zero);
+        let off = (found.axis * found.angle.signum()).angle(axis);
+        let angle = |samples: &Range<usize>| {
+            imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
+        };
+        let within = angle(&samples).dot(axis);
+        let verdict = Verdict::Turn {
             angle: within,
             off: off.min(std::f64::consts::PI - off),
-        },
-        disagreement: match is_cut {
-            true => Some(
-                "starts or ends during the turn: extend it until the sensor is still at both ends"
-                    .to_owned(),
-            ),
-            false if as_said(within) => None,
-            false => Some(format!(
-                "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, \
-                 or the gyros' scale",
-                within / DEGREE,
-                labelled / DEGREE
-            )),
-        },
-        as_labelled: match is_cut {
-            true => (as_said(to_rests) && whole != samples).then_some(whole),
-            false => as_said(within).then_some(samples),
-        },
+        };
+        let as_said = |angle: f64| (angle / labelled - 1.0).abs() < tolerance(self.run);
+        let length = samples_of(END, imu.period).min(samples.len());
+        let (first, last) = (samples.start + length, samples.end - length);
+        let turns = |end: Range<usize>| angle(&end).norm() / length as f64 / imu.period > TURNING;
+        // Beyond sections laid end to end lies something else.
+        let whole = match imu.continuous {
+            true => self.to_rests(&samples),
+            false => samples.clone(),
+        };
+        let to_rests = angle(&whole).dot(axis);
+        let is_more = !imu.continuous || (to_rests - within).abs() > LOST;
+        if is_more && (turns(samples.start..first) || turns(last..samples.end)) {
+            let words =
+                "starts or ends during the turn: extend it until the sensor is still at both ends";
+            let as_labelled = (as_said(to_rests) && whole != samples).then_some(whole);
+            return (verdict, Some(words.to_owned()), as_labelled);
+        }
+        if as_said(within) {
+            return (verdict, None, Some(samples));
+        }
+        let words = format!(
+            "turns by {:+.0}° about its axis, not {:+.0}°: correct the axis, sign or angle of the label, \
+             or the gyros' scale",
+            within / DEGREE,
+            labelled / DEGREE
+        );
+        (verdict, Some(words), None)
     }
-}
 
-/// Sum of the gyros over some samples, rad.
-fn angle(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Vector3<f64> {
-    let imu = &run.recording.imu;
-    imu.gyro.sum(samples.clone()) - zero * (samples.len() as f64 * imu.period)
-}
+    /// Some samples and those between them and the rests before and after.
+    fn to_rests(&self, samples: &Range<usize>) -> Range<usize> {
+        let mut dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
+        let before = dwells.clone().rfind(|dwell| dwell.start < samples.start);
+        let after = dwells.find(|dwell| dwell.end > samples.end);
+        before.map_or(samples.start, |dwell| dwell.end.min(samples.start))
+            ..after.map_or(samples.end, |dwell| dwell.start.max(samples.end))
+    }
 
-/// Some samples and those between them and the rests before and after.
-fn to_rests(rests: &[Rest], samples: &Range<usize>) -> Range<usize> {
-    let dwells = || rests.iter().map(|rest| &rest.dwell.samples);
-    let before = dwells().filter(|dwell| dwell.start < samples.start);
-    let after = dwells().filter(|dwell| dwell.end > samples.end);
-    let begin = before.map(|dwell| dwell.end.min(samples.start)).max();
-    let end = after.map(|dwell| dwell.start.max(samples.end)).min();
-    begin.unwrap_or(samples.start)..end.unwrap_or(samples.end)
-}
-
-/// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.
-fn moving(run: &Run, rests: &[Rest], samples: &Range<usize>) -> f64 {
-    let of = |rest: &Rest| {
-        let Range { start, end } = rest.dwell.samples;
-        end.min(samples.end)
-            .saturating_sub(start.max(samples.start))
-    };
-    let standing: usize = rests.iter().map(of).sum();
-    samples.len().saturating_sub(standing) as f64 * run.recording.imu.period
+    /// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.
+    fn moving(&self, samples: &Range<usize>) -> f64 {
+        let dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
+        let standing: usize = dwells.map(|dwell| common(dwell, samples).len()).sum();
+        samples.len().saturating_sub(standing) as f64 * self.run.recording.imu.period
+    }
 }

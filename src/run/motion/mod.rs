@@ -5,6 +5,6 @@ mod label;
 mod rest;
 mod turn;
 
-pub use label::{ContradictedLabel, LabelCheck, Verdict, checks};
+pub use label::{LabelCheck, Verdict, checks};
 pub use rest::{Rest, Up, rests};
 pub use turn::{Turn, turns};

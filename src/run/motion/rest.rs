@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use crate::imu::Sensor;
 use crate::run::{Dwell, Run};
 use crate::units::DEGREE;
 
@@ -49,34 +48,19 @@ impl Up {
 }
 
 impl Rest {
-    fn of(run: &Run, dwell: Dwell) -> Self {
-        let force = dwell.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias;
-        Self {
-            up: Up::of(&force),
-            force,
-            dwell,
-        }
-    }
-
-    /// Begin and end, s.
-    pub fn times(&self, run: &Run) -> [f64; 2] {
-        self.dwell.times(run)
-    }
-
     /// Angle between gravity as the accelerometers see it and as the table holds the instrument, rad.
     pub fn off_table(&self) -> Option<f64> {
         let attitude = self.dwell.position.as_ref()?.attitude;
         Some(self.force.angle(&attitude.tr_mul(&Vector3::z())))
     }
-
-    /// s.
-    pub fn duration(&self, run: &Run) -> f64 {
-        self.dwell.samples.len() as f64 * run.recording.imu.period
-    }
 }
 
 /// Where it stands, in order.
 pub fn rests(run: &Run) -> Vec<Rest> {
-    let rests = run.dwells(run.aiding()).into_iter();
-    rests.map(|dwell| Rest::of(run, dwell)).collect()
+    let rest = |dwell: Dwell| {
+        let force = dwell.force(run);
+        let up = Up::of(&force);
+        Rest { dwell, force, up }
+    };
+    run.dwells(run.aiding()).into_iter().map(rest).collect()
 }

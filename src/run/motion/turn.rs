@@ -9,6 +9,7 @@ use crate::attitude::{exp, log};
 use crate::imu::Sensor;
 use crate::recording::LabelledMotion;
 use crate::run::Run;
+use crate::run::turning::{SMALLEST, steps};
 use crate::units::DEGREE;
 
 /// Turns about one axis go along it for this part of their way at least …
@@ -17,10 +18,6 @@ const ALONG: f64 = 0.95;
 const ONE_AXIS: f64 = 1.0 * DEGREE;
 /// … and this part of the way.
 const APART: f64 = 0.02;
-/// The way is measured in steps this long, s, so that noise adds little to it.
-const STEP: f64 = 0.1;
-/// What turns by less has not turned, rad.
-const SMALLEST: f64 = 1.0 * DEGREE;
 /// Turns about an axis within this angle of a body axis are about that.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
 
@@ -43,22 +40,25 @@ pub struct Turn {
     pub rotation: Matrix3<f64>,
     /// The rest before it, by its place among the rests; the next one comes after.
     pub from: Option<usize>,
+    /// Angle between up as the gyros carry it over the turn and as the accelerometers see it after, rad.
+    pub off_gravity: Option<f64>,
+    /// Angle between the turn by the gyros and by the table, rad.
+    pub off_table: Option<f64>,
 }
 
 impl Turn {
-    pub(super) fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
-        let period = run.recording.imu.period;
-        let length = ((STEP / period).round() as usize).max(1);
+    /// Of these samples, with this output as zero, rad/s.
+    pub fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
+        let imu = &run.recording.imu;
         let mut attitude = Matrix3::identity();
+        for increment in imu.gyro.within(samples.clone()) {
+            attitude *= exp(increment - zero * imu.period);
+        }
         let (mut sum, mut way, mut fastest) = (Vector3::zeros(), 0.0, 0.0f64);
-        for step in run.recording.imu.gyro.parts(samples.clone(), length) {
-            let turned = step.iter().sum::<Vector3<f64>>() - zero * (step.len() as f64 * period);
-            for increment in step.iter() {
-                attitude *= exp(increment - zero * period);
-            }
+        for (_, duration, turned) in steps(imu, samples.clone(), *zero) {
             sum += turned;
             way += turned.norm();
-            fastest = fastest.max(turned.amax() / (step.len() as f64 * period));
+            fastest = fastest.max(turned.amax() / duration);
         }
         let off = log(&(exp(sum) * attitude.transpose())).norm();
         let single = sum.norm() > ALONG * way && off < ONE_AXIS + APART * way;
@@ -74,22 +74,9 @@ impl Turn {
             fastest,
             rotation: attitude,
             from: None,
+            off_gravity: None,
+            off_table: None,
         }
-    }
-
-    /// Angle between up as the gyros carry it over the turn and as the accelerometers see it after, rad.
-    pub fn off_gravity(&self, rests: &[Rest]) -> Option<f64> {
-        let from = self.from?;
-        let carried = self.rotation.tr_mul(&rests.get(from)?.force);
-        Some(carried.angle(&rests.get(from + 1)?.force))
-    }
-
-    /// Angle between the turn by the gyros and by the table, rad.
-    pub fn off_table(&self, rests: &[Rest]) -> Option<f64> {
-        let from = self.from?;
-        let attitude = |rest: usize| Some(rests.get(rest)?.dwell.position.as_ref()?.attitude);
-        let said = attitude(from)?.tr_mul(&attitude(from + 1)?);
-        Some(log(&(self.rotation * said.transpose())).norm())
     }
 
     /// The body axis that it is about, if it is about one.
@@ -113,29 +100,34 @@ pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
 
 /// What turns from rest to rest, or in sections labelled as turns.
 pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
-    let between = rests.windows(2).enumerate().map(|(from, pair)| {
-        let samples = pair[0].dwell.samples.end..pair[1].dwell.samples.start;
-        (Some(from), samples)
+    let imu = &run.recording.imu;
+    let turn = |samples: Range<usize>| {
+        // What was lost on the way may be any turn.
+        let known = !samples.is_empty() && !imu.is_lost(&samples);
+        let zero = zero(run, rests, samples.start);
+        let turn = known.then(|| Turn::of(run, samples, &zero));
+        turn.filter(|turn| turn.angle.abs() > SMALLEST || turn.fastest > SMALLEST)
+    };
+    let between = rests.windows(2).enumerate().filter_map(|(from, pair)| {
+        let turn = turn(pair[0].dwell.samples.end..pair[1].dwell.samples.start)?;
+        let attitude = |rest: &Rest| Some(rest.dwell.position.as_ref()?.attitude);
+        let by_table = attitude(&pair[0]).zip(attitude(&pair[1]));
+        let carried = turn.rotation.tr_mul(&pair[0].force);
+        Some(Turn {
+            from: Some(from),
+            off_gravity: Some(carried.angle(&pair[1].force)),
+            off_table: by_table
+                .map(|(before, after)| log(&(turn.rotation * after.tr_mul(&before))).norm()),
+            ..turn
+        })
     });
-    let labelled = run.recording.segments.iter().filter_map(|segment| {
-        let turns = matches!(segment.motion, Some(LabelledMotion::Turns { .. }));
-        turns.then(|| (None, segment.samples.clone()))
+    let segments = run.recording.segments.iter();
+    let labelled = segments.filter_map(|segment| match segment.motion {
+        Some(LabelledMotion::Turns { .. }) => turn(segment.samples.clone()),
+        _ => None,
     });
-    let all: Vec<(Option<usize>, Range<usize>)> = match run.recording.imu.continuous {
+    match imu.continuous {
         true => between.collect(),
         false => labelled.collect(),
-    };
-    // What was lost on the way may be any turn.
-    let known = |samples: &Range<usize>| !samples.is_empty() && !run.recording.imu.is_lost(samples);
-    let turns = all.into_iter().filter(|(_, samples)| known(samples));
-    let turns = turns.map(|(from, samples)| {
-        let zero = zero(run, rests, samples.start);
-        Turn {
-            from,
-            ..Turn::of(run, samples, &zero)
-        }
-    });
-    turns
-        .filter(|turn| turn.angle.abs() > SMALLEST || turn.fastest > SMALLEST)
-        .collect()
+    }
 }

@@ -92,10 +92,7 @@ impl Baseline {
             .chain([self.equal])
             .map(|part| {
                 let part = part?;
-                let shorter = |dwell: &Dwell| {
-                    let duration = dwell.samples.len() as f64 * run.recording.imu.period;
-                    dwell.first_seconds(part * duration, &run.recording.imu)
-                };
+                let shorter = |dwell: &Dwell| dwell.first_part(part, &run.recording.imu);
                 let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
                 let closed_form = six_position_of(&problem, &dwells).ok()?;
                 let estimate = in_general_form(&closed_form.estimate.triads);

@@ -147,7 +147,7 @@ impl Hypotheses {
             .filter(|(_, of)| largest - of < TOLD_APART.ln());
         let mut likely: Vec<_> = likely.map(|(pair, _)| *pair).collect();
         likely.sort_by_key(|orders| {
-            let changed = Sensor::ALL.map(|sensor| orders.get(sensor).changed());
+            let changed = Sensor::ALL.map(|sensor| orders.get(sensor).changed().count());
             let triads = changed.iter().filter(|&&changed| changed > 0).count();
             (triads, changed[0] + changed[1])
         });

@@ -120,8 +120,8 @@ fn of_triad(sensor: Sensor, order: &AxisOrder) -> String {
 
 fn axes(sensor: Sensor, order: &AxisOrder) -> String {
     let name = sensor.name();
-    let changed = (0..3).filter(|&axis| order.source[axis] != axis || order.reversed[axis]);
-    let axes: Vec<String> = changed
+    let axes: Vec<String> = order
+        .changed()
         .map(|axis| {
             let sign = if order.reversed[axis] { "−" } else { "" };
             let source = AXES[order.source[axis]];

@@ -4,48 +4,18 @@
 pub mod imu;
 pub mod table;
 
-pub use imu::LONG_ENOUGH;
-
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
+use super::dwell::{Dwell, SHORTEST, common};
 use super::{Aiding, Run};
-use crate::attitude::{exp, log};
-use crate::imu::Sensor;
-use crate::recording::{ImuSamples, LabelledMotion, Segment};
-use crate::units::{ARCSEC, DEG_PER_H, DEGREE};
+use crate::recording::{LabelledMotion, Segment};
+use crate::units::DEGREE;
+use imu::{STILL_RATE, STILL_SIGMAS};
 
-/// Samples during which the instrument is at rest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Dwell {
-    /// Samples that lie wholly within it.
-    pub samples: Range<usize>,
-    /// What the table says of it; none without a table.
-    pub position: Option<Position>,
-}
-
-/// A position of the table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Position {
-    /// Readings of the table within the dwell.
-    pub readings: Range<usize>,
-    /// Mean reading, `C_b_n`.
-    pub attitude: Matrix3<f64>,
-}
-
-/// Readings of a table at rest differ by less than this many σ of their noise …
-const STANDING_SIGMAS: f64 = 6.0;
-/// … or this much, whatever the noise.
-const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
-/// Shortest dwell worth a name, s.
-const SHORTEST: f64 = 0.5;
-/// Gyros that integrate to less than this have not turned, rad …
+/// Gyros that integrate to less than this, beyond their noise and the drift of their bias, have not turned, rad.
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
-/// … beyond their noise …
-const STILL_SIGMAS: f64 = 6.0;
-/// … and more than the worst bias may drift, rad/s.
-const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 
 impl Run {
     /// The dwells, in order.
@@ -54,12 +24,13 @@ impl Run {
     /// readings may miss a full turn). Two between which they do not turn are one (a wild reading, or a knock,
     /// parted them).
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
-        if !self.recording.imu.continuous && !self.recording.segments.is_empty() {
+        let imu = &self.recording.imu;
+        if !imu.continuous && !self.recording.segments.is_empty() {
             return self.labelled_dwells();
         }
         let standstills = match self.observed_table(aiding) {
             Some(table) => table::standstills(self, table),
-            None => imu::standstills(self),
+            None => imu::standstills(self).into_iter().map(Dwell::of).collect(),
         };
         let mut dwells: Vec<Dwell> = Vec::new();
         let at_rest = |dwell: &Dwell| !self.turns(dwell.samples.clone(), dwell);
@@ -70,9 +41,14 @@ impl Run {
             }
         }
         dwells.retain_mut(|dwell| {
-            let missing = self.recording.imu.missing();
-            missing.for_each(|missing| dwell.leave_out(&missing));
-            dwell.samples.len() as f64 * self.recording.imu.period >= SHORTEST
+            for missing in imu.missing() {
+                // The longer part before or after it.
+                let known = [missing.end..imu.len(), 0..missing.start];
+                let parts = known.map(|known| common(&known, &dwell.samples));
+                let longer = parts.into_iter().max_by_key(Range::len);
+                dwell.samples = longer.unwrap_or_default();
+            }
+            dwell.duration(imu) >= SHORTEST
         });
         dwells
     }
@@ -84,180 +60,79 @@ impl Run {
         let within = |segment: &Segment| {
             // A row at the edge of a section may be of the one beside it.
             let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
+            let dwell = |standstill| Dwell::of(common(standstill, &samples));
+            let is_long = |dwell: &Dwell| dwell.duration(&self.recording.imu) >= SHORTEST;
             match segment.motion {
                 Some(LabelledMotion::Stands { .. }) => {
-                    vec![self.standing_in(&samples, &standstills).unwrap_or(samples)]
+                    let standing = self.standing_in(&samples, &standstills);
+                    vec![Dwell::of(standing.unwrap_or(samples))]
                 }
                 Some(LabelledMotion::Turns { .. }) => Vec::new(),
-                None => standstills
-                    .iter()
-                    .map(|standstill| standstill.common(&samples))
-                    .filter(|common| common.len() as f64 * self.recording.imu.period >= SHORTEST)
-                    .collect(),
+                None => standstills.iter().map(dwell).filter(is_long).collect(),
             }
         };
         let inside = self.recording.segments.iter().flat_map(within);
-        let known = inside.filter(|samples| !samples.is_empty());
-        known.map(Dwell::of).collect()
+        inside.filter(|dwell| !dwell.samples.is_empty()).collect()
     }
 
     /// The longest of these standstills within some samples, where it turns in the others by more than a
     /// position that is set by hand may be off.
-    pub(super) fn standing_in(
+    pub fn standing_in(
         &self,
         samples: &Range<usize>,
-        standstills: &[Dwell],
+        standstills: &[Range<usize>],
     ) -> Option<Range<usize>> {
+        let imu = &self.recording.imu;
         let within = standstills
             .iter()
-            .map(|standstill| standstill.common(samples));
-        let longest = within.max_by_key(ExactSizeIterator::len)?;
-        let imu = &self.recording.imu;
-        if (longest.len() as f64) * imu.period < SHORTEST {
-            return None;
-        }
-        let zero = imu.gyro.sum(longest.clone()) / longest.len() as f64;
+            .map(|standstill| common(standstill, samples));
+        let longest = Dwell::of(within.max_by_key(Range::len)?);
+        let Range { start, end } = longest.samples;
         let limit = |count: usize| {
             let random_walk = self.instrument.noise.gyro.random_walk;
             self.segment_sigma + STILL_SIGMAS * random_walk * (count as f64 * imu.period).sqrt()
         };
-        let (before, after) = (samples.start..longest.start, longest.end..samples.end);
-        let before = imu.gyro.part(before).into_owned().into_iter().rev();
-        let turns =
-            turn_beyond(before, &zero, limit) || turn_beyond(imu.gyro.within(after), &zero, limit);
-        turns.then_some(longest)
+        let before = imu.gyro.part(samples.start..start).into_owned();
+        let turns = || {
+            self.turns_beyond(before.into_iter().rev(), &longest, limit)
+                || self.turns_beyond(imu.gyro.within(end..samples.end), &longest, limit)
+        };
+        (longest.duration(imu) >= SHORTEST && turns()).then_some(start..end)
     }
 
     fn same_position(&self, before: &Dwell, after: &Dwell) -> bool {
-        let same_reading = match (&before.position, &after.position) {
-            (Some(before), Some(after)) => {
-                let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
-                let reading_sigma = self.table.reading_sigma;
-                let limit = STANDING_ANGLE.max(STANDING_SIGMAS * reading_sigma * share.sqrt());
-                log(&(after.attitude * before.attitude.transpose())).norm() < limit
-            }
-            _ => true,
-        };
         let between = before.samples.end..after.samples.start;
-        same_reading && self.recording.imu.unbroken(&between) && !self.turns(between, before)
+        let positions = before.position.as_ref().zip(after.position.as_ref());
+        positions.is_none_or(|(before, after)| table::same_reading(self, before, after))
+            && self.recording.imu.unbroken(&between)
+            && !self.turns(between, before)
     }
 
-    /// Whether the gyros turn during these samples, with their mean output at rest as zero.
+    /// Whether the gyros turn during these samples.
     fn turns(&self, samples: Range<usize>, at_rest: &Dwell) -> bool {
-        let gyro = &self.recording.imu.gyro;
-        let zero = gyro.sum(at_rest.samples.clone()) / at_rest.samples.len() as f64;
         let duration = samples.len() as f64 * self.recording.imu.period;
         let limit = STILL_ANGLE
             + STILL_SIGMAS * self.instrument.noise.gyro.random_walk * duration.sqrt()
             + STILL_RATE * duration;
-        turn_beyond(gyro.within(samples), &zero, |_| limit)
-    }
-}
-
-/// Whether the sum of the first increments, each with this zero, is ever beyond the limit for their number.
-fn turn_beyond(
-    increments: impl Iterator<Item = Vector3<f64>>,
-    zero: &Vector3<f64>,
-    limit: impl Fn(usize) -> f64,
-) -> bool {
-    let mut angle = Vector3::zeros();
-    increments.enumerate().any(|(before, increment)| {
-        angle += increment - zero;
-        angle.norm_squared() > limit(before + 1).powi(2)
-    })
-}
-
-/// Mean output of a triad over a dwell.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeanOutput {
-    /// Normalised output per second, rad/s or m/s².
-    pub output: Vector3<f64>,
-    /// Variance per axis by the instrument's noise, pulses and, where samples were interpolated, on the axis that
-    /// has most of that.
-    pub variance: f64,
-}
-
-impl Dwell {
-    /// Of these samples, without a table.
-    pub fn of(samples: Range<usize>) -> Self {
-        Self {
-            samples,
-            position: None,
-        }
+        let increments = self.recording.imu.gyro.within(samples);
+        self.turns_beyond(increments, at_rest, |_| limit)
     }
 
-    /// The samples that it has in common with others; an empty range where none.
-    fn common(&self, samples: &Range<usize>) -> Range<usize> {
-        let Range { start, end } = self.samples;
-        start.max(samples.start)..end.min(samples.end)
-    }
-
-    /// Begin and end, s.
-    pub fn times(&self, run: &Run) -> [f64; 2] {
-        let imu = &run.recording.imu;
-        let begin = imu.time(self.samples.start);
-        [begin, begin + self.samples.len() as f64 * imu.period]
-    }
-
-    /// Mean output of a triad over it.
-    pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
-        let samples = run.recording.imu.of(sensor);
-        let duration = self.samples.len() as f64 * run.recording.imu.period;
-        let sum = samples.sum(self.samples.clone());
-        let mut interpolated = Vector3::<f64>::zeros();
-        for (bridge, part) in run.recording.imu.bridged(&self.samples) {
-            let of_sensor = bridge.each().filter(|&(of, ..)| of == sensor);
-            for (_, axis, variance) in of_sensor {
-                interpolated[axis] += variance * part;
-            }
-        }
-        let span = self.times(run);
-        MeanOutput {
-            output: sum / duration,
-            variance: run
-                .instrument
-                .noise
-                .get(sensor)
-                .covariance_of_means(span, span)
-                + run.recording.imu.pulse.get(sensor).powi(2) / (6.0 * duration * duration)
-                + interpolated.max() / (duration * duration),
-        }
-    }
-
-    /// Keeps the longer of the parts before and after these samples.
-    fn leave_out(&mut self, lost: &Range<usize>) {
-        let Range { start, end } = self.samples;
-        if lost.start >= end || lost.end <= start {
-            return;
-        }
-        let (before, after) = (start..lost.start.max(start), lost.end.min(end)..end);
-        self.samples = if before.len() >= after.len() {
-            before
-        } else {
-            after
-        };
-    }
-
-    /// The first seconds of it; the attitude is that of all its readings.
-    pub fn first_seconds(&self, duration: f64, imu: &ImuSamples) -> Self {
-        let samples = (duration / imu.period).round() as usize;
-        let end = self.samples.end.min(self.samples.start + samples);
-        Self {
-            samples: self.samples.start..end,
-            ..self.clone()
-        }
-    }
-
-    /// Takes in a later dwell at the same position.
-    fn extend(&mut self, later: &Self) {
-        self.samples.end = later.samples.end;
-        if let (Some(position), Some(later)) = (&mut self.position, &later.position) {
-            let (own, added) = (position.readings.len(), later.readings.len());
-            let turn = log(&(later.attitude * position.attitude.transpose()));
-            let share = added as f64 / (own + added) as f64;
-            position.attitude = exp(turn * share) * position.attitude;
-            position.readings.end = later.readings.end;
-        }
+    /// Whether the sum of the first increments of the gyros, with their mean at rest as zero, is ever beyond the
+    /// limit for their number.
+    fn turns_beyond(
+        &self,
+        increments: impl Iterator<Item = Vector3<f64>>,
+        at_rest: &Dwell,
+        limit: impl Fn(usize) -> f64,
+    ) -> bool {
+        let samples = at_rest.samples.clone();
+        let zero = self.recording.imu.gyro.sum(samples.clone()) / samples.len() as f64;
+        let mut angle = Vector3::zeros();
+        increments.enumerate().any(|(before, increment)| {
+            angle += increment - zero;
+            angle.norm_squared() > limit(before + 1).powi(2)
+        })
     }
 }
 
@@ -265,9 +140,12 @@ impl Dwell {
 mod tests {
     use nalgebra::UnitQuaternion;
 
+    use super::imu::LONG_ENOUGH;
     use super::*;
-    use crate::recording::{Stretch, TableLog};
+    use crate::attitude::{exp, log};
+    use crate::recording::{ImuSamples, Stretch, TableLog};
     use crate::simulation::Scenario;
+    use crate::units::ARCSEC;
 
     fn reading(dwell: &Dwell) -> Range<usize> {
         dwell.position.clone().unwrap().readings
