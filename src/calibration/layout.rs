@@ -21,12 +21,12 @@
 use super::budget::source::BudgetSource;
 use super::model::Model;
 use super::parameters::PARAMETERS;
-use super::parameters::auxiliary::OF_AXES;
+use super::parameters::error_term::ErrorTerm;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::several::thermal::Coefficient;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS, Term};
 use crate::run::Aiding;
-use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY};
+use crate::turntable::{AXIS_ERRORS, AxisError};
 
 /// Attitude error φ.
 pub const ATTITUDE: usize = 0;
@@ -36,6 +36,35 @@ pub const VELOCITY: usize = 3;
 pub const POSITION: usize = 6;
 /// Number of navigation states, the only ones that move with the body.
 pub const NAVIGATION: usize = 9;
+
+impl Constant {
+    /// What is known of it before.
+    pub fn source(self) -> BudgetSource {
+        match self {
+            Self::Parameter(_) => BudgetSource::Prior,
+            Self::Term(index) => Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term),
+            Self::Thermal(_) => BudgetSource::Temperature,
+            Self::Gravity => BudgetSource::Gravity,
+            Self::Base(2) => BudgetSource::TableNorth,
+            Self::Base(_) => BudgetSource::TableLevel,
+            Self::Axis(index) => match AxisError::of(index) {
+                Some(AxisError::Tilt) => BudgetSource::TableSquareness,
+                Some(AxisError::Wobble) => BudgetSource::TableWobble,
+                _ => BudgetSource::TableEncoder,
+            },
+        }
+    }
+
+    /// The error term that it is of, if it is of one.
+    pub fn error_term(self) -> Option<ErrorTerm> {
+        match self {
+            Self::Term(index) => Term::of(index).map(ErrorTerm::Instrument),
+            Self::Base(_) => Some(ErrorTerm::TableBase),
+            Self::Axis(index) => AxisError::of(index).map(ErrorTerm::TableAxes),
+            Self::Parameter(_) | Self::Thermal(_) | Self::Gravity => None,
+        }
+    }
+}
 
 /// Where each group of states is.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,31 +141,21 @@ impl Layout {
         }
     }
 
-    /// The same with auxiliary parameters, in their order, as columns.
-    pub fn trying(mut self, auxiliary: &[usize]) -> Self {
-        let constant = |&index: &usize| match index.checked_sub(TABLE_GEOMETRY) {
-            Some(term) => Constant::Term(term),
-            None if index < OF_AXES => Constant::Base(index),
-            None => Constant::Axis(index - OF_AXES),
-        };
-        self.columns = auxiliary.iter().map(constant).collect();
-        self
-    }
-
-    /// The same with all constants as columns, those that are states first: the filter is left with what moves and
-    /// what is drawn anew.
-    pub fn reduced(mut self) -> Self {
+    /// The same with all constants as columns: the filter is left with what moves and what is drawn anew, as gravity is
+    /// at another site.
+    pub fn reduced(self) -> Self {
+        let driving = self.driving().filter(|&of| of != Constant::Gravity);
         let base = self.base.iter().map(|&axis| Constant::Base(axis));
         let axes = self.axes.iter().map(|&k| Constant::Axis(k));
-        let states: Vec<Constant> = self.driving().chain(base).chain(axes).collect();
-        self.columns.splice(0..0, states);
-        self.parameters.clear();
-        self.terms.clear();
-        self.thermal.clear();
-        self.gravity = false;
-        self.base.clear();
-        self.axes.clear();
-        self
+        Self {
+            columns: driving.chain(base).chain(axes).collect(),
+            parameters: Vec::new(),
+            terms: Vec::new(),
+            thermal: Vec::new(),
+            base: Vec::new(),
+            axes: Vec::new(),
+            ..self
+        }
     }
 
     /// The constants that are states and drive navigation errors, in their order.
@@ -231,57 +250,21 @@ impl Layout {
         placed(self.axes_begin(), &self.axes)
     }
 
-    /// What draws a state anew, or is known of it before.
+    /// What draws anew a state that is no constant, or is known of it before.
     pub fn source(&self, state: usize) -> BudgetSource {
-        let within = |first: Option<usize>| {
-            first.and_then(|first| state.checked_sub(first).filter(|&axis| axis < 3))
-        };
-        let varying = self
-            .varying_biases()
-            .find(|&(varying, ..)| varying == state);
-        if let Some((_, sensor, _)) = varying {
+        let within =
+            |first: Option<usize>| first.is_some_and(|first| (first..first + 3).contains(&state));
+        let mut varying = self.varying_biases();
+        if let Some((_, sensor, _)) = varying.find(|&(varying, ..)| varying == state) {
             return BudgetSource::wander(sensor);
         }
-        if (VELOCITY..POSITION + 3).contains(&state) {
-            return BudgetSource::Place;
-        }
-        let of_base = |&(base, _): &(usize, usize)| base == state;
-        if let Some((_, axis)) = self.table_base().find(of_base) {
-            return match axis {
-                2 => BudgetSource::TableNorth,
-                _ => BudgetSource::TableLevel,
-            };
-        }
-        if within(self.table_position()).is_some() {
-            return BudgetSource::TablePosition;
-        }
-        if within(self.turn_at_rest()).is_some() {
-            return BudgetSource::Turning;
-        }
-        if self.gravity() == Some(state) {
-            return BudgetSource::Gravity;
-        }
-        if let Some((_, index)) = self.table_axes().find(|&(axis, _)| axis == state) {
-            let mut kinds = AxisError::ALL.into_iter();
-            let kind = kinds.find(|kind| kind.range().contains(&index));
-            return match kind {
-                Some(AxisError::Tilt) => BudgetSource::TableSquareness,
-                Some(AxisError::Wobble) => BudgetSource::TableWobble,
-                _ => BudgetSource::TableEncoder,
-            };
-        }
-        if let Some((_, index)) = self.terms().find(|&(term, _)| term == state) {
-            return Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term);
-        }
-        if self.thermal().any(|(thermal, _)| thermal == state) {
-            return BudgetSource::Temperature;
-        }
-        if self.own().any(|(own, _)| own == state) {
-            return BudgetSource::Recording;
-        }
-        match self.parameters().any(|(parameter, _)| parameter == state) {
-            true => BudgetSource::Prior,
-            false => BudgetSource::InitialAttitude,
+        match state {
+            VELOCITY..NAVIGATION => BudgetSource::Place,
+            _ if within(self.table_position()) => BudgetSource::TablePosition,
+            _ if within(self.turn_at_rest()) => BudgetSource::Turning,
+            _ if self.gravity() == Some(state) => BudgetSource::Gravity,
+            _ if self.own().any(|(own, _)| own == state) => BudgetSource::Recording,
+            _ => BudgetSource::InitialAttitude,
         }
     }
 

@@ -5,14 +5,16 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::budget::BudgetSource;
+use super::error::CalibrationError;
 use super::estimate::{Estimate, largest_growth};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::model::Model;
-use super::noise::NoiseReport;
+use super::noise::{NoiseReport, Script};
 use super::parameters::auxiliary::Auxiliary;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::pass::{Epoch, Own};
 use super::problem::Problem;
+use super::reduction::{Posterior, Prior, Reduction};
 use crate::calibration::checks::dwell_scatter::DwellScatter;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
@@ -123,6 +125,38 @@ impl Outcome {
         let mut model = problem.model.clone();
         model.prior_sigma = self.model.prior_sigma;
         problem.with_model(model)
+    }
+
+    /// Which observations were let in.
+    pub(in crate::calibration) fn accepted(&self) -> Vec<bool> {
+        let each = self.innovations.iter();
+        each.map(|innovation| innovation.accepted).collect()
+    }
+
+    /// What happens in a problem at the point where the record was linearised.
+    pub(in crate::calibration) fn script<'a>(
+        &'a self,
+        problem: &'a Problem,
+    ) -> Result<Script<'a>, CalibrationError> {
+        Script::new(problem, &self.prior_attitudes, &self.linearised_at)
+    }
+
+    /// What the record says of the constants of a problem there.
+    pub(in crate::calibration) fn reduction(
+        &self,
+        problem: &Problem,
+    ) -> Result<Reduction, CalibrationError> {
+        self.script(problem)?.reduce(problem, &self.accepted())
+    }
+
+    /// With what is known of those constants beforehand.
+    pub(in crate::calibration) fn posterior(
+        &self,
+        problem: &Problem,
+        reduction: &Reduction,
+    ) -> Result<Posterior, CalibrationError> {
+        let constants = &reduction.constants;
+        reduction.posterior(&Prior::new(constants, &problem.model, &self.linearised_at))
     }
 
     /// A part of the covariance of the estimate that no pass knows of; zero where there is none of it.

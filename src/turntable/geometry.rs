@@ -52,6 +52,12 @@ impl AxisError {
         }
     }
 
+    /// That of an index among the errors of the axes; `None` beyond the last.
+    pub fn of(index: usize) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|kind| kind.range().contains(&index))
+    }
+
     /// Indices of its errors among those of the axes.
     pub fn range(self) -> Range<usize> {
         self.of_axis(0).start..self.of_axis(AXES - 1).end

@@ -2,9 +2,8 @@
 //!
 //! The covariance of a filter is homogeneous of degree one in the variances of all sources together: what was known
 //! before, noise of the instrument, errors of the table, noise of each observation. So the part of a source is its
-//! variance times the derivative by it, and the parts add up to the covariance (Euler). The derivative is had by a
-//! pass with that variance a little larger; that its gains are other ones changes nothing to first order, for the
-//! gains are those of the least covariance.
+//! variance times the derivative by it, and the parts add up to the covariance (Euler). That of what was known of the
+//! constants is exact; the derivative by a noise is that of the information in two reductions.
 
 pub mod curvature;
 
@@ -20,9 +19,9 @@ use super::error::CalibrationError;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix};
 use super::problem::Problem;
+use super::reduction::Prior;
 use crate::calibration::budget::curvature::curvature;
 use crate::calibration::layout::Layout;
-use crate::calibration::noise::Script;
 use crate::imu::{MotionNoise, Sensor};
 use crate::run::{Aiding, Run};
 use crate::statistics::student_limit;
@@ -63,19 +62,29 @@ impl Budget {
     /// [`CalibrationError`] where the problem is not the one of the outcome.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &outcome.as_calibrated(problem);
-        let accepted: Vec<bool> = outcome.innovations.iter().map(|i| i.accepted).collect();
-        let script = Script::new(problem, &outcome.prior_attitudes, &outcome.linearised_at)?;
-        let covariance = |source, factor| {
+        let (script, accepted) = (outcome.script(problem)?, outcome.accepted());
+        let reduction = |varied| {
             let mut model = problem.model.clone();
-            model.varied = Some((source, factor));
-            script.covariance(&problem.with_model(model), &accepted)
+            model.varied = varied;
+            script.reduce(&problem.with_model(model), &accepted)
         };
-        let part = |source: BudgetSource| {
-            let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|factor| covariance(source, factor));
-            Ok::<_, CalibrationError>((source, (more? - less?) / (2.0 * STEP)))
+        let own = reduction(None)?;
+        let prior = Prior::new(&own.constants, &problem.model, &outcome.linearised_at);
+        let posterior = own.posterior(&prior)?;
+        let of_noise = |source: BudgetSource| {
+            let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|factor| {
+                let reduction = reduction(Some((source, factor)))?;
+                Ok::<_, CalibrationError>(reduction.information())
+            });
+            let fall = (less? - more?) / (2.0 * STEP);
+            let part = &posterior.covariance * fall * &posterior.covariance;
+            Ok::<_, CalibrationError>((source, own.of_parameters(&part)))
         };
         let sources = problem.sources().into_par_iter();
-        let by_source = sources.map(part).collect::<Result<Vec<_>, _>>()?;
+        let mut by_source = sources.map(of_noise).collect::<Result<Vec<_>, _>>()?;
+        for (source, part) in own.by_prior(&posterior, &prior) {
+            by_source.push((source, own.of_parameters(&part)));
+        }
         let filter: ParameterMatrix = by_source.iter().map(|(_, part)| part).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
         let beside = outcome.beside.iter().map(|(&source, &part)| (source, part));
@@ -139,10 +148,10 @@ impl Budget {
 }
 
 impl Problem<'_> {
-    /// The sources that its filter has.
+    /// The sources of noise that its reduction has.
     fn sources(&self) -> BTreeSet<BudgetSource> {
         let model = &self.model;
-        let layout = Layout::new(model);
+        let layout = Layout::new(model).reduced();
         let mut all: BTreeSet<_> = (0..layout.size())
             .map(|state| layout.source(state))
             .collect();

@@ -70,7 +70,12 @@ impl Filter {
     /// The same with all constants as columns.
     pub fn reduced(model: &Model) -> Self {
         let layout = Layout::new(model).reduced();
-        Self::of(layout, model, &PriorErrors::none()).carrying_columns()
+        let columns = layout.columns().len();
+        let filter = Self::of(layout, model, &PriorErrors::none());
+        Self {
+            columns: Some(Columns::new(columns, filter.x.len())),
+            ..filter
+        }
     }
 
     fn of(layout: Layout, model: &Model, errors: &PriorErrors) -> Self {
@@ -101,9 +106,6 @@ impl Filter {
             Some((state, variation.sigma, variation.correlation_time))
         });
         let varying = varying.collect();
-        for state in 0..n {
-            p[(state, state)] *= model.weight(layout.source(state));
-        }
         Self {
             layout,
             x,
@@ -116,18 +118,6 @@ impl Filter {
             columns: None,
             varied: model.varied,
         }
-    }
-
-    /// The same with auxiliary parameters as columns.
-    pub fn trying(mut self, auxiliary: &[usize]) -> Self {
-        self.layout = self.layout.trying(auxiliary);
-        self.carrying_columns()
-    }
-
-    fn carrying_columns(mut self) -> Self {
-        let columns = self.layout.columns().len();
-        self.columns = (columns > 0).then(|| Columns::new(columns, self.x.len()));
-        self
     }
 
     /// A stretch begins: navigation errors and the table's position start anew. In another recording the

@@ -6,7 +6,6 @@ use crate::calibration::filter::columns::Columns;
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
-use crate::calibration::parameters::ParameterMatrix;
 use crate::calibration::pass::{
     Dwells, Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict,
     begin,
@@ -94,18 +93,6 @@ impl<'a> Script<'a> {
         let filter = Filter::new(model, &PriorErrors::at(model, self.at));
         self.follow(problem, accepted, filter, |_| {}, Some(&mut replay))?;
         Ok(replay)
-    }
-
-    /// Covariance of the parameters of both triads at the end of such a pass.
-    pub fn covariance(
-        &self,
-        problem: &Problem,
-        accepted: &[bool],
-    ) -> Result<ParameterMatrix, CalibrationError> {
-        let model = &problem.model;
-        let filter = Filter::new(model, &PriorErrors::at(model, self.at));
-        let filter = self.follow(problem, accepted, filter, |_| {}, None)?;
-        Ok(filter.parameter_covariance())
     }
 
     /// What such a pass says of the constants.

@@ -39,10 +39,7 @@ impl AuxiliaryKind {
         match self {
             Self::Table(0..OF_AXES) => ErrorTerm::TableBase,
             Self::Table(k) => {
-                let of_axes = k - OF_AXES;
-                let kind = AxisError::ALL
-                    .into_iter()
-                    .find(|kind| kind.range().contains(&of_axes));
+                let kind = AxisError::of(k - OF_AXES);
                 ErrorTerm::TableAxes(kind.unwrap_or(AxisError::Encoder))
             }
             Self::Term(term, _) => ErrorTerm::Instrument(term),

@@ -19,9 +19,9 @@ pub use crate::calibration::record::segment::Seen;
 use earlier::Earlier;
 pub use mode::{Gate, Mode};
 use posteriors::Posteriors;
+pub use result::PassResult;
 use result::Sums;
 pub use result::{Epoch, Own};
-pub use result::{PassResult, Tried};
 use stretch::OneStretch;
 
 /// A pass over all stretches of a problem, `priors` what is known of the initial attitude of each.
@@ -31,17 +31,6 @@ pub fn pass(
     at: &Linearisation,
     mode: Mode,
 ) -> Result<PassResult, CalibrationError> {
-    pass_trying(problem, priors, at, mode, &[])
-}
-
-/// The same, and what auxiliary parameters that are no states would do to it.
-pub fn pass_trying(
-    problem: &Problem,
-    priors: &[AttitudePrior],
-    at: &Linearisation,
-    mode: Mode,
-    tried: &[usize],
-) -> Result<PassResult, CalibrationError> {
     let model = &problem.model;
     // The prior keeps its own mean, wherever the pass linearises; a pass with feedback begins at the
     // point it is given and finds its way from there.
@@ -49,7 +38,7 @@ pub fn pass_trying(
         Mode::Feedback => PriorErrors::none(),
         Mode::Held(_) => PriorErrors::at(model, at),
     };
-    let filter = Filter::new(model, &errors).trying(tried);
+    let filter = Filter::new(model, &errors);
     let dwells = Dwells::of(&filter);
     let mut sums = Sums {
         at: at.clone(),

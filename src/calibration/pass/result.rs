@@ -64,8 +64,6 @@ pub struct PassResult {
     pub history: Vec<Epoch>,
     /// What is known of the constants before the first dwell and after each, or each so many.
     pub posteriors: Vec<Posterior>,
-    /// What auxiliary parameters that were tried would do to it.
-    pub tried: Option<Tried>,
 }
 
 impl PassResult {
@@ -82,17 +80,6 @@ impl PassResult {
             triads,
         }
     }
-}
-
-/// What auxiliary parameters that are no states of a pass would do to it.
-#[derive(Debug, Clone)]
-pub struct Tried {
-    /// Their information from the data alone.
-    pub information: DMatrix<f64>,
-    /// Gradient of ln of the likelihood where they are zero.
-    pub score: DVector<f64>,
-    /// Derivative of the estimated parameters of both triads: [`PARAMETERS`] rows.
-    pub of_parameters: DMatrix<f64>,
 }
 
 /// By how much a recording differs from what all recordings have in common.
@@ -127,28 +114,6 @@ impl Sums {
             estimate: to_vector(&self.at.triads) + self.filter.parameters(),
             sigma: self.filter.parameter_sigma(),
         }
-    }
-
-    /// What auxiliary parameters that were tried would do.
-    fn take_tried(&mut self) -> Option<Tried> {
-        let mut columns = self.filter.columns.take()?;
-        let rows = columns.take_rows();
-        let n = rows.ncols() - 1;
-        let normal = rows.tr_mul(&rows);
-        let information = normal.view((0, 0), (n, n)).into_owned();
-        let score = normal.view((0, n), (n, 1)).column(0).into_owned();
-        let states = self.filter.layout.parameters();
-        let (states, indices): (Vec<usize>, Vec<usize>) = states.unzip();
-        let of_states = columns.of_states.select_columns(&states).transpose();
-        let mut of_parameters = DMatrix::zeros(PARAMETERS, score.len());
-        for (row, index) in of_states.row_iter().zip(indices) {
-            of_parameters.set_row(index, &row);
-        }
-        Some(Tried {
-            information,
-            score,
-            of_parameters,
-        })
     }
 
     /// By how much each recording differs, smoothed by those after it.
@@ -188,8 +153,7 @@ impl Sums {
         }
     }
 
-    pub fn result(mut self, model: &Model) -> PassResult {
-        let tried = self.take_tried();
+    pub fn result(self, model: &Model) -> PassResult {
         let own = self.own();
         let estimate = self.estimate(&own);
         let filter = &self.filter;
@@ -217,19 +181,11 @@ impl Sums {
             history: self.history,
             posteriors: self.posteriors.finish(),
             at: self.at,
-            tried,
         }
     }
 }
 
 impl PassResult {
-    /// What the covariance of another pass lacks if this one's model is right: the mean square error of what that
-    /// one finds is the covariance here and the square of what is between them.
-    pub fn added_to(&self, other: &Self) -> ParameterMatrix {
-        let change = to_vector(&self.estimate.triads) - to_vector(&other.estimate.triads);
-        self.covariance - other.covariance + change * change.transpose()
-    }
-
     /// Takes another covariance of the constants, each in units of the σ that it has.
     pub fn widen(&mut self, layout: &Layout, widened: &DMatrix<f64>) {
         let states: Vec<usize> = layout.constants().collect();

@@ -4,15 +4,17 @@
 //! [`super::filter::columns`]). Each dwell leaves whitened rows `[G ν]`, so that `ν = G c + noise of σ 1`: with a prior they
 //! give the estimate of any part of the constants, without another pass.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 
+use super::budget::BudgetSource;
 use super::error::CalibrationError;
 use super::layout::Constant;
 use super::linearisation::Linearisation;
 use super::model::Model;
-use super::noise::Script;
-use super::parameters::to_vector;
-use super::problem::Problem;
+use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
+use crate::imu::Sensor;
 
 /// Whitened rows of all dwells.
 #[derive(Debug, Clone)]
@@ -31,16 +33,19 @@ pub struct Reduction {
 #[derive(Debug, Clone)]
 pub struct Prior {
     pub mean: DVector<f64>,
-    /// 1σ of each; zero of one that is off.
+    /// 1σ of each; zero of what is known to be at its mean.
     pub sigma: DVector<f64>,
 }
 
 /// What is known of constants with the data.
 #[derive(Debug, Clone)]
 pub struct Posterior {
-    /// Zero of those that are off, as in the covariance.
-    pub mean: DVector<f64>,
+    /// Errors of the parameters of both triads.
+    pub parameters: ParameterVector,
+    /// Of all constants; zero of what was known.
     pub covariance: DMatrix<f64>,
+    /// Of the parameters of both triads.
+    pub parameter_covariance: ParameterMatrix,
     /// Squared residuals over their σ, with those of the prior.
     pub cost: f64,
     /// −2 ln of the likelihood, except a constant.
@@ -48,22 +53,33 @@ pub struct Posterior {
 }
 
 impl Reduction {
-    /// Of what is let in.
-    pub fn new(
-        script: &Script,
-        problem: &Problem,
-        accepted: &[bool],
-    ) -> Result<Self, CalibrationError> {
-        script.reduce(problem, accepted)
+    /// One triangle of the rows of all dwells: what remains of them where no dwell is looked at alone.
+    pub fn folded(mut self) -> Self {
+        let columns = self.constants.len() + 1;
+        let empty = DMatrix::zeros(0, columns);
+        let triangle = self.dwells.iter().fold(empty, |triangle, dwell| {
+            let (above, below) = (triangle.nrows(), dwell.nrows());
+            let mut both = triangle.resize_vertically(above + below, 0.0);
+            both.rows_mut(above, below).copy_from(dwell);
+            match both.nrows() > columns {
+                true => both.qr().unpack_r(),
+                false => both,
+            }
+        });
+        self.dwells = vec![triangle];
+        self
     }
 
-    /// With what is known beforehand; `None` where that and the data together leave a constant open.
-    pub fn posterior(&self, prior: &Prior) -> Option<Posterior> {
-        let on: Vec<usize> = (0..self.constants.len())
-            .filter(|&k| prior.sigma[k] > 0.0)
-            .collect();
+    /// With what is known beforehand.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Singular`] where that and the data together leave a constant open.
+    pub fn posterior(&self, prior: &Prior) -> Result<Posterior, CalibrationError> {
+        let all = self.constants.len();
+        let on: Vec<usize> = (0..all).filter(|&k| prior.sigma[k] > 0.0).collect();
+        let off: Vec<usize> = (0..all).filter(|&k| prior.sigma[k] == 0.0).collect();
+        let known = prior.mean.select_rows(&off);
         let n = on.len();
-        let observed = self.constants.len();
         let count: usize = self.dwells.iter().map(DMatrix::nrows).sum();
         let mut stacked = DMatrix::zeros(n + count, n + 1);
         for (row, &k) in on.iter().enumerate() {
@@ -72,36 +88,100 @@ impl Reduction {
         }
         let mut first = n;
         for dwell in &self.dwells {
-            for (place, &k) in on.iter().chain([&observed]).enumerate() {
-                let mut column = stacked.view_mut((first, place), (dwell.nrows(), 1));
-                column.copy_from(&dwell.column(k));
-            }
+            let mut rows = stacked.rows_mut(first, dwell.nrows());
+            rows.columns_mut(0, n).copy_from(&dwell.select_columns(&on));
+            let observed = dwell.column(all) - dwell.select_columns(&off) * &known;
+            rows.set_column(n, &observed);
             first += dwell.nrows();
         }
         let triangle = stacked.qr().unpack_r();
         let root = triangle.view((0, 0), (n, n));
         let mut inverse = DMatrix::identity(n, n);
-        let solved = root.solve_upper_triangular_mut(&mut inverse);
+        if !root.solve_upper_triangular_mut(&mut inverse) {
+            return Err(CalibrationError::Singular {
+                sensor: Sensor::Gyro,
+            });
+        }
         let last = triangle.get((n, n)).copied().unwrap_or(0.0);
         let logarithms = root.diagonal().map(|of| of.abs().ln()).sum();
         let of_prior: f64 = on.iter().map(|&k| prior.sigma[k].ln()).sum();
+        let mut mean = prior.mean.clone();
         let found = &inverse * triangle.view((0, n), (n, 1));
         let within = &inverse * inverse.transpose();
-        let mut mean = DVector::zeros(observed);
-        let mut covariance = DMatrix::zeros(observed, observed);
+        let mut covariance = DMatrix::zeros(all, all);
         for (i, &row) in on.iter().enumerate() {
             mean[row] = found[i];
             for (j, &column) in on.iter().enumerate() {
                 covariance[(row, column)] = within[(i, j)];
             }
         }
+        let mut parameters = ParameterVector::zeros();
+        for (row, index) in self.parameters() {
+            parameters[index] = mean[row];
+        }
         let cost = self.squares + last.powi(2);
-        solved.then_some(Posterior {
-            mean,
+        Ok(Posterior {
+            parameter_covariance: self.of_parameters(&covariance),
             covariance,
+            parameters,
             cost,
             deviance: cost + self.log_determinant + 2.0 * (logarithms + of_prior),
         })
+    }
+
+    /// Information of the constants by the rows alone.
+    pub fn information(&self) -> DMatrix<f64> {
+        let n = self.constants.len();
+        let mut information = DMatrix::zeros(n, n);
+        for dwell in &self.dwells {
+            let rows = dwell.columns(0, n);
+            information += rows.tr_mul(&rows);
+        }
+        information
+    }
+
+    /// What prior σ of a model add to a covariance by their sources, which is exact: `P P₀⁻¹ P`.
+    pub fn by_prior(&self, of: &Posterior, prior: &Prior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
+        let mut parts = BTreeMap::new();
+        for (k, constant) in self.constants.iter().enumerate() {
+            if prior.sigma[k] > 0.0 {
+                let column = of.covariance.column(k) / prior.sigma[k];
+                let n = self.constants.len();
+                let zeros = || DMatrix::zeros(n, n);
+                let part = parts.entry(constant.source()).or_insert_with(zeros);
+                *part += &column * column.transpose();
+            }
+        }
+        parts
+    }
+
+    /// A matrix of the constants as one of the parameters of both triads.
+    pub fn of_parameters(&self, of_constants: &DMatrix<f64>) -> ParameterMatrix {
+        let mut parameters = ParameterMatrix::zeros();
+        for (row, i) in self.parameters() {
+            for (column, j) in self.parameters() {
+                parameters[(i, j)] = of_constants[(row, column)];
+            }
+        }
+        parameters
+    }
+
+    /// The parameters of both triads among the constants: place and index of each.
+    fn parameters(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let places = self.constants.iter().enumerate();
+        places.filter_map(|(place, constant)| match constant {
+            Constant::Parameter(index) => Some((place, *index)),
+            _ => None,
+        })
+    }
+}
+
+impl Posterior {
+    /// What the covariance of another one lacks if this one's prior is right: the mean square error of what that
+    /// one finds is the covariance here and the square of what is between them.
+    pub fn added_to(&self, other: &Self) -> ParameterMatrix {
+        let change = self.parameters - other.parameters;
+        self.parameter_covariance - other.parameter_covariance + change * change.transpose()
     }
 }
 

@@ -23,13 +23,9 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Of parameters with this gain, covariance and prior σ.
-    pub fn new(gain: f64, covariance: &DMatrix<f64>, prior_sigma: &[f64]) -> Self {
-        let n = prior_sigma.len();
-        let taken = DMatrix::from_fn(n, n, |i, j| {
-            let left = covariance[(i, j)] / (prior_sigma[i] * prior_sigma[j]);
-            f64::from(u8::from(i == j)) - left
-        });
+    /// Of parameters with this gain and covariance, each over its σ before the data.
+    pub fn new(gain: f64, over_prior: &DMatrix<f64>) -> Self {
+        let taken = DMatrix::identity(over_prior.nrows(), over_prior.ncols()) - over_prior;
         let total = taken.trace().max(0.0);
         let share = taken.symmetric_eigenvalues().max();
         Self {
@@ -103,10 +99,9 @@ mod tests {
 
     #[test]
     fn what_data_hardly_show_takes_little_to_be_significant_and_counts_as_few_states() {
-        let prior = [1.0; 4];
         let covariance =
             DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[0.01, 0.5, 0.99, 0.99]));
-        let evidence = Evidence::new(20.0, &covariance, &prior);
+        let evidence = Evidence::new(20.0, &covariance);
         assert_relative_eq!(evidence.states, 1.51 / 0.99, max_relative = 1e-12);
         let chance = (-0.5 * evidence.significance()).exp();
         assert_relative_eq!(evidence.limit(chance), 20.0, max_relative = 1e-6);

@@ -1,12 +1,11 @@
 //! What each error term costs in σ, what it explains of the data, and which one explains them best.
 //!
-//! A repeated last pass answers for all constant ones: those that are on are taken off by conditioning
-//! on zero, those that are off are tried in it (see [`crate::calibration::pass`]). Varying biases are not constant;
-//! they take a pass of their own.
+//! One reduction answers for all constant ones, whichever are on (see [`crate::calibration::reduction`]). Varying
+//! biases are not constant; they take a reduction of their own.
 
 mod evidence;
 mod explanation;
-mod joint;
+mod terms_on;
 mod unseen;
 
 use serde::{Deserialize, Serialize};
@@ -18,13 +17,13 @@ use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::parameters::group::Group;
 use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
-use crate::calibration::pass::PassResult;
 use crate::calibration::problem::Problem;
+use crate::calibration::reduction::Posterior;
 use crate::statistics::FALSE_ALARM;
 use evidence::ln_survival;
 pub use explanation::LeftOff;
 use explanation::{Explanation, seen_and_left_off};
-use joint::{Fit, Joint, last_pass};
+use terms_on::TermsOn;
 pub use unseen::{biases_may_vary, unseen_variation};
 
 /// An error term against the same calibration without it.
@@ -75,10 +74,11 @@ const ODDS: f64 = 20.0;
 
 impl ErrorTermTest {
     /// Of a calibration with it and one without, not yet judged.
-    fn new(term: ErrorTerm, on: bool, with: &Fit, without: &Fit) -> Self {
+    fn new(term: ErrorTerm, on: bool, with: &Posterior, without: &Posterior) -> Self {
         let factor = |group: Group| {
             let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
-            let sums = of_group.map(|i| [with.variance[i], without.variance[i]]);
+            let both = [with, without].map(|of| of.parameter_covariance.diagonal());
+            let sums = of_group.map(|i| both.map(|variance| variance[i]));
             let [with, without] = sums.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
             Some(f64::sqrt(with / without)).filter(|ratio| ratio.is_finite())
         };
@@ -155,9 +155,11 @@ pub fn test_error_terms(
     problem: &Problem,
     outcome: &Outcome,
 ) -> Result<(Vec<ErrorTermTest>, Option<ParameterMatrix>), CalibrationError> {
-    let of_record = Tested::new(&outcome.as_calibrated(problem), outcome)?;
+    let as_calibrated = outcome.as_calibrated(problem);
+    let of_record = Tested::new(&as_calibrated, outcome)?;
     if outcome.noise.learnt {
-        let stated = Tested::new(&outcome.with_prior(problem), outcome)?;
+        let as_stated = outcome.with_prior(problem);
+        let stated = Tested::new(&as_stated, outcome)?;
         let likeliest = stated.tests.iter().find(|t| t.role == Role::Likeliest);
         if likeliest.is_some_and(|test| test.significance > significance_of_noise(outcome)) {
             let left_off = of_record.left_off(&stated);
@@ -179,15 +181,15 @@ fn significance_of_noise(outcome: &Outcome) -> f64 {
 const VARYING: ErrorTerm = ErrorTerm::GaussMarkovBias;
 
 /// All terms with one noise.
-struct Tested {
+struct Tested<'a> {
     tests: Vec<ErrorTermTest>,
-    joint: Joint,
+    terms: TermsOn<'a>,
     /// Where biases vary if they do not in the model, and the other way round.
-    otherwise: PassResult,
+    otherwise: Posterior,
 }
 
-impl Tested {
-    fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
+impl<'a> Tested<'a> {
+    fn new(problem: &'a Problem, outcome: &'a Outcome) -> Result<Self, CalibrationError> {
         let model = &problem.model;
         let mut other = model.clone();
         match model.has(VARYING) {
@@ -195,12 +197,13 @@ impl Tested {
             false => other.switch_on(VARYING),
         }
         // The longer of the two first: a thread that is done with something else can take the other.
-        let (otherwise, joint) = rayon::join(
-            || last_pass(&problem.with_model(other), outcome, &[]),
-            || Joint::new(problem, outcome),
+        let other = &problem.with_model(other);
+        let (otherwise, terms) = rayon::join(
+            || outcome.posterior(other, &outcome.reduction(other)?),
+            || TermsOn::new(problem, outcome),
         );
         let mut tested = Self {
-            joint: joint?,
+            terms: terms?,
             otherwise: otherwise?,
             tests: Vec::new(),
         };
@@ -225,29 +228,33 @@ impl Tested {
 
     /// The test of a constant term, with costs of the whole record. `None` if that is singular.
     fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
-        let own = Fit::of(&self.joint.own);
         let (with, without, evidence, left_off) = if on {
-            let (without, evidence) = self.joint.without(term)?;
-            (own, without, evidence, None)
+            let (without, evidence) = self.terms.without(term)?;
+            (None, Some(without), evidence, None)
         } else {
-            let evidence = self.joint.evidence(term, &[])?;
-            let with = self.joint.with(&[term])?;
-            (with, own, evidence, self.joint.left_off(term))
+            let evidence = self.terms.evidence(term, &[])?;
+            let with = self.terms.with(&[term])?;
+            (Some(with), None, evidence, self.terms.left_off(term))
         };
+        let own = &self.terms.own;
+        let (with, without) = (
+            with.as_ref().unwrap_or(own),
+            without.as_ref().unwrap_or(own),
+        );
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
             left_off,
-            ..ErrorTermTest::new(term, on, &with, &without)
+            ..ErrorTermTest::new(term, on, with, without)
         })
     }
 
     /// The same of biases that vary.
     fn varying(&self, on: bool, chance: f64) -> ErrorTermTest {
-        let (own, otherwise) = (Fit::of(&self.joint.own), Fit::of(&self.otherwise));
+        let (own, otherwise) = (&self.terms.own, &self.otherwise);
         let (with, without, gain) = match on {
-            true => (&own, &otherwise, -self.fall_otherwise()),
-            false => (&otherwise, &own, self.fall_otherwise()),
+            true => (own, otherwise, -self.fall_otherwise()),
+            false => (otherwise, own, self.fall_otherwise()),
         };
         ErrorTermTest {
             gain,
@@ -259,13 +266,13 @@ impl Tested {
 
     /// By how much −2 ln of the likelihood falls where biases vary otherwise than in the model.
     fn fall_otherwise(&self) -> f64 {
-        self.joint.own.deviance() - self.otherwise.deviance()
+        self.terms.own.deviance - self.otherwise.deviance
     }
 
     /// Gives each test its role: the likeliest explanation first, then what is significant once it is on, until
     /// nothing is.
     fn decide(&mut self, chance: f64) {
-        let Self { tests, joint, .. } = self;
+        let Self { tests, terms, .. } = self;
         let shown = tests.iter_mut().filter(|t| !t.on && t.significant());
         let Some(likeliest) = shown.max_by(|a, b| a.significance.total_cmp(&b.significance)) else {
             return;
@@ -278,7 +285,7 @@ impl Tested {
             let others = tests.iter_mut();
             let others = others.filter(|test| !test.on && !on.contains(&test.term));
             let others = others.filter_map(|test| {
-                let evidence = joint.evidence(test.term, &on)?;
+                let evidence = terms.evidence(test.term, &on)?;
                 Some((evidence.significance(), test))
             });
             match others.max_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -317,18 +324,18 @@ impl Tested {
 
     fn explanation(&self, term: ErrorTerm, others: &[ErrorTerm]) -> Option<Explanation> {
         if term != VARYING {
-            return self.joint.explanation(term, others);
+            return self.terms.explanation(term, others);
         }
         let is_on = |test: &ErrorTermTest| test.term == VARYING && test.on;
         if self.tests.iter().any(is_on) {
             return None;
         }
         let ratio = 0.5 * self.fall_otherwise();
-        let added = self.otherwise.added_to(&self.joint.own);
+        let added = self.otherwise.added_to(&self.terms.own);
         Some(Explanation {
             ln_likelihood_ratio: ratio,
             of_term: ratio,
-            added: added + self.joint.on(others)?.added(),
+            added: added + self.terms.added(others)?,
         })
     }
 }
@@ -336,69 +343,70 @@ impl Tested {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::UNWATCHED;
-    use crate::calibration::{Options, estimate};
+    use crate::calibration::pass::{Gate, Mode, PassResult, pass};
+    use crate::calibration::{Options, UNWATCHED, estimate};
     use crate::imu::Term;
     use crate::simulation::Scenario;
     use crate::turntable::AxisError;
     use approx::assert_relative_eq;
 
+    /// A pass of the filter that has all that is on among its states.
+    fn last_pass(problem: &Problem, outcome: &Outcome) -> PassResult {
+        let mode = Mode::Held(Gate::As(&outcome.innovations));
+        pass(
+            problem,
+            &outcome.prior_attitudes,
+            &outcome.linearised_at,
+            mode,
+        )
+        .unwrap()
+    }
+
+    /// The test of a term against two passes.
+    fn is_of_passes(test: &ErrorTermTest, with: &PassResult, without: &PassResult) {
+        let gain = without.cost - with.cost;
+        println!("{:?}: {} {gain}", test.term, test.gain);
+        assert_relative_eq!(test.gain, gain, max_relative = 1e-3, epsilon = 0.01);
+        for (group, factor) in Group::all().zip(test.sigma_factors) {
+            let rms = |of: &PassResult| {
+                let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
+                of_group.map(|i| of.covariance[(i, i)]).sum::<f64>().sqrt()
+            };
+            assert_relative_eq!(
+                factor.unwrap(),
+                rms(with) / rms(without),
+                max_relative = 1e-4
+            );
+        }
+    }
+
     #[test]
-    fn conditioning_on_zero_is_a_pass_without_the_term() {
+    fn a_term_that_is_taken_off_or_put_on_is_a_pass_without_or_with_it() {
         let order = ErrorTerm::Instrument(Term::AccelSecondOrder);
         let scenario = Scenario::load("real-table").unwrap().with_error_term(order);
         let run = scenario.simulate(23, 0).unwrap().run;
         let problem = Problem::new(&run, &Options::default());
         let outcome = estimate(&problem, UNWATCHED).unwrap();
         let (tests, _) = test_error_terms(&problem, &outcome).unwrap();
-        let with = Fit::of(&last_pass(&problem, &outcome, &[]).unwrap());
-        for term in [
-            order,
-            ErrorTerm::TableBase,
-            ErrorTerm::TableAxes(AxisError::Tilt),
-        ] {
-            let mut other = problem.model.clone();
-            other.switch_off(term);
-            let other = problem.with_model(other);
-            let without = Fit::of(&last_pass(&other, &outcome, &[]).unwrap());
-            let test = tests.iter().find(|e| e.term == term).unwrap();
-            println!("{term:?}: {} {}", test.gain, without.cost - with.cost);
-            assert!(test.on);
-            assert_relative_eq!(test.gain, without.cost - with.cost, max_relative = 1e-3);
-            let by_passes = ErrorTermTest::new(term, true, &with, &without);
-            for (a, b) in test.sigma_factors.iter().zip(by_passes.sigma_factors) {
-                assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-4);
-            }
-        }
-    }
-
-    #[test]
-    fn a_term_that_is_tried_explains_what_a_pass_with_its_states_explains() {
-        let scenario = Scenario::load("demo").unwrap();
-        let run = scenario.simulate(23, 0).unwrap().run;
-        let problem = Problem::new(&run, &Options::default());
-        let outcome = estimate(&problem, UNWATCHED).unwrap();
-        for term in [
-            ErrorTerm::Instrument(Term::SizeEffect),
-            ErrorTerm::Instrument(Term::GyroNonlinearity),
-            ErrorTerm::TableBase,
-            ErrorTerm::TableAxes(AxisError::Wobble),
+        let own = last_pass(&problem, &outcome);
+        for (term, on) in [
+            (order, true),
+            (ErrorTerm::TableBase, true),
+            (ErrorTerm::TableAxes(AxisError::Tilt), true),
+            (ErrorTerm::Instrument(Term::GyroNonlinearity), false),
+            (ErrorTerm::TableAxes(AxisError::Wobble), false),
         ] {
             let mut model = problem.model.clone();
-            model.switch_on(term);
-            // Behind a prior of 0.1 m the filter itself is not exact.
-            model.term_sigma /= 100.0;
-            let joint = Joint::with_model(&problem, &outcome, &model).unwrap();
-            let without = Fit::of(&joint.own);
-            let with = Fit::of(&last_pass(&problem.with_model(model), &outcome, &[]).unwrap());
-            let tried = joint.with(&[term]).unwrap();
-            let gain = without.cost - with.cost;
-            println!("{term:?}: {gain} {}", without.cost - tried.cost);
-            // Velocity is known to 0.1 m/s, then to 0.1 µm/s: rounding leaves less than a tenth of what one
-            // state gains by chance.
-            assert_relative_eq!(without.cost - tried.cost, gain, epsilon = 0.1);
-            for p in 0..PARAMETERS {
-                assert_relative_eq!(tried.variance[p], with.variance[p], max_relative = 1e-3);
+            match on {
+                true => model.switch_off(term),
+                false => model.switch_on(term),
+            }
+            let other = last_pass(&problem.with_model(model), &outcome);
+            let test = tests.iter().find(|e| e.term == term).unwrap();
+            assert_eq!(test.on, on);
+            match on {
+                true => is_of_passes(test, &own, &other),
+                false => is_of_passes(test, &other, &own),
             }
         }
     }

@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::joint::last_pass;
 use super::{ErrorTermTest, Role};
 use crate::calibration::checks::finding::{Finding, widened_by};
 use crate::calibration::error::CalibrationError;
@@ -12,8 +11,8 @@ use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::ParameterMatrix;
 use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::pass::PassResult;
 use crate::calibration::problem::Problem;
+use crate::calibration::reduction::Posterior;
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
@@ -56,12 +55,12 @@ pub fn unseen_variation(
     if sensors.is_empty() {
         return Ok(None);
     }
-    let own = last_pass(problem, outcome, &[])?;
+    let own = outcome.posterior(problem, &outcome.reduction(problem)?)?;
     let of_sensors = sensors.par_iter().map(|&sensor| {
         let stated = stated.get(sensor);
         of_one(problem, outcome, &own, sensor, stated)
     });
-    let of_sensors: Vec<ParameterMatrix> = of_sensors.collect();
+    let of_sensors = of_sensors.collect::<Result<Vec<_>, _>>()?;
     Ok(Some(of_sensors.into_iter().sum()))
 }
 
@@ -80,36 +79,43 @@ pub fn biases_may_vary(growth: f64) -> Option<Finding> {
 fn of_one(
     problem: &Problem,
     outcome: &Outcome,
-    own: &PassResult,
+    own: &Posterior,
     sensor: Sensor,
     stated: &Noise,
-) -> ParameterMatrix {
+) -> Result<ParameterMatrix, CalibrationError> {
     let usual = usual_variation(stated);
     let density = |z: &f64| (-0.5 * z * z).exp();
     let sum_of = |nodes: &[f64]| -> f64 { nodes.iter().map(density).sum() };
     let all = sum_of(&SIGMAS) * sum_of(&TIMES);
     let (mut weights, mut sum) = (1.0, ParameterMatrix::zeros());
+    let mut varying = problem.model.clone();
+    varying.noise.get_mut(sensor).gauss_markov = Some(usual);
+    let varying = problem.with_model(varying);
+    let (script, accepted) = (outcome.script(&varying)?, outcome.accepted());
     for (sigma, time) in SIGMAS
         .iter()
         .flat_map(|s| TIMES.iter().map(move |t| (s, t)))
     {
-        let mut model = problem.model.clone();
+        let mut model = varying.model.clone();
         model.noise.get_mut(sensor).gauss_markov = Some(GaussMarkov {
             sigma: usual.sigma * (sigma * LOG_SIGMA).exp(),
             correlation_time: usual.correlation_time * (time * LOG_SIGMA).exp(),
         });
         // What the filter cannot run with is not likely.
-        let Ok(with) = last_pass(&problem.with_model(model), outcome, &[]) else {
+        let problem = problem.with_model(model);
+        let reduction = script.reduce(&problem, &accepted);
+        let Ok(with) = reduction.and_then(|reduction| outcome.posterior(&problem, &reduction))
+        else {
             continue;
         };
-        let ratio = (0.5 * (own.deviance() - with.deviance())).exp();
+        let ratio = (0.5 * (own.deviance - with.deviance)).exp();
         let weight = ratio * density(sigma) * density(time) / all;
         if weight.is_finite() {
             weights += weight;
             sum += with.added_to(own) * weight;
         }
     }
-    sum / weights
+    Ok(sum / weights)
 }
 
 #[cfg(test)]
