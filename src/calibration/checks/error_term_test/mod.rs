@@ -366,7 +366,8 @@ mod tests {
     fn is_of_passes(test: &ErrorTermTest, with: &PassResult, without: &PassResult) {
         let gain = without.cost - with.cost;
         println!("{:?}: {} {gain}", test.term, test.gain);
-        assert_relative_eq!(test.gain, gain, max_relative = 1e-3, epsilon = 0.01);
+        // Rounding of a pass leaves less than a tenth of what one state gains by chance.
+        assert_relative_eq!(test.gain, gain, max_relative = 1e-3, epsilon = 0.1);
         for (group, factor) in Group::all().zip(test.sigma_factors) {
             let rms = |of: &PassResult| {
                 let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
