@@ -6,6 +6,7 @@
 //! and any part of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)),
 //! without the cost of that filter.
 
+use faer::MatRef;
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::Linear;
@@ -86,8 +87,16 @@ impl Columns {
         let rows = std::mem::take(&mut self.rows);
         let rows = DMatrix::from_row_slice(rows.len() / columns, columns, &rows);
         match rows.nrows() > columns {
-            true => rows.qr().unpack_r(),
+            true => triangle(&rows),
             false => rows,
         }
     }
+}
+
+/// The upper triangle that has the same squares as these rows, by Householder's reflections.
+pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let rows = MatRef::from_column_major_slice(rows.as_slice(), rows.nrows(), rows.ncols());
+    let qr = rows.qr();
+    let triangle = qr.thin_R();
+    DMatrix::from_fn(triangle.nrows(), triangle.ncols(), |i, j| triangle[(i, j)])
 }

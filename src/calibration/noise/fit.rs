@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::factors::{Factors, SOURCES, Scale};
-use super::replay::{Replay, Script};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::problem::Problem;
+use crate::calibration::reduction::{Replay, Script};
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;

@@ -4,7 +4,6 @@ use super::factors::{Factors, Scale};
 use super::fit::{Fit, Likelihood};
 use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
-use super::replay::Script;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
 use super::selection::Selection;
 use super::source::Source;
@@ -14,6 +13,7 @@ use crate::calibration::iterations::{Progress, iterate};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;
+use crate::calibration::reduction::Script;
 use crate::calibration::solved::Solved;
 use crate::statistics::FALSE_ALARM;
 

@@ -11,7 +11,6 @@ mod fit;
 mod learn;
 mod likelihood_ratio;
 mod policy;
-mod replay;
 mod report;
 mod run_toml;
 mod selection;
@@ -21,7 +20,6 @@ pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use fit::LOG_SIGMA;
 pub use learn::learn;
 pub use policy::NoisePolicy;
-pub use replay::Script;
 pub use report::{NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;
 

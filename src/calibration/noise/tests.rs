@@ -1,4 +1,5 @@
 use crate::calibration::iterations::UNWATCHED;
+use crate::calibration::reduction::Script;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -71,7 +72,7 @@ fn attitude_noise_of_moves_is_found() {
     assert!(outcome.noise.learnt && outcome.converged);
     let problem = Problem::new(&run, &Options::default());
     let at = &outcome.linearised_at;
-    let script = replay::Script::new(&problem, &outcome.prior_attitudes, at).unwrap();
+    let script = Script::new(&problem, &outcome.prior_attitudes, at).unwrap();
     let moves = script.moves();
     // Noise by time and by rate do the same in moves that are all alike.
     let found = outcome.model.motion_noise.gyro;

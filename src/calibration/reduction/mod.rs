@@ -4,17 +4,22 @@
 //! [`super::filter::columns`]). Each dwell leaves whitened rows `[G ν]`, so that `ν = G c + noise of σ 1`: with a prior they
 //! give the estimate of any part of the constants, without another pass.
 
+mod script;
+
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::budget::BudgetSource;
 use super::error::CalibrationError;
+use super::filter::columns::triangle;
 use super::layout::Constant;
 use super::linearisation::Linearisation;
 use super::model::Model;
 use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
+use crate::calibration::several::thermal::Coefficient;
 use crate::imu::Sensor;
+pub use script::{Moves, Replay, Script};
 
 /// Whitened rows of all dwells.
 #[derive(Debug, Clone)]
@@ -40,6 +45,8 @@ pub struct Prior {
 /// What is known of constants with the data.
 #[derive(Debug, Clone)]
 pub struct Posterior {
+    /// Errors of all constants.
+    pub mean: DVector<f64>,
     /// Errors of the parameters of both triads.
     pub parameters: ParameterVector,
     /// Of all constants; zero of what was known.
@@ -62,7 +69,7 @@ impl Reduction {
             let mut both = triangle.resize_vertically(above + below, 0.0);
             both.rows_mut(above, below).copy_from(dwell);
             match both.nrows() > columns {
-                true => both.qr().unpack_r(),
+                true => triangle(&both),
                 false => both,
             }
         });
@@ -94,7 +101,7 @@ impl Reduction {
             rows.set_column(n, &observed);
             first += dwell.nrows();
         }
-        let triangle = stacked.qr().unpack_r();
+        let triangle = triangle(&stacked);
         let root = triangle.view((0, 0), (n, n));
         let mut inverse = DMatrix::identity(n, n);
         if !root.solve_upper_triangular_mut(&mut inverse) {
@@ -124,6 +131,7 @@ impl Reduction {
             parameter_covariance: self.of_parameters(&covariance),
             covariance,
             parameters,
+            mean,
             cost,
             deviance: cost + self.log_determinant + 2.0 * (logarithms + of_prior),
         })
@@ -164,6 +172,15 @@ impl Reduction {
             }
         }
         parameters
+    }
+
+    /// The coefficients of temperature among the constants, with their places.
+    pub fn coefficients(&self) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
+        let places = self.constants.iter().enumerate();
+        places.filter_map(|(place, constant)| match constant {
+            Constant::Thermal(coefficient) => Some((place, *coefficient)),
+            _ => None,
+        })
     }
 
     /// The parameters of both triads among the constants: place and index of each.

@@ -135,14 +135,13 @@ pub fn solve<'a>(
     let gate = Gate::Innovations;
     let mut iterated = iterate(&problem, &priors, at, gate, &mut passes, progress)?;
     if let Some(thermal) = &iterated.held.thermal {
-        let selected = order::select(thermal, &iterated.held.covariance);
+        let selected = order::select(&problem, &priors, &iterated.held, thermal)?;
         findings.extend(selected.finding(problem.model.form));
         if selected.model != thermal.model {
             let mut model = problem.model.clone();
             model.thermal = Some(Arc::new(selected.model));
             problem = problem.with_model(model);
-            let mut from = iterated.held.estimate.clone();
-            order::move_to(&selected.conditioned, &mut from);
+            let from = selected.at;
             iterated = iterate(&problem, &priors, from, gate, &mut passes, progress)?;
         }
     }

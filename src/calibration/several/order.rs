@@ -1,12 +1,14 @@
 //! Which orders of the polynomials the data call for.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::thermal::{Coefficient, Thermal};
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::observability::temperature_not_seen;
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::parameters::{OBSERVED_BELOW, ParameterMatrix, parameter_name};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::linearisation::{AttitudePrior, Linearisation};
+use crate::calibration::parameters::{OBSERVED_BELOW, from_vector, parameter_name, to_vector};
+use crate::calibration::pass::PassResult;
+use crate::calibration::problem::Problem;
+use crate::calibration::reduction::{Posterior, Prior, Script};
 use crate::imu::{InstallationForm, ParameterKind, RATE, Sensor, ThermalModel, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
@@ -14,7 +16,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 pub struct Selected {
     pub model: ThermalModel,
     /// The estimates under it.
-    pub conditioned: Conditioned,
+    pub at: Linearisation,
     /// Coefficients of first order that the recordings did not show.
     unseen: Vec<Coefficient>,
 }
@@ -27,48 +29,62 @@ struct Order {
     function: usize,
 }
 
-/// Estimates where others are known to be zero.
-pub struct Conditioned {
-    coefficients: Vec<Coefficient>,
-    values: DVector<f64>,
-    covariance: DMatrix<f64>,
-    /// Change of the parameters of both triads.
-    change: DVector<f64>,
-    cross: DMatrix<f64>,
-}
-
 /// Takes the highest order of a kind of parameters off while the data do not call for it: where it is zero, the
 /// ratio of likelihoods with and without it is χ² of as many degrees as it has coefficients (Wilks).
-pub fn select(thermal: &Thermal, parameters: &ParameterMatrix) -> Selected {
-    let mut left = Conditioned::new(thermal, parameters);
+pub fn select(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    held: &PassResult,
+    thermal: &Thermal,
+) -> Result<Selected, CalibrationError> {
+    let accepted: Vec<bool> = held.innovations.iter().map(|of| of.accepted).collect();
+    let script = Script::new(problem, priors, &held.at)?;
+    let reduction = script.reduce(problem, &accepted)?.folded();
+    let known = Prior::new(&reduction.constants, &problem.model, &held.at);
+    let with = |model: &ThermalModel| -> Result<Posterior, CalibrationError> {
+        let mut prior = known.clone();
+        for (place, coefficient) in reduction.coefficients() {
+            prior.sigma[place] = coefficient.of(&model.sigma);
+        }
+        reduction.posterior(&prior)
+    };
     let mut model = thermal.model.clone();
-    let unseen = unseen(thermal);
+    let mut now = with(&model)?;
     loop {
-        let least = left
-            .highest()
-            .into_iter()
-            .filter_map(|order| {
-                let places = left.places(order);
-                let gain = left.gain(&places)?;
-                let limit = chi_square_limit(places.len() as f64, FALSE_ALARM);
-                Some((gain / limit, order))
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        match least {
-            Some((ratio, order)) if ratio < 1.0 => {
-                for coefficient in left.without(order) {
-                    let sigma = model.sigma.get_mut(coefficient.sensor);
-                    sigma[(coefficient.parameter, coefficient.function)] = 0.0;
-                }
-            }
+        let of_order = |order: Order| {
+            let of = Coefficient::all(problem.model.form, Some(&model)).into_iter();
+            of.filter(move |coefficient| Order::of(coefficient) == order)
+        };
+        let without = |order: Order| {
+            let mut without = model.clone();
+            of_order(order).for_each(|coefficient| *coefficient.of_mut(&mut without.sigma) = 0.0);
+            without
+        };
+        let candidates = highest(problem.model.form, &model).into_iter();
+        let least = candidates.filter_map(|order| {
+            let without = without(order);
+            let posterior = with(&without).ok()?;
+            let limit = chi_square_limit(of_order(order).count() as f64, FALSE_ALARM);
+            Some(((posterior.cost - now.cost) / limit, without, posterior))
+        });
+        match least.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((ratio, without, posterior)) if ratio < 1.0 => (model, now) = (without, posterior),
             _ => break,
         }
     }
-    Selected {
-        model,
-        conditioned: left,
-        unseen,
+    let mut at = held.estimate.clone();
+    at.triads = from_vector(
+        at.triads.gyro.form,
+        &(to_vector(&held.at.triads) + now.parameters),
+    );
+    for (place, coefficient) in reduction.coefficients() {
+        *coefficient.of_mut(&mut at.thermal) = coefficient.of(&held.at.thermal) + now.mean[place];
     }
+    Ok(Selected {
+        model,
+        at,
+        unseen: unseen(thermal),
+    })
 }
 
 /// Coefficients of first order of which little more is known than before.
@@ -82,20 +98,6 @@ fn unseen(thermal: &Thermal) -> Vec<Coefficient> {
     .collect()
 }
 
-/// Takes these estimates of the coefficients, and of the parameters what goes with them.
-pub fn move_to(conditioned: &Conditioned, at: &mut Linearisation) {
-    at.thermal = Default::default();
-    for (coefficient, value) in conditioned.coefficients.iter().zip(&conditioned.values) {
-        *coefficient.of_mut(&mut at.thermal) = *value;
-    }
-    let moved = crate::calibration::parameters::to_vector(&at.triads) + change(conditioned);
-    at.triads = crate::calibration::parameters::from_vector(at.triads.gyro.form, &moved);
-}
-
-fn change(conditioned: &Conditioned) -> crate::calibration::parameters::ParameterVector {
-    crate::calibration::parameters::ParameterVector::from_fn(|i, _| conditioned.change[i])
-}
-
 impl Selected {
     /// What the recordings do not show, if there is anything.
     pub fn finding(&self, form: InstallationForm) -> Option<Finding> {
@@ -106,74 +108,23 @@ impl Selected {
     }
 }
 
-impl Conditioned {
-    fn new(thermal: &Thermal, parameters: &ParameterMatrix) -> Self {
-        Self {
-            coefficients: thermal.coefficients.clone(),
-            values: thermal.values.clone(),
-            covariance: thermal.covariance.clone(),
-            change: DVector::zeros(parameters.nrows()),
-            cross: thermal.cross.clone(),
-        }
-    }
-
-    /// The highest order of each kind of parameters, and its rate.
-    fn highest(&self) -> Vec<Order> {
-        let mut orders: Vec<Order> = self.coefficients.iter().map(Order::of).collect();
-        orders.sort();
-        orders.dedup();
-        let top = |order: &Order| {
-            order.function == RATE
-                || !orders.iter().any(|other| {
-                    (other.accel, other.kind) == (order.accel, order.kind)
-                        && other.function > order.function
-                        && other.function < RATE
-                })
-        };
-        orders.iter().copied().filter(top).collect()
-    }
-
-    fn places(&self, order: Order) -> Vec<usize> {
-        let all = self.coefficients.iter().enumerate();
-        all.filter(|(_, c)| Order::of(c) == order)
-            .map(|(k, _)| k)
-            .collect()
-    }
-
-    /// By how much −2 ln of the likelihood rises where these are zero.
-    fn gain(&self, places: &[usize]) -> Option<f64> {
-        let n = places.len();
-        let values = DVector::from_fn(n, |i, _| self.values[places[i]]);
-        let covariance = DMatrix::from_fn(n, n, |i, j| self.covariance[(places[i], places[j])]);
-        Some(values.dot(&covariance.cholesky()?.solve(&values)))
-    }
-
-    /// Takes an order off, which is known to be zero then; its coefficients.
-    fn without(&mut self, order: Order) -> Vec<Coefficient> {
-        let off = self.places(order);
-        let taken = off.iter().map(|&k| self.coefficients[k]).collect();
-        let n = off.len();
-        let inner = DMatrix::from_fn(n, n, |i, j| self.covariance[(off[i], off[j])]);
-        let values = DVector::from_fn(n, |i, _| self.values[off[i]]);
-        if let Some(factor) = inner.cholesky() {
-            let across = self.covariance.select_columns(&off);
-            let with_parameters = self.cross.select_columns(&off);
-            let solved = factor.solve(&values);
-            let back = factor.solve(&across.transpose());
-            self.values -= &across * &solved;
-            self.change -= &with_parameters * &solved;
-            self.cross -= &with_parameters * &back;
-            self.covariance -= &across * &back;
-        }
-        let left: Vec<usize> = (0..self.coefficients.len())
-            .filter(|k| !off.contains(k))
-            .collect();
-        self.coefficients = left.iter().map(|&k| self.coefficients[k]).collect();
-        self.values = self.values.select_rows(&left);
-        self.covariance = self.covariance.select_rows(&left).select_columns(&left);
-        self.cross = self.cross.select_columns(&left);
-        taken
-    }
+/// The highest order of each kind of parameters, and its rate.
+fn highest(form: InstallationForm, model: &ThermalModel) -> Vec<Order> {
+    let mut orders: Vec<Order> = Coefficient::all(form, Some(model))
+        .iter()
+        .map(Order::of)
+        .collect();
+    orders.sort();
+    orders.dedup();
+    let top = |order: &Order| {
+        order.function == RATE
+            || !orders.iter().any(|other| {
+                (other.accel, other.kind) == (order.accel, order.kind)
+                    && other.function > order.function
+                    && other.function < RATE
+            })
+    };
+    orders.iter().copied().filter(top).collect()
 }
 
 impl Order {

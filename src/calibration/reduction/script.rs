@@ -1,6 +1,7 @@
 //! A pass with the linearisation held, of which navigation is done once and the filter as often as noise
 //! is tried.
 
+use super::Reduction;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::filter::columns::Columns;
 use crate::calibration::layout::Layout;
@@ -12,7 +13,6 @@ use crate::calibration::pass::{
 };
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::events::{Event, Events};
-use crate::calibration::reduction::Reduction;
 use crate::imu::{PerSensor, Sensor};
 
 /// What a pass does at one point of linearisation, whatever the noise.
