@@ -64,16 +64,16 @@ impl Reduction {
     pub fn folded(mut self) -> Self {
         let columns = self.constants.len() + 1;
         let empty = DMatrix::zeros(0, columns);
-        let triangle = self.dwells.iter().fold(empty, |triangle, dwell| {
-            let (above, below) = (triangle.nrows(), dwell.nrows());
-            let mut both = triangle.resize_vertically(above + below, 0.0);
+        let folded = self.dwells.iter().fold(empty, |folded, dwell| {
+            let (above, below) = (folded.nrows(), dwell.nrows());
+            let mut both = folded.resize_vertically(above + below, 0.0);
             both.rows_mut(above, below).copy_from(dwell);
             match both.nrows() > columns {
                 true => triangle(&both),
                 false => both,
             }
         });
-        self.dwells = vec![triangle];
+        self.dwells = vec![folded];
         self
     }
 
