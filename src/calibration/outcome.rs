@@ -20,7 +20,7 @@ use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
 use crate::calibration::checks::innovation::{Consistency, Innovation};
 use crate::calibration::checks::observability::Observability;
-use crate::calibration::several::alone::Alone;
+use crate::calibration::several::separate_estimate::SeparateEstimate;
 use crate::calibration::several::thermal::Thermal;
 use crate::run::Aiding;
 
@@ -53,7 +53,7 @@ pub struct Outcome {
     /// By how much each recording differs from what all have in common; empty where nothing does.
     pub own: Vec<Own>,
     /// What each recording alone says, where something differs between recordings or temperatures.
-    pub alone: Vec<Alone>,
+    pub alone: Vec<SeparateEstimate>,
     /// Mean temperature of each dwell in °C and its rate in K/s; empty where nothing follows temperature.
     pub warming: Vec<(f64, f64)>,
     /// Gravity and its 1σ after the run, m/s².

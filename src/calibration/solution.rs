@@ -3,13 +3,13 @@
 use super::budget::{Budget, BudgetSource};
 use super::error::CalibrationError;
 use super::estimate::Estimate;
-use super::gauss_newton::estimate;
-use super::iterations::Progress;
+use super::estimator::estimate;
+use super::gauss_newton::Progress;
 use super::outcome::Outcome;
 use super::problem::Problem;
 use super::result::{Calibration, Method, Provenance};
 use crate::calibration::checks::error_term_test::{
-    ErrorTermTest, test_error_terms, unseen_variation,
+    ErrorTermTest, bias_variation, test_error_terms,
 };
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::quality::Quality;
@@ -155,7 +155,7 @@ impl Solution {
                 };
                 // A calibration is one without its budget, too.
                 let mut budget = budget.ok();
-                let variation = unseen_variation(problem, outcome, &error_terms)?;
+                let variation = bias_variation(problem, outcome, &error_terms)?;
                 for (source, part) in [
                     (BudgetSource::ErrorTermsLeftOff, left_off),
                     (BudgetSource::UnseenVariation, variation),

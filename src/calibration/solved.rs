@@ -1,6 +1,6 @@
 //! What iterations found, and with what they were made.
 
-use super::iterations::Iterated;
+use super::gauss_newton::Iterated;
 use super::linearisation::AttitudePrior;
 use super::outcome::Pass;
 use super::parameters::ParameterMatrix;
@@ -8,7 +8,7 @@ use super::pass::Epoch;
 use super::problem::Problem;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
-use crate::calibration::several::alone::Alone;
+use crate::calibration::several::separate_estimate::SeparateEstimate;
 use crate::calibration::start::coarse::CoarseStart;
 
 /// A problem whose iterations have ended.
@@ -27,7 +27,7 @@ pub struct Solved<'a> {
     pub by_headings: ParameterMatrix,
     pub noise: NoiseReport,
     /// Each recording calibrated alone, where there are several.
-    pub alone: Vec<Alone>,
+    pub alone: Vec<SeparateEstimate>,
     pub findings: Vec<Finding>,
 }
 

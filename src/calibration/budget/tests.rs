@@ -1,6 +1,6 @@
 use super::*;
 use crate::calibration::checks::innovation::Innovation;
-use crate::calibration::iterations::UNWATCHED;
+use crate::calibration::gauss_newton::UNWATCHED;
 use crate::calibration::model::Model;
 use crate::calibration::pass::{Gate, Mode, PassResult, pass};
 use crate::calibration::{ErrorTerm, NoisePolicy, Options, estimate};

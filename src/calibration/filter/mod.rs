@@ -1,21 +1,21 @@
 //! The Kalman filter: covariance in block form, measurements one scalar at a time.
 
 pub mod columns;
-pub mod courses;
-pub mod given;
+pub mod dwell_filter;
+pub mod gain_cache;
+pub mod input_prior;
 pub mod linear;
-pub mod local;
 pub mod measurement;
 pub mod rows;
 
-mod at_rest;
-mod dwells;
+mod dwell_filters;
+mod dwell_update;
 mod propagation;
-mod standing;
+mod step_at_rest;
 mod update;
 
-pub use dwells::Dwells;
-pub use standing::{Innovations, Observer, Taken, Verdict};
+pub use dwell_filters::DwellFilters;
+pub use dwell_update::{Innovations, ObservationJudge, Taken, Verdict};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -9,7 +9,7 @@ use super::selection::Selection;
 use super::source::Source;
 use crate::calibration::checks::innovation::{Innovation, Observation};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::iterations::{Progress, iterate};
+use crate::calibration::gauss_newton::{Progress, iterate};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;

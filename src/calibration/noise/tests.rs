@@ -1,4 +1,4 @@
-use crate::calibration::iterations::UNWATCHED;
+use crate::calibration::gauss_newton::UNWATCHED;
 use crate::calibration::reduction::Script;
 use nalgebra::Vector3;
 use rand::SeedableRng;

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::mode::{Gate, Mode};
 use crate::calibration::checks::innovation::{Innovation, Observation};
-use crate::calibration::filter::{Innovations, Observer, Verdict};
+use crate::calibration::filter::{Innovations, ObservationJudge, Verdict};
 use crate::calibration::model::Model;
 use crate::calibration::problem::Stretch;
 use crate::calibration::record::segment::Seen;
@@ -80,7 +80,7 @@ impl Memory {
     }
 }
 
-impl Observer for Judge<'_> {
+impl ObservationJudge for Judge<'_> {
     fn variance(&self, seen: &Seen) -> f64 {
         self.stretch
             .observation_variance(self.model, seen.kind, seen.readings)

@@ -13,7 +13,7 @@ use super::model::Model;
 use super::problem::{Problem, Stretch};
 pub use crate::calibration::filter::measurement::ScalarInnovation;
 pub use crate::calibration::filter::{
-    Dwells, Filter, Innovations, Observer, PriorErrors, Since, Taken, Verdict,
+    DwellFilters, Filter, Innovations, ObservationJudge, PriorErrors, Since, Taken, Verdict,
 };
 pub use crate::calibration::record::segment::Seen;
 use earlier::Earlier;
@@ -39,7 +39,7 @@ pub fn pass(
         Mode::Held(_) => PriorErrors::at(model, at),
     };
     let filter = Filter::new(model, &errors);
-    let dwells = Dwells::of(&filter);
+    let dwells = DwellFilters::of(&filter);
     let mut sums = Sums {
         at: at.clone(),
         filter,

@@ -10,7 +10,7 @@ use crate::calibration::checks::dwell_scatter::Posterior;
 use crate::calibration::checks::innovation::Innovation;
 use crate::calibration::checks::observability::AttitudeCovariance;
 use crate::calibration::estimate::Estimate;
-use crate::calibration::filter::{Dwells, Filter};
+use crate::calibration::filter::{DwellFilters, Filter};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::model::Model;
@@ -95,7 +95,7 @@ pub struct Own {
 pub struct Sums {
     pub at: Linearisation,
     pub filter: Filter,
-    pub dwells: Dwells,
+    pub dwells: DwellFilters,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
     pub posteriors: Posteriors,

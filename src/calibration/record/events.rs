@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::segment::{Segment, Segments, moves, segments};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::filter::measurement::Measurement;
-use crate::calibration::filter::{Dwells, Filter, Observer, Taken};
+use crate::calibration::filter::{DwellFilters, Filter, ObservationJudge, Taken};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::model::Model;
@@ -45,9 +45,9 @@ impl Event {
     /// Takes a filter of this model through it.
     pub fn take_in(
         &self,
-        (filter, dwells): (&mut Filter, &mut Dwells),
+        (filter, dwells): (&mut Filter, &mut DwellFilters),
         (model, stretch): (&Model, &Stretch),
-        observer: &mut impl Observer,
+        observer: &mut impl ObservationJudge,
     ) -> Taken {
         match self {
             Self::Move(block, _) => {

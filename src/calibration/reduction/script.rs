@@ -8,8 +8,8 @@ use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::pass::{
-    Dwells, Filter, Innovations, Observer, PriorErrors, ScalarInnovation, Seen, Taken, Verdict,
-    begin,
+    DwellFilters, Filter, Innovations, ObservationJudge, PriorErrors, ScalarInnovation, Seen,
+    Taken, Verdict, begin,
 };
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::events::{Event, Events};
@@ -125,7 +125,7 @@ impl<'a> Script<'a> {
         mut replay: Option<&mut Replay>,
     ) -> Result<Filter, CalibrationError> {
         let model = &problem.model;
-        let mut dwells = Dwells::of(&filter);
+        let mut dwells = DwellFilters::of(&filter);
         let mut accepted = accepted.iter();
         let mut before = None;
         let stretches = problem.stretches().iter().zip(self.priors);
@@ -180,17 +180,17 @@ impl Decided<'_, '_> {
     }
 }
 
-impl Observer for Decided<'_, '_> {
+impl ObservationJudge for Decided<'_, '_> {
     fn variance(&self, seen: &Seen) -> f64 {
         self.stretch
             .observation_variance(self.model, seen.kind, seen.readings)
     }
 
-    fn knows(&self) -> bool {
+    fn verdicts_are_known(&self) -> bool {
         self.replay.is_none()
     }
 
-    fn foregone(&mut self) -> Verdict {
+    fn known_verdict(&mut self) -> Verdict {
         self.verdict()
     }
 

@@ -10,16 +10,16 @@ pub mod day_to_day;
 pub mod separate;
 pub mod thermal;
 
-pub mod alone;
-mod differ;
+mod between_recordings;
 mod order;
 mod repeat;
+pub mod separate_estimate;
 mod temperatures;
 
 use std::sync::Arc;
 
 use super::error::CalibrationError;
-use super::iterations::{Progress, iterate};
+use super::gauss_newton::{Progress, iterate};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::noise::NoisePolicy;
 use super::options::Options;
@@ -27,8 +27,8 @@ use super::parameters::parameter;
 use super::pass::Gate;
 use super::problem::{Problem, Stretch};
 use super::solved::Solved;
-use crate::calibration::several::alone::Alone;
 use crate::calibration::several::day_to_day::{DayToDay, Difference};
+use crate::calibration::several::separate_estimate::SeparateEstimate;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
@@ -122,7 +122,7 @@ pub fn solve<'a>(
     let mut findings = Vec::new();
     let mut problem = problem.clone();
     if problem.options.noise != NoisePolicy::Stated
-        && let Some((day_to_day, finding)) = differ::learnt(&problem.model, &alone)
+        && let Some((day_to_day, finding)) = between_recordings::learnt(&problem.model, &alone)
     {
         let mut model = problem.model.clone();
         model.day_to_day = day_to_day;
@@ -153,7 +153,7 @@ pub fn solve<'a>(
 }
 
 /// Where the iterations begin: of each parameter the polynomial through what each recording alone says.
-fn start(problem: &Problem, alone: &[Alone]) -> Linearisation {
+fn start(problem: &Problem, alone: &[SeparateEstimate]) -> Linearisation {
     let model = &problem.model;
     let initial = alone.iter().flat_map(|a| a.initial_attitudes.clone());
     let mut at = Linearisation::new(

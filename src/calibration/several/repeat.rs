@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::alone::Alone;
 use super::day_to_day::Difference;
+use super::separate_estimate::SeparateEstimate;
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{PARAMETERS, ParameterVector, to_vector};
@@ -29,7 +29,7 @@ pub struct Repeatability {
 impl Outcome {
     /// What a recording alone says less all together at its temperature, where its temperature stands, if it had been
     /// mounted as the mean of all.
-    fn departure(&self, number: usize, alone: &Alone) -> Option<ParameterVector> {
+    fn departure(&self, number: usize, alone: &SeparateEstimate) -> Option<ParameterVector> {
         let mounting = self.own.get(number).map(|own| own.values.mounting);
         let turned_back = Difference {
             mounting: -mounting.unwrap_or_default(),

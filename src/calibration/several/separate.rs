@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
-use super::alone::Alone;
 use super::day_to_day::{DayToDay, Difference};
+use super::separate_estimate::SeparateEstimate;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
-use crate::calibration::iterations::{Iterated, UNWATCHED, iterate};
+use crate::calibration::gauss_newton::{Iterated, UNWATCHED, iterate};
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::noise::learn;
@@ -29,12 +29,12 @@ const PART_OF_RANGE: f64 = 0.1;
 
 /// Each recording alone, on as many threads as there are, with the noise that is stated or, where it may be learnt
 /// and has to be, with that of what each shows.
-pub fn each(problem: &Problem) -> Result<Vec<Alone>, CalibrationError> {
+pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError> {
     let runs = problem.runs().count();
     let plain = |number: usize| plain(&problem.recordings(|of| of == number), &problem.model);
     let all = (0..runs).into_par_iter();
     let all = all.map(|number| of(&plain(number), problem.model.thermal.as_deref()));
-    let (mut all, contradicted): (Vec<Alone>, Vec<bool>) =
+    let (mut all, contradicted): (Vec<SeparateEstimate>, Vec<bool>) =
         all.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
     if contradicted.contains(&true)
         && let Some(model) = noise_of_all(problem, &all)
@@ -58,13 +58,13 @@ fn plain<'a>(recording: &Problem<'a>, model: &Model) -> Problem<'a> {
 
 /// A model with the noise that recordings show which have no parameter in common: a short one does not show its own,
 /// and what they differ by is no noise.
-fn noise_of_all(problem: &Problem, alone: &[Alone]) -> Option<Model> {
+fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> {
     let known = |number: usize| alone[number].estimate.is_some();
     let problem = problem.recordings(known);
     let mut model = plain(&problem, &problem.model).model;
     model.day_to_day.parameters = model.prior_sigma;
     let problem = problem.with_model(model);
-    let known: Vec<&Alone> = alone
+    let known: Vec<&SeparateEstimate> = alone
         .iter()
         .filter(|alone| alone.estimate.is_some())
         .collect();
@@ -93,7 +93,10 @@ fn noise_of_all(problem: &Problem, alone: &[Alone]) -> Option<Model> {
 }
 
 /// A recording alone with the noise that is stated or that it shows, and whether it shows other than is stated.
-fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), CalibrationError> {
+fn of(
+    plain: &Problem,
+    thermal: Option<&ThermalModel>,
+) -> Result<(SeparateEstimate, bool), CalibrationError> {
     let run = plain.run();
     let temperature = run.recording.imu.temperature.as_ref();
     let span = temperature.map_or(0.0, |temperature| {
@@ -108,7 +111,7 @@ fn of(plain: &Problem, thermal: Option<&ThermalModel>) -> Result<(Alone, bool), 
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.range.state(at, &PerSensor::default()));
-    let alone = |(start, by_headings), priors, initial_attitudes, estimate| Alone {
+    let alone = |(start, by_headings), priors, initial_attitudes, estimate| SeparateEstimate {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
@@ -169,7 +172,7 @@ fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
 }
 
 /// What a recording alone says with other noise.
-fn with_noise(alone: &Alone, recording: &Problem) -> Option<Estimate> {
+fn with_noise(alone: &SeparateEstimate, recording: &Problem) -> Option<Estimate> {
     let at = Linearisation::new(
         alone.estimate.as_ref()?.triads,
         SVector::zeros(),
@@ -191,7 +194,7 @@ fn estimate(iterated: Iterated, by_headings: ParameterMatrix) -> Option<Estimate
 /// temperature: least squares through what each recording alone says.
 pub fn through(
     model: &Model,
-    alone: &[Alone],
+    alone: &[SeparateEstimate],
     (sensor, of_triad, axis): (Sensor, usize, usize),
 ) -> DVector<f64> {
     let index = parameter(sensor, of_triad);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::coarse::{CoarseStart, coarse_start};
 use crate::attitude::log;
 use crate::calibration::error::CalibrationError;
-use crate::calibration::iterations::{Iterated, Progress, iterate, summary, tell};
+use crate::calibration::gauss_newton::{Iterated, Progress, iterate, summary, tell};
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::noise::{NoisePolicy, learn};
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector, to_vector};

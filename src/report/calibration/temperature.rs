@@ -5,7 +5,7 @@ use super::super::group::{Group, axis_name};
 use super::super::number::{plus_minus, three_digits, value};
 use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
 use crate::calibration::{
-    Alone, Estimate, Outcome, ParameterMatrix, ParameterVector, Thermal, parameter_name,
+    Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
     sensor_and_parameter,
 };
 use crate::imu::{PerSensor, RATE, Sensor, ThermalState};
@@ -192,7 +192,7 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
 }
 
 /// The temperature of a recording at the axis of a parameter.
-fn own_temperature(alone: &Alone, index: usize) -> Option<f64> {
+fn own_temperature(alone: &SeparateEstimate, index: usize) -> Option<f64> {
     let (sensor, _) = sensor_and_parameter(index);
     let axes = alone.temperature.as_ref()?.get(sensor);
     Some(axes.iter().sum::<f64>() / 3.0)
@@ -301,7 +301,7 @@ fn recordings(outcome: &Outcome) -> Table {
     if outcome.alone.len() < 2 {
         return Table::default();
     }
-    let row = |(number, alone): (usize, &Alone)| {
+    let row = |(number, alone): (usize, &SeparateEstimate)| {
         let distance = outcome.distance_alone(number);
         vec![
             alone.name.clone(),

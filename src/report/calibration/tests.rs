@@ -8,7 +8,7 @@ use super::super::synthetic::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
 use crate::calibration::{
-    ErrorTerm, ErrorTermTest, LeftOff, PARAMETERS, ParameterMatrix, ParameterVector, Role,
+    ErrorTerm, ErrorTermTest, PARAMETERS, ParameterMatrix, ParameterVector, Role, UnmodelledEffect,
     parameter,
 };
 use crate::calibration::{Nis, Observation, from_vector, parameter_name, to_vector};
@@ -361,7 +361,7 @@ fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
         role: Role::None,
         without: 1.0,
         with: 1.0,
-        left_off: Some(LeftOff {
+        left_off: Some(UnmodelledEffect {
             usual: off(times),
             shown: off(times),
         }),

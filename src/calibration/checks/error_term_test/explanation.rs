@@ -4,7 +4,7 @@ use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
 
 /// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeftOff {
+pub struct UnmodelledEffect {
     /// Where its own parameters have their usual σ around zero.
     pub usual: ParameterVector,
     /// RMS where they are also as the record shows them.

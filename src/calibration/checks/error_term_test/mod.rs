@@ -3,10 +3,10 @@
 //! One reduction answers for all constant ones, whichever are on (see [`crate::calibration::reduction`]). Varying
 //! biases are not constant; they take a reduction of their own.
 
+mod bias_variation;
 mod evidence;
 mod explanation;
 mod terms_on;
-mod unseen;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -20,11 +20,11 @@ use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
 use crate::calibration::problem::Problem;
 use crate::calibration::reduction::Posterior;
 use crate::statistics::FALSE_ALARM;
+pub use bias_variation::{bias_variation, biases_may_vary};
 use evidence::ln_survival;
-pub use explanation::LeftOff;
+pub use explanation::UnmodelledEffect;
 use explanation::{Explanation, seen_and_left_off};
 use terms_on::TermsOn;
-pub use unseen::{biases_may_vary, unseen_variation};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,7 +53,7 @@ pub struct ErrorTermTest {
     pub with: f64,
     /// What leaving it off may have done to the estimate; absent if it is on, or not constant.
     #[serde(skip)]
-    pub left_off: Option<LeftOff>,
+    pub left_off: Option<UnmodelledEffect>,
 }
 
 /// Test result for an error term that is off.

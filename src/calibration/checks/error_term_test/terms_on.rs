@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::evidence::Evidence;
-use super::explanation::{Explanation, LeftOff};
+use super::explanation::{Explanation, UnmodelledEffect};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::model::Model;
 use crate::calibration::outcome::Outcome;
@@ -66,7 +66,7 @@ impl<'a> TermsOn<'a> {
     }
 
     /// What a term that is off changes the parameters by; absent if the reduction does not have it.
-    pub fn left_off(&self, term: ErrorTerm) -> Option<LeftOff> {
+    pub fn left_off(&self, term: ErrorTerm) -> Option<UnmodelledEffect> {
         let (own, of) = (self.prior(self.model), self.of(term));
         let mut usual_model = self.model.clone();
         usual_model.switch_on(term);
@@ -79,7 +79,7 @@ impl<'a> TermsOn<'a> {
             let change = self.reduction.posterior(&there).ok()?.parameters - self.own.parameters;
             squares += change.component_mul(&change);
         }
-        (!of.is_empty()).then(|| LeftOff {
+        (!of.is_empty()).then(|| UnmodelledEffect {
             usual: squares.map(f64::sqrt),
             shown: shown.map(|variance| variance.max(0.0).sqrt()),
         })

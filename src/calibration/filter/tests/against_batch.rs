@@ -1,7 +1,7 @@
 //! The filter against batch least squares on the same linear problem.
 
 use super::batch::batch_estimate;
-use crate::calibration::iterations::UNWATCHED;
+use crate::calibration::gauss_newton::UNWATCHED;
 use crate::calibration::{NoisePolicy, Options, Outcome, PARAMETERS, Problem, estimate};
 use crate::imu::InstallationForm;
 use crate::run::Run;

@@ -287,7 +287,7 @@ struct Open<'a> {
     scalars: Vec<ScalarInnovation>,
 }
 
-impl Observer for Open<'_> {
+impl ObservationJudge for Open<'_> {
     fn variance(&self, seen: &Seen) -> f64 {
         self.stretch
             .observation_variance(self.model, seen.kind, seen.readings)
@@ -354,7 +354,7 @@ struct Without<'a> {
     number: usize,
 }
 
-impl Observer for Without<'_> {
+impl ObservationJudge for Without<'_> {
     fn variance(&self, seen: &Seen) -> f64 {
         self.open.variance(seen)
     }
@@ -374,7 +374,7 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
     let problem = Problem::new(&run, &Options::default());
     let (model, stretch) = (&problem.model, &problem.stretches()[0]);
     let triads = crate::calibration::from_vector(model.form, &model.prior_mean);
-    let mut shared = Dwells::of(&filter());
+    let mut shared = DwellFilters::of(&filter());
     let attitudes = [Vector3::zeros(), Vector3::new(0.3, -1.0, 2.0)].map(crate::attitude::exp);
     for (attitude, left_out) in attitudes
         .iter()
@@ -386,7 +386,7 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
         let part = segments(&stretch.steps, true).next().unwrap();
         let of = (&problem, stretch);
         let segment = Segment::navigate(&mut navigator.unwrap(), of, &part, true, attitude);
-        let through = |dwells: &mut Dwells| {
+        let through = |dwells: &mut DwellFilters| {
             let mut filter = filter();
             let open = Open {
                 stretch,
@@ -399,7 +399,10 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
             assert_eq!(taken, Taken::Whole);
             (filter.x, filter.p, observer.open.scalars)
         };
-        assert_eq!(through(&mut shared), through(&mut Dwells::of(&filter())));
+        assert_eq!(
+            through(&mut shared),
+            through(&mut DwellFilters::of(&filter()))
+        );
     }
 }
 
@@ -458,7 +461,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
             scalars: Vec::new(),
         };
         let mut other = filter.clone();
-        let mut dwells = Dwells::of(&filter);
+        let mut dwells = DwellFilters::of(&filter);
         let taken = dwells.take_in(&mut filter, &segment, &mut open);
         assert_eq!(taken, Taken::Whole);
         let scalars = other.step_by_step(&segment, &open);

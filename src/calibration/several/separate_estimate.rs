@@ -9,7 +9,7 @@ use crate::imu::{PerSensor, ThermalState};
 
 /// What a recording alone says.
 #[derive(Debug, Clone)]
-pub struct Alone {
+pub struct SeparateEstimate {
     /// Its name.
     pub name: String,
     /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
@@ -28,7 +28,7 @@ pub struct Alone {
     pub(in crate::calibration) initial_attitudes: Vec<Matrix3<f64>>,
 }
 
-impl Alone {
+impl SeparateEstimate {
     /// Mean temperature of all axes over its dwells, °C.
     pub fn mean_temperature(&self) -> Option<f64> {
         let PerSensor { gyro, accel } = self.temperature?;

@@ -1,10 +1,10 @@
 //! A part of a dwell at once.
 
 use super::Filter;
-use super::at_rest::Map;
-use super::courses::Courses;
-use super::local::{Local, Observed, Outcome};
+use super::dwell_filter::{DwellFilter, Observed, Outcome};
+use super::gain_cache::GainCache;
 use super::measurement::ScalarInnovation;
+use super::step_at_rest::Map;
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::segment::{Seen, Segment, Standing};
@@ -27,18 +27,18 @@ pub struct Innovations {
 }
 
 /// Who decides on innovations, and what variance the observations have.
-pub trait Observer {
+pub trait ObservationJudge {
     /// Of each component.
     fn variance(&self, seen: &Seen) -> f64;
     fn judge(&mut self, innovations: Innovations) -> Verdict;
 
     /// Whether verdicts are known: innovations are not worked out then.
-    fn knows(&self) -> bool {
+    fn verdicts_are_known(&self) -> bool {
         false
     }
 
     /// The verdict that is known on the next observation.
-    fn foregone(&mut self) -> Verdict {
+    fn known_verdict(&mut self) -> Verdict {
         Verdict::Accepted
     }
 }
@@ -54,27 +54,27 @@ pub enum Taken {
 
 impl Filter {
     /// Takes in a part of a dwell.
-    pub fn stand<const M: usize, const G: usize>(
+    pub fn update_dwell<const M: usize, const G: usize>(
         &mut self,
         segment: &Segment,
-        courses: &mut Courses<M, G>,
-        observer: &mut impl Observer,
+        gains: &mut GainCache<M, G>,
+        observer: &mut impl ObservationJudge,
     ) -> Taken {
         let Some(first) = segment.models.first() else {
             return Taken::Whole;
         };
         let moving = self.moving();
         let map = self.map(segment, first, &moving, G);
-        courses.tidy();
-        let models = self.models(segment, courses);
+        gains.tidy();
+        let models = self.models(segment, gains);
         let across = &map.given.states * &self.p;
-        let given = (!observer.knows()).then(|| self.given(&map.given, &across));
-        let mut local = Local::new(given, courses);
-        match self.through(&mut local, (segment, &models), observer) {
+        let given = (!observer.verdicts_are_known()).then(|| self.given(&map.given, &across));
+        let mut dwell = DwellFilter::new(given, gains);
+        match self.through(&mut dwell, (segment, &models), observer) {
             Taken::Whole => {}
             other => return other,
         }
-        let outcome = local.outcome();
+        let outcome = dwell.outcome();
         if let Some(columns) = &mut self.columns {
             columns.squares += outcome.squares;
             columns.log_determinant += outcome.log_determinant;
@@ -92,20 +92,20 @@ impl Filter {
     fn models<const M: usize, const G: usize>(
         &self,
         segment: &Segment,
-        courses: &mut Courses<M, G>,
+        gains: &mut GainCache<M, G>,
     ) -> Vec<usize> {
         let moving = self.moving();
         let models = segment.models.iter();
-        let numbers = models.map(|block| courses.number(self.step_model(block, &moving)));
+        let numbers = models.map(|block| gains.number(self.step_model(block, &moving)));
         numbers.collect()
     }
 
     /// A filter of a part alone through all of it, given the numbers of its models.
     fn through<const M: usize, const G: usize>(
         &self,
-        local: &mut Local<M, G>,
+        dwell: &mut DwellFilter<M, G>,
         (segment, models): (&Segment, &[usize]),
-        observer: &mut impl Observer,
+        observer: &mut impl ObservationJudge,
     ) -> Taken {
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
         for step in &segment.steps {
@@ -119,10 +119,10 @@ impl Filter {
             let errors = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(*referred);
             for (first, by) in errors.chain(turned) {
                 for axis in 0..3 {
-                    local.refer(first + axis, by[axis]);
+                    dwell.refer(first + axis, by[axis]);
                 }
             }
-            local.propagate(models[*model]);
+            dwell.propagate(models[*model]);
             for seen in &segment.seen[seen.clone()] {
                 let state = match seen.kind {
                     Observation::Velocity => VELOCITY,
@@ -134,23 +134,23 @@ impl Filter {
                     residual: seen.residual,
                     variance: observer.variance(seen),
                 };
-                if observer.knows() {
-                    let accepted = observer.foregone() == Verdict::Accepted;
-                    if accepted && local.tell(&observed).is_none() {
+                if observer.verdicts_are_known() {
+                    let accepted = observer.known_verdict() == Verdict::Accepted;
+                    if accepted && dwell.update_unjudged(&observed).is_none() {
                         return Taken::Diverged;
                     }
                     continue;
                 }
-                let Some(look) = local.look(&observed) else {
+                let Some(prediction) = dwell.predict(&observed) else {
                     return Taken::Diverged;
                 };
                 let innovations = Innovations {
                     time: *time,
                     kind: seen.kind,
-                    scalars: look.scalars,
+                    scalars: prediction.scalars,
                 };
                 match observer.judge(innovations) {
-                    Verdict::Accepted => local.take(&look),
+                    Verdict::Accepted => dwell.update(&prediction),
                     Verdict::Rejected => {}
                     Verdict::Abandoned => return Taken::Abandoned,
                 }

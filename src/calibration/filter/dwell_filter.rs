@@ -10,8 +10,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::courses::{Courses, Gain};
-use super::given::{Given, Unexpected};
+use super::gain_cache::{Gain, GainCache};
+use super::input_prior::{InputPrior, Unexpected};
 use super::measurement::ScalarInnovation;
 use super::rows::{add, factor};
 
@@ -25,8 +25,8 @@ pub struct Observed {
 
 /// Navigation errors `U g + m` where `g` is given, and what is known of `g`: `M` states move, `G` is the size of
 /// `g`.
-pub struct Local<'a, const M: usize, const G: usize> {
-    courses: &'a mut Courses<M, G>,
+pub struct DwellFilter<'a, const M: usize, const G: usize> {
+    gains: &'a mut GainCache<M, G>,
     /// The point of its course where it is.
     at: usize,
     /// m
@@ -37,11 +37,11 @@ pub struct Local<'a, const M: usize, const G: usize> {
     squares: f64,
     log_determinant: f64,
     /// What is known of `g`; none where innovations are not asked for.
-    given: Option<Given<G>>,
+    given: Option<InputPrior<G>>,
 }
 
 /// An innovation, and what taking it in needs.
-pub(in crate::calibration) struct Look<const G: usize> {
+pub(in crate::calibration) struct Prediction<const G: usize> {
     /// Where taking it in leads.
     pub to: usize,
     /// Of each component, the components before it taken in.
@@ -66,11 +66,11 @@ pub(in crate::calibration) struct Outcome {
     pub covariance: DMatrix<f64>,
 }
 
-impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
-    pub fn new(given: Option<Given<G>>, courses: &'a mut Courses<M, G>) -> Self {
+impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
+    pub fn new(given: Option<InputPrior<G>>, gains: &'a mut GainCache<M, G>) -> Self {
         Self {
-            courses,
-            at: Courses::<M, G>::BEGIN,
+            gains,
+            at: GainCache::<M, G>::BEGIN,
             mean: [0.0; M],
             vector: [0.0; G],
             squares: 0.0,
@@ -85,21 +85,21 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     }
 
     pub fn propagate(&mut self, model: usize) {
-        self.at = self.courses.step(self.at, model);
+        self.at = self.gains.step(self.at, model);
         let mut mean = [0.0; M];
-        for &(row, column, phi) in &self.courses.model(model).transition {
+        for &(row, column, phi) in &self.gains.model(model).transition {
             mean[row] += phi * self.mean[column];
         }
         self.mean = mean;
     }
 
     /// The innovation of an observation; `None` if it is not finite or its covariance not positive definite.
-    // A look is half a kilobyte, which would be copied on its way out.
+    // A prediction is half a kilobyte, which would be copied on its way out.
     #[inline(always)]
-    pub fn look(&mut self, observed: &Observed) -> Option<Look<G>> {
+    pub fn predict(&mut self, observed: &Observed) -> Option<Prediction<G>> {
         let (to, residual) = self.whitened(observed)?;
-        let Gain { root, rows, .. } = self.courses.gain(to)?;
-        let unexpected = self.given.as_ref()?.look(rows, &residual)?;
+        let Gain { root, rows, .. } = self.gains.gain(to)?;
+        let unexpected = self.given.as_ref()?.predict(rows, &residual)?;
         let scalars = [0, 1, 2].map(|k| {
             let sigma = root[(k, k)] * unexpected.root[(k, k)];
             ScalarInnovation {
@@ -107,7 +107,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
                 variance: sigma.powi(2),
             }
         });
-        Some(Look {
+        Some(Prediction {
             to,
             scalars,
             residual,
@@ -123,23 +123,23 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
             residual,
             variance,
         } = *observed;
-        let to = self.courses.observe(self.at, state, variance)?;
+        let to = self.gains.observe(self.at, state, variance)?;
         let expected = Vector3::from_fn(|axis, _| self.mean[state + axis]);
-        let root = &self.courses.gain(to)?.root;
+        let root = &self.gains.gain(to)?.root;
         Some((to, root.solve_lower_triangular(&(residual - expected))?))
     }
 
     /// Takes an innovation in.
     #[inline]
-    pub fn take(&mut self, look: &Look<G>) {
-        self.add(look.to, &look.residual);
+    pub fn update(&mut self, prediction: &Prediction<G>) {
+        self.add(prediction.to, &prediction.residual);
         if let Some(given) = &mut self.given {
-            given.take(&look.unexpected);
+            given.update(&prediction.unexpected);
         }
     }
 
-    /// Takes an observation in without asking for its innovation; `None` as of [`Self::look`].
-    pub fn tell(&mut self, observed: &Observed) -> Option<()> {
+    /// Takes an observation in without asking for its innovation; `None` as of [`Self::predict`].
+    pub fn update_unjudged(&mut self, observed: &Observed) -> Option<()> {
         let (to, residual) = self.whitened(observed)?;
         self.add(to, &residual);
         Some(())
@@ -149,7 +149,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     fn add(&mut self, to: usize, residual: &Vector3<f64>) {
         self.at = to;
         self.squares += residual.norm_squared();
-        if let Some(gain) = self.courses.gain(to) {
+        if let Some(gain) = self.gains.gain(to) {
             self.log_determinant += gain.log_determinant;
             for k in 0..3 {
                 add(&mut self.mean, residual[k], &gain.of_errors[k]);
@@ -159,7 +159,7 @@ impl<'a, const M: usize, const G: usize> Local<'a, M, G> {
     }
 
     pub fn outcome(self) -> Outcome {
-        let known = self.courses.known(self.at);
+        let known = self.gains.known(self.at);
         let rows = factor(known.information, self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         let values = DVector::from_vec(values);

@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::Filter;
-use super::courses::StepModel;
-use super::given::Given;
+use super::gain_cache::StepModel;
+use super::input_prior::InputPrior;
 use super::linear::Linear;
 use crate::calibration::layout::{ATTITUDE, Constant, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::segment::Segment;
@@ -102,10 +102,10 @@ impl Filter {
     }
 
     /// What is known of `g` before, given its covariance with all states.
-    pub fn given<const G: usize>(&self, rows: &Linear, across: &DMatrix<f64>) -> Given<G> {
+    pub fn given<const G: usize>(&self, rows: &Linear, across: &DMatrix<f64>) -> InputPrior<G> {
         let mean = &rows.states * &self.x;
         let covariance = across * rows.states.transpose();
-        Given::new(
+        InputPrior::new(
             std::array::from_fn(|i| mean[i]),
             std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
         )

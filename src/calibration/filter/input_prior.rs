@@ -7,7 +7,7 @@ use super::rows::{add, dot, factor, whiten};
 /// Mean of constants `g` and a root S of their covariance, `S Sᵀ`: what is known of `g` may shrink by twelve
 /// orders of magnitude from one observation to the next, and a root keeps twice the digits (Bierman 1977,
 /// *Factorization Methods for Discrete Sequential Estimation*, §II).
-pub struct Given<const G: usize> {
+pub struct InputPrior<const G: usize> {
     mean: [f64; G],
     /// S, row by row.
     root: [[f64; G]; G],
@@ -23,7 +23,7 @@ pub struct Unexpected<const G: usize> {
     by_root: [[f64; G]; 3],
 }
 
-impl<const G: usize> Given<G> {
+impl<const G: usize> InputPrior<G> {
     pub fn new(mean: [f64; G], covariance: [[f64; G]; G]) -> Self {
         let mut root = [[0.0; G]; G];
         for (k, (_, column, _)) in factor(covariance, [0.0; G]).enumerate() {
@@ -36,7 +36,7 @@ impl<const G: usize> Given<G> {
 
     /// What of three independent scalars of σ 1, rows H of `g`, is not expected; `None` if that is not finite.
     #[inline]
-    pub fn look(&self, rows: &[[f64; G]; 3], scalars: &Vector3<f64>) -> Option<Unexpected<G>> {
+    pub fn predict(&self, rows: &[[f64; G]; 3], scalars: &Vector3<f64>) -> Option<Unexpected<G>> {
         let mut by_root = [[0.0; G]; 3];
         for (by_root, row) in by_root.iter_mut().zip(rows) {
             for (weight, of_component) in row.iter().zip(&self.root) {
@@ -58,7 +58,7 @@ impl<const G: usize> Given<G> {
     /// Takes it in: Potter's form of three scalars at once, `S − S Bᵀ L⁻ᵀ (L + 1)⁻¹ B` (Andrews 1968, "A square
     /// root formulation of the Kalman covariance equations", AIAA Journal 6(6)).
     #[inline]
-    pub fn take(&mut self, unexpected: &Unexpected<G>) {
+    pub fn update(&mut self, unexpected: &Unexpected<G>) {
         let Unexpected {
             whitened,
             root,

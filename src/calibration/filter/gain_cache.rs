@@ -21,7 +21,7 @@ pub struct StepModel<const M: usize> {
 }
 
 /// Courses that parts of dwells have taken: a tree, from where all begin.
-pub struct Courses<const M: usize, const G: usize> {
+pub struct GainCache<const M: usize, const G: usize> {
     models: Vec<StepModel<M>>,
     points: Vec<Point>,
     gains: Vec<Gain<M, G>>,
@@ -75,7 +75,7 @@ pub struct Known<const M: usize, const G: usize> {
 /// So many bytes are kept before a part begins: those of some ten courses.
 const MOST: usize = 1 << 23;
 
-impl<const M: usize, const G: usize> Courses<M, G> {
+impl<const M: usize, const G: usize> GainCache<M, G> {
     /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
     pub const BEGIN: usize = 0;
 
@@ -246,26 +246,26 @@ impl<const M: usize, const G: usize> Known<M, G> {
 mod tests {
     use super::*;
 
-    fn courses() -> Courses<9, 12> {
+    fn gains() -> GainCache<9, 12> {
         let begins = [0, 1, 2, 3, 4, 5].map(Some);
-        let mut courses = Courses::new(std::array::from_fn(|k| begins.get(k).copied().flatten()));
+        let mut gains = GainCache::new(std::array::from_fn(|k| begins.get(k).copied().flatten()));
         let mut noise = [[0.0; 9]; 9];
         (0..9).for_each(|k| noise[k][k] = 1.0 + k as f64);
         let mut transition: Vec<_> = (0..9).map(|k| (k, k, 1.0)).collect();
         transition.extend([(3, 1, -0.98), (4, 0, 0.98)]);
-        courses.number(StepModel {
+        gains.number(StepModel {
             noise,
             transition,
             driven: vec![(0, 6, 0.1), (3, 9, 0.1)],
         });
-        courses
+        gains
     }
 
     /// Through a step and an observation so many times; where each observation leads.
-    fn go(courses: &mut Courses<9, 12>, mut at: usize, times: usize, variance: f64) -> Vec<usize> {
+    fn go(gains: &mut GainCache<9, 12>, mut at: usize, times: usize, variance: f64) -> Vec<usize> {
         let each = (0..times).map(|_| {
-            let stepped = courses.step(at, 0);
-            at = courses
+            let stepped = gains.step(at, 0);
+            at = gains
                 .observe(stepped, 3, variance)
                 .expect("it is positive definite");
             at
@@ -275,23 +275,20 @@ mod tests {
 
     #[test]
     fn what_is_known_is_the_same_whichever_course_came_before() {
-        let mut shared = courses();
-        let begin = Courses::<9, 12>::BEGIN;
+        let mut shared = gains();
+        let begin = GainCache::<9, 12>::BEGIN;
         // One course, one that branches off it, and the first again.
         for variances in [
             [(10, 0.5), (5, 0.5)],
             [(10, 0.5), (5, 2.0)],
             [(15, 0.5), (0, 0.0)],
         ] {
-            let along = |courses: &mut Courses<9, 12>| {
+            let along = |gains: &mut GainCache<9, 12>| {
                 variances.iter().fold(begin, |at, &(times, variance)| {
-                    go(courses, at, times, variance)
-                        .last()
-                        .copied()
-                        .unwrap_or(at)
+                    go(gains, at, times, variance).last().copied().unwrap_or(at)
                 })
             };
-            let mut alone = courses();
+            let mut alone = gains();
             let (point, at) = (along(&mut shared), along(&mut alone));
             let (shared, alone) = (shared.known(point), alone.known(at));
             assert_eq!(shared.of_given, alone.of_given);

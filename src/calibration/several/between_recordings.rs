@@ -2,8 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::alone::Alone;
 use super::day_to_day::DayToDay;
+use super::separate_estimate::SeparateEstimate;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::recordings::{RecordingDifference, recordings_differ};
 use crate::calibration::estimate::Estimate;
@@ -33,15 +33,15 @@ const SETTLED: f64 = 1e-2;
 /// Source: Patterson and Thompson 1971, "Recovery of inter-block information when block sizes are unequal",
 /// Biometrika 58(3), for the likelihood; Henderson 1975, "Best linear unbiased estimation and prediction under a
 /// selection model", Biometrics 31(2), for its normal equations.
-pub fn learnt(model: &Model, alone: &[Alone]) -> Option<(DayToDay, Finding)> {
-    let said = Said::new(model, alone)?;
-    let limit = chi_square_limit(1.0, FALSE_ALARM / said.groups.len() as f64);
-    let found = said.found(limit)?;
+pub fn learnt(model: &Model, alone: &[SeparateEstimate]) -> Option<(DayToDay, Finding)> {
+    let evidence = RecordingsEvidence::new(model, alone)?;
+    let limit = chi_square_limit(1.0, FALSE_ALARM / evidence.groups.len() as f64);
+    let found = evidence.found(limit)?;
     let mut day_to_day = model.day_to_day;
     let differences = found
         .into_iter()
         .map(
-            |Found {
+            |GroupDifference {
                  group,
                  variance,
                  ratio,
@@ -67,14 +67,14 @@ pub fn learnt(model: &Model, alone: &[Alone]) -> Option<(DayToDay, Finding)> {
 }
 
 /// A group whose parameters differ by this variance beyond what is stated.
-struct Found {
+struct GroupDifference {
     group: Group,
     variance: f64,
     ratio: f64,
 }
 
 /// What one recording says beyond its prior, along the directions of which it says more than that.
-struct Says {
+struct RecordingEvidence {
     /// Each with an error of 1σ …
     values: DVector<f64>,
     /// … of its own parameters, in prior σ: a row for each value …
@@ -84,8 +84,8 @@ struct Says {
 }
 
 /// What all recordings say of the parameters that are estimated.
-struct Said {
-    recordings: Vec<Says>,
+struct RecordingsEvidence {
+    recordings: Vec<RecordingEvidence>,
     /// Of each parameter: the group's place, and the prior variance.
     parameters: Vec<(usize, f64)>,
     groups: Vec<Group>,
@@ -101,7 +101,7 @@ struct Likelihood {
     slopes: Vec<f64>,
 }
 
-impl Says {
+impl RecordingEvidence {
     /// Where `common` takes what all have in common to the parameters at the recording's temperature. `None` where
     /// the recording says nothing beyond its prior.
     fn new(
@@ -157,9 +157,9 @@ fn common(
     common
 }
 
-impl Said {
+impl RecordingsEvidence {
     /// `None` where too few recordings say anything.
-    fn new(model: &Model, alone: &[Alone]) -> Option<Self> {
+    fn new(model: &Model, alone: &[SeparateEstimate]) -> Option<Self> {
         let groups: Vec<Group> = Group::all().collect();
         let indices: Vec<usize> = groups
             .iter()
@@ -182,7 +182,7 @@ impl Said {
             let common = common(model, &indices, state, functions);
             let (off, covariance) = in_prior_sigma(estimate, model, &indices);
             widest.zip_apply(&off, |widest, off| *widest = widest.max(off.abs()));
-            recordings.extend(Says::new((&off, covariance), &common));
+            recordings.extend(RecordingEvidence::new((&off, covariance), &common));
         }
         let own = model.day_to_day;
         let own = own.covariance(&from_vector(model.form, &model.prior_mean));
@@ -218,14 +218,14 @@ impl Said {
         let mut right = DVector::zeros(self.prior.len());
         let mut deviance = 0.0;
         let mut whitened = Vec::with_capacity(self.recordings.len());
-        for says in &self.recordings {
-            let m = says.values.len();
+        for evidence in &self.recordings {
+            let m = evidence.values.len();
             let covariance =
-                DMatrix::identity(m, m) + &says.by_own * &own * says.by_own.transpose();
+                DMatrix::identity(m, m) + &evidence.by_own * &own * evidence.by_own.transpose();
             let root = covariance.cholesky()?.unpack();
             let by = |of: &DMatrix<f64>| root.solve_lower_triangular(of);
-            let (by_own, by_common) = (by(&says.by_own)?, by(&says.by_common)?);
-            let values = root.solve_lower_triangular(&says.values)?;
+            let (by_own, by_common) = (by(&evidence.by_own)?, by(&evidence.by_common)?);
+            let values = root.solve_lower_triangular(&evidence.values)?;
             deviance += 2.0 * root.diagonal().map(f64::ln).sum() + values.norm_squared();
             information += by_common.tr_mul(&by_common);
             right += by_common.tr_mul(&values);
@@ -274,7 +274,7 @@ impl Said {
     }
 
     /// The groups whose variance the data call for beyond this likelihood ratio; `None` where there are none.
-    fn found(&self, limit: f64) -> Option<Vec<Found>> {
+    fn found(&self, limit: f64) -> Option<Vec<GroupDifference>> {
         let mut variances = vec![0.0; self.groups.len()];
         let deviance = |variances: &[f64]| self.likelihood(variances).map(|of| of.deviance);
         // What −2 ln of the likelihood loses by a group, the others' variances held.
@@ -312,9 +312,9 @@ impl Said {
             }
         }
         let found = (0..variances.len()).filter(|&group| variances[group] > 0.0);
-        let found: Vec<Found> = found
+        let found: Vec<GroupDifference> = found
             .filter_map(|group| {
-                Some(Found {
+                Some(GroupDifference {
                     group: self.groups[group],
                     variance: variances[group],
                     ratio: ratio(group, &variances)?,
@@ -355,7 +355,7 @@ mod tests {
 
     /// Ten parameters of one group in eight recordings with a linear change, each alone known to 1 or, of the first
     /// recording, only the sum of each two; that differ by `sigma`.
-    fn drawn(sigma: f64, seed: u64) -> Said {
+    fn drawn(sigma: f64, seed: u64) -> RecordingsEvidence {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let mut unit = || -> f64 { StandardNormal.sample(&mut rng) };
         let (n, by) = (10, |a: usize| a as f64 / 4.0 - 1.0);
@@ -372,14 +372,14 @@ mod tests {
                 };
                 let mut common = DMatrix::identity(n, 2 * n);
                 common.view_mut((0, n), (n, n)).fill_diagonal(by(a));
-                Says {
+                RecordingEvidence {
                     values: &by_own * own + normal(1.0).rows(0, by_own.nrows()),
                     by_common: &by_own * common,
                     by_own,
                 }
             })
             .collect();
-        Said {
+        RecordingsEvidence {
             recordings,
             parameters: vec![(0, PRIOR.powi(2)); n],
             groups: Group::all().take(1).collect(),
@@ -390,8 +390,8 @@ mod tests {
 
     #[test]
     fn the_slope_of_the_likelihood_is_its_derivative() {
-        let said = drawn(2.0, 1);
-        let at = |variance: f64| said.likelihood(&[variance]).unwrap();
+        let evidence = drawn(2.0, 1);
+        let at = |variance: f64| evidence.likelihood(&[variance]).unwrap();
         let numeric = (at(2.0 + 1e-4).deviance - at(2.0 - 1e-4).deviance) / 2e-4;
         assert!((at(2.0).slopes[0] / numeric - 1.0).abs() < 1e-6);
     }
@@ -425,13 +425,13 @@ mod tests {
         // It saw the sum of two parameters of which the first is 3 prior σ off, and shares it by their prior.
         let covariance =
             DMatrix::from_row_slice(2, 2, &[0.5, -0.5, -0.5, 0.5]) + DMatrix::identity(2, 2) * 1e-6;
-        let says = Says::new(
+        let evidence = RecordingEvidence::new(
             (&DVector::from_vec(vec![1.5, 1.5]), covariance),
             &DMatrix::identity(2, 2),
         )
         .unwrap();
-        assert_eq!(says.values.len(), 1);
-        let off = (&says.by_own * DVector::from_vec(vec![3.0, 0.0]) - &says.values)[0];
+        assert_eq!(evidence.values.len(), 1);
+        let off = (&evidence.by_own * DVector::from_vec(vec![3.0, 0.0]) - &evidence.values)[0];
         assert!(off.abs() < 0.01, "{off}");
     }
 }

@@ -37,7 +37,7 @@ const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 ///
 /// # Errors
 /// [`CalibrationError`] where the problem is not the one of the outcome.
-pub fn unseen_variation(
+pub fn bias_variation(
     problem: &Problem,
     outcome: &Outcome,
     tests: &[ErrorTermTest],

@@ -1,0 +1,50 @@
+//! Filters of parts of dwells, by how many states move in them.
+
+use super::Filter;
+use super::dwell_update::{ObservationJudge, Taken};
+use super::gain_cache::GainCache;
+use super::step_at_rest::begins;
+use crate::calibration::record::segment::Segment;
+
+/// Takes parts of dwells into filters of one kind: what moves in them is always the same.
+pub struct DwellFilters(Moving);
+
+/// What moves.
+enum Moving {
+    /// Navigation errors alone.
+    Navigation(GainCache<9, 12>),
+    /// And the turn at rest, or the biases of a triad.
+    Three(GainCache<12, 15>),
+    /// And two of these.
+    Six(GainCache<15, 18>),
+    /// And all of them.
+    Nine(GainCache<18, 21>),
+}
+
+impl DwellFilters {
+    /// Of filters like this.
+    pub fn of(filter: &Filter) -> Self {
+        let moving = filter.moving();
+        Self(match moving.len() {
+            9 => Moving::Navigation(GainCache::new(begins(&moving))),
+            12 => Moving::Three(GainCache::new(begins(&moving))),
+            15 => Moving::Six(GainCache::new(begins(&moving))),
+            _ => Moving::Nine(GainCache::new(begins(&moving))),
+        })
+    }
+
+    /// Takes in a part of a dwell.
+    pub fn take_in(
+        &mut self,
+        filter: &mut Filter,
+        segment: &Segment,
+        observer: &mut impl ObservationJudge,
+    ) -> Taken {
+        match &mut self.0 {
+            Moving::Navigation(gains) => filter.update_dwell(segment, gains, observer),
+            Moving::Three(gains) => filter.update_dwell(segment, gains, observer),
+            Moving::Six(gains) => filter.update_dwell(segment, gains, observer),
+            Moving::Nine(gains) => filter.update_dwell(segment, gains, observer),
+        }
+    }
+}
