@@ -86,7 +86,7 @@ pub fn iterate(
         let same_data = before.as_ref().is_some_and(|last| same_data(last, &result));
         let settled = summary.largest_step <= problem.options.converged_sigma
             && (decided || same_data || (before.is_none() && summary.rejected == 0));
-        let doubtful = !given && beyond(&result, problem.gate()) > MOST_OUTLIERS;
+        let doubtful = !given && beyond(&result, problem.gate_limit()) > MOST_OUTLIERS;
         let finished = settled && (gate == Gate::Open || !doubtful);
         if finished || passes.len() >= most {
             return Ok(Iterated::ended(result, settled));

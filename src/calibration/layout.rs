@@ -261,7 +261,7 @@ impl Layout {
         match state {
             VELOCITY..NAVIGATION => BudgetSource::Place,
             _ if within(self.table_position()) => BudgetSource::TablePosition,
-            _ if within(self.turn_at_rest()) => BudgetSource::Turning,
+            _ if within(self.turn_at_rest()) => BudgetSource::RotationAtRest,
             _ if self.gravity() == Some(state) => BudgetSource::Gravity,
             _ if self.own().any(|(own, _)| own == state) => BudgetSource::Recording,
             _ => BudgetSource::InitialAttitude,

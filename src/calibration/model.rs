@@ -47,7 +47,7 @@ pub struct Model {
     pub motion_noise: PerSensor<MotionNoise>,
     /// White 1σ at standstill of what each triad's output adds up to, attitude in rad and velocity in m/s;
     /// none: in each stretch what its run states or shows.
-    pub stillness: PerSensor<Option<f64>>,
+    pub standstill_sigma: PerSensor<Option<f64>>,
     /// How the body turns where it should not, in dwells without a table: 1σ density of a random walk,
     /// rad/√s. Gyros sense it, so it is none of their noise.
     pub turning_at_rest: f64,
@@ -85,7 +85,7 @@ impl Model {
             prior_sigma: ParameterVector::zeros(),
             noise: run.instrument.noise,
             motion_noise: run.instrument.motion_noise,
-            stillness: PerSensor::default(),
+            standstill_sigma: PerSensor::default(),
             turning_at_rest: run.standstill.turning,
             term_sigma: run.instrument.term_sigma,
             thermal: None,
@@ -128,9 +128,13 @@ impl Model {
     }
 
     /// Sets the variance at standstill over the least that is ever taken, rad² or m²/s².
-    pub(in crate::calibration) fn set_unrest(&mut self, sensor: Sensor, variance: f64) {
+    pub(in crate::calibration) fn set_standstill_variance(
+        &mut self,
+        sensor: Sensor,
+        variance: f64,
+    ) {
         let sigma = (variance + FLOOR.get(sensor).powi(2)).sqrt();
-        *self.stillness.get_mut(sensor) = Some(sigma);
+        *self.standstill_sigma.get_mut(sensor) = Some(sigma);
     }
 
     /// The same with the noise of another model.
@@ -138,7 +142,7 @@ impl Model {
         Self {
             noise: other.noise,
             motion_noise: other.motion_noise,
-            stillness: other.stillness,
+            standstill_sigma: other.standstill_sigma,
             turning_at_rest: other.turning_at_rest,
             position_sigma: other.position_sigma,
             reading_sigma: other.reading_sigma,

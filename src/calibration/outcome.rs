@@ -36,7 +36,7 @@ pub struct Outcome {
     pub covariance_by_noise: ParameterMatrix,
     /// What the covariance of the estimate has beside that, each part by what it is of; see
     /// [`crate::calibration::Solution::assess`] for those that come later.
-    pub beside: BTreeMap<BudgetSource, ParameterMatrix>,
+    pub covariance_parts: BTreeMap<BudgetSource, ParameterMatrix>,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
     /// Mean of every parameter before the run.
@@ -161,13 +161,16 @@ impl Outcome {
 
     /// A part of the covariance of the estimate that no pass knows of; zero where there is none of it.
     pub fn part(&self, source: BudgetSource) -> ParameterMatrix {
-        self.beside.get(&source).copied().unwrap_or_default()
+        self.covariance_parts
+            .get(&source)
+            .copied()
+            .unwrap_or_default()
     }
 
     /// Adds such a part to the covariance of the estimate, in the place of what it had of it.
     pub(in crate::calibration) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
         self.estimate.covariance += part - self.part(source);
-        self.beside.insert(source, part);
+        self.covariance_parts.insert(source, part);
     }
 
     /// How many times larger the σ of a parameter are, at most, for such a part.

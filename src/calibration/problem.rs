@@ -11,7 +11,7 @@ use super::options::Options;
 use crate::attitude::to_tilt_and_heading;
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::record::schedule::{Step, first_reading, steps};
-use crate::calibration::record::standstill::{FLOOR, stillness};
+use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Run};
@@ -48,7 +48,7 @@ pub struct Stretch<'a> {
     pub steps: Vec<Step>,
     pub variance: Variance,
     /// White 1σ at standstill as the run states or shows it: attitude in rad, velocity in m/s.
-    pub stillness: PerSensor<f64>,
+    pub standstill_sigma: PerSensor<f64>,
 }
 
 /// Variance of each observation per axis.
@@ -152,10 +152,10 @@ impl<'a> Problem<'a> {
                 run,
                 table,
                 recording,
-                stillness,
+                standstill_sigma,
                 ..
             } = *stretch;
-            Stretch::new(run, table, recording, dwells, stillness)
+            Stretch::new(run, table, recording, dwells, standstill_sigma)
         });
         Self {
             stretches: stretches.collect(),
@@ -181,16 +181,16 @@ impl<'a> Problem<'a> {
     }
 
     /// White 1σ at standstill in the first stretch, of attitude in rad (gyros) or velocity in m/s.
-    pub(in crate::calibration) fn stillness(&self, sensor: Sensor) -> f64 {
+    pub(in crate::calibration) fn standstill_sigma(&self, sensor: Sensor) -> f64 {
         let first = self.stretches.first();
-        first.map_or(0.0, |stretch| stretch.stillness(&self.model, sensor))
+        first.map_or(0.0, |stretch| stretch.standstill_sigma(&self.model, sensor))
     }
 
     /// Variance at standstill over the least that is ever taken, of attitude in rad² (gyros) or velocity in
     /// m²/s²; of several stretches the mean.
-    pub(in crate::calibration) fn unrest(&self, sensor: Sensor) -> f64 {
+    pub(in crate::calibration) fn standstill_variance(&self, sensor: Sensor) -> f64 {
         let of = |stretch: &Stretch| {
-            let sigma = stretch.stillness(&self.model, sensor);
+            let sigma = stretch.standstill_sigma(&self.model, sensor);
             (sigma.powi(2) - FLOOR.get(sensor).powi(2)).max(0.0)
         };
         let sum: f64 = self.stretches.iter().map(of).sum();
@@ -259,7 +259,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Squared whitened innovation of three components beyond which an observation is an outlier.
-    pub(in crate::calibration) fn gate(&self) -> f64 {
+    pub(in crate::calibration) fn gate_limit(&self) -> f64 {
         let steps = self.stretches.iter().flat_map(|stretch| &stretch.steps);
         let observations: usize = steps.map(|step| self.observed(step).count()).sum();
         let of_each = self.options.false_rejection / observations.max(1) as f64;
@@ -273,7 +273,7 @@ impl<'a> Stretch<'a> {
         table: Option<&'a TableLog>,
         recording: usize,
         dwells: Vec<Dwell>,
-        stillness: PerSensor<f64>,
+        standstill_sigma: PerSensor<f64>,
     ) -> Self {
         let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
         let PerSensor { gyro, accel } = run.recording.imu.pulse;
@@ -288,7 +288,7 @@ impl<'a> Stretch<'a> {
             table,
             recording,
             dwells,
-            stillness,
+            standstill_sigma,
         }
     }
 
@@ -318,7 +318,7 @@ impl<'a> Stretch<'a> {
     }
 
     fn at_rest(&self, model: &Model, sensor: Sensor, pulses: f64) -> f64 {
-        let still = self.stillness(model, sensor).powi(2);
+        let still = self.standstill_sigma(model, sensor).powi(2);
         still * model.weight(BudgetSource::at_rest(sensor))
             + pulses * model.weight(BudgetSource::Pulses)
     }
@@ -329,9 +329,9 @@ impl<'a> Stretch<'a> {
     }
 
     /// White 1σ at standstill that the filter uses, of attitude in rad (gyros) or velocity in m/s.
-    pub fn stillness(&self, model: &Model, sensor: Sensor) -> f64 {
-        let of_model = *model.stillness.get(sensor);
-        of_model.unwrap_or(*self.stillness.get(sensor))
+    pub fn standstill_sigma(&self, model: &Model, sensor: Sensor) -> f64 {
+        let of_model = *model.standstill_sigma.get(sensor);
+        of_model.unwrap_or(*self.standstill_sigma.get(sensor))
     }
 
     /// What the table says of the attitude at its first sample, where it says anything.
@@ -354,7 +354,7 @@ impl<'a> Stretch<'a> {
         Start {
             attitude: to_tilt_and_heading(&(prior.mean * at.transpose())),
             attitude_sigma: prior.sigma,
-            velocity_sigma: INITIAL_VELOCITY.hypot(self.stillness.accel),
+            velocity_sigma: INITIAL_VELOCITY.hypot(self.standstill_sigma.accel),
             position_sigma: self.run.standstill.position_sigma,
         }
     }
@@ -364,14 +364,14 @@ impl<'a> Stretch<'a> {
 fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'a>> {
     let table = run.observed_table(model.aiding);
     let dwells = run.dwells(model.aiding);
-    let stillness = stillness(run, &dwells);
+    let standstill_sigma = standstill_sigma(run, &dwells);
     let imu = &run.recording.imu;
     let unbroken = |before: &Dwell, after: &Dwell| {
         imu.unbroken(&(before.samples.end - 1..after.samples.start + 1))
     };
     let parts = dwells.chunk_by(unbroken);
     parts
-        .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), stillness))
+        .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), standstill_sigma))
         .collect()
 }
 
@@ -391,7 +391,7 @@ mod tests {
         let problem = Problem::new(&simulated.run, &Options::default());
         let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         let observations = solution.outcome().unwrap().innovations.len();
-        let of_each = ChiSquared::new(3.0).unwrap().sf(problem.gate());
+        let of_each = ChiSquared::new(3.0).unwrap().sf(problem.gate_limit());
         assert_relative_eq!(observations as f64 * of_each, 1e-3, max_relative = 1e-6);
     }
 }

@@ -206,7 +206,7 @@ fn outcome(
         form_test: None,
         dwell_scatter: None,
         covariance_by_noise: ParameterMatrix::zeros(),
-        beside: BTreeMap::new(),
+        covariance_parts: BTreeMap::new(),
         model: Model::new(run, &Options::default().installation(form)),
         noise: NoiseReport {
             policy: Default::default(),

@@ -38,7 +38,7 @@ impl BudgetSource {
             Self::AccelWander => &[Source::AccelGaussMarkov],
             Self::VelocityAtRest => &[Source::Velocity],
             Self::AttitudeAtRest => &[Source::Attitude],
-            Self::Turning => &[Source::Turning],
+            Self::RotationAtRest => &[Source::RotationAtRest],
             Self::TablePosition => &[Source::TablePosition],
             Self::TableReading => &[Source::TableReading],
             _ => &[],

@@ -87,7 +87,10 @@ impl Budget {
         }
         let filter: ParameterMatrix = by_source.iter().map(|(_, part)| part).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
-        let beside = outcome.beside.iter().map(|(&source, &part)| (source, part));
+        let beside = outcome
+            .covariance_parts
+            .iter()
+            .map(|(&source, &part)| (source, part));
         let parts = by_source
             .into_iter()
             .chain([(BudgetSource::Curvature, bent)])
@@ -167,7 +170,7 @@ impl Problem<'_> {
             Aiding::Table => all.insert(BudgetSource::TableReading),
             Aiding::Velocity => {
                 all.insert(BudgetSource::AttitudeAtRest);
-                all.insert(BudgetSource::Turning)
+                all.insert(BudgetSource::RotationAtRest)
             }
         };
         let bridged = |run: &Run| {

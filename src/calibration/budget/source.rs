@@ -26,7 +26,7 @@ pub enum BudgetSource {
     /// White attitude at standstill, without a table.
     AttitudeAtRest,
     /// Turning at standstill, without a table.
-    Turning,
+    RotationAtRest,
     /// Velocity at the first sample, and position in every dwell: the IMU's distance from the table's
     /// centre.
     Place,
@@ -116,7 +116,7 @@ impl BudgetSource {
             Self::Pulses => "pulses",
             Self::VelocityAtRest => "velocity at standstill",
             Self::AttitudeAtRest => "attitude at standstill",
-            Self::Turning => "turning at standstill",
+            Self::RotationAtRest => "turning at standstill",
             Self::Place => "place of the IMU",
             Self::TablePosition => "table position",
             Self::TableReading => "table reading",

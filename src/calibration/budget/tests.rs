@@ -70,7 +70,7 @@ const CHANGES: [(BudgetSource, Change); 11] = [
         m.noise.accel.gauss_markov.as_mut().unwrap().sigma *= f;
     }),
     (BudgetSource::VelocityAtRest, |m, f| {
-        *m.stillness.accel.as_mut().unwrap() *= f;
+        *m.standstill_sigma.accel.as_mut().unwrap() *= f;
     }),
     (BudgetSource::TableNorth, |m, f| m.geometry.base.z *= f),
     (BudgetSource::TableLevel, |m, f| {
@@ -91,8 +91,8 @@ fn held_against_passes(run: &Run, options: &Options) -> usize {
     let outcome = estimate(&problem, UNWATCHED).unwrap();
     let budget = Budget::new(&problem, &outcome).unwrap();
     let mut model = outcome.model.clone();
-    let at_rest = problem.stretches()[0].stillness(&model, Sensor::Accel);
-    model.stillness.accel = Some(at_rest);
+    let at_rest = problem.stretches()[0].standstill_sigma(&model, Sensor::Accel);
+    model.standstill_sigma.accel = Some(at_rest);
     let sigma = outcome.estimate.sigma();
     let parts = CHANGES.into_iter().filter_map(|(source, change)| {
         let part = budget.parts.iter().find(|part| part.source == source)?;

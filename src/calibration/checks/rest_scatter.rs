@@ -58,8 +58,8 @@ fn of_triad<'a>(
         * step.powi(2)
         * (noise.covariance_of_means(spans[0], spans[0])
             - noise.covariance_of_means(spans[0], spans[1]));
-    let stillness = run.standstill.sigma.get(sensor).unwrap_or(0.0);
-    let least = by_noise + 6.0 * stillness.powi(2);
+    let standstill_sigma = run.standstill.sigma.get(sensor).unwrap_or(0.0);
+    let least = by_noise + 6.0 * standstill_sigma.powi(2);
     let pulses = (PULSES * imu.pulse.get(sensor)).powi(2);
     let most = least + pulses * correction.norm_squared() / AXES.len() as f64;
     let (low, high) = mean_square_interval(count, FALSE_ALARM / Sensor::ALL.len() as f64);

@@ -40,7 +40,7 @@ pub struct Filter {
     p: DMatrix<f64>,
     noise: PerSensor<ProcessNoise>,
     /// Of the turn at rest alone, rad/√s.
-    turning: f64,
+    rotation_at_rest: f64,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
     day_to_day: DayToDay,
@@ -110,7 +110,8 @@ impl Filter {
             layout,
             x,
             p,
-            turning: model.turning_at_rest * model.weight(BudgetSource::Turning).sqrt(),
+            rotation_at_rest: model.turning_at_rest
+                * model.weight(BudgetSource::RotationAtRest).sqrt(),
             noise: model.process_noise(),
             varying,
             day_to_day: model.day_to_day,

@@ -95,7 +95,7 @@ impl Filter {
         let of_navigation = self.noise_of(block);
         DMatrix::from_fn(MOVING, MOVING, |row, column| {
             let alone = row == column && row >= NAVIGATION;
-            let turning = self.turning.powi(2) * block.duration;
+            let turning = self.rotation_at_rest.powi(2) * block.duration;
             of_navigation[(own(row), own(column))] + if alone { turning } else { 0.0 }
         })
     }

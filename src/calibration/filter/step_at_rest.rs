@@ -135,7 +135,7 @@ impl Filter {
                     *noise = of_navigation[(i, j)];
                 }
                 if row == column && row >= NAVIGATION && own(row).is_some() {
-                    *noise += self.turning.powi(2) * block.duration;
+                    *noise += self.rotation_at_rest.powi(2) * block.duration;
                 }
             }
         }

@@ -19,7 +19,11 @@ const SETTLED: f64 = 0.01;
 const STEPS: usize = 40;
 
 /// What a hand may add: to the attitude in moves, of either kind, and in dwells.
-pub const BY_HAND: [Source; 3] = [Source::GyroMotion, Source::GyroMoving, Source::Turning];
+pub const BY_HAND: [Source; 3] = [
+    Source::GyroMotion,
+    Source::GyroMoving,
+    Source::RotationAtRest,
+];
 
 /// How much of each of [`BY_HAND`] is in errors, where that is one in SI and radians.
 pub type Parts = [DVector<f64>; BY_HAND.len()];

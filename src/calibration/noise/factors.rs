@@ -55,7 +55,11 @@ impl Scale {
             let sigma = source.sigma(problem);
             match source {
                 // Beside a table's readings it says nothing.
-                Source::Attitude | Source::Turning if problem.model.aiding == Aiding::Table => 0.0,
+                Source::Attitude | Source::RotationAtRest
+                    if problem.model.aiding == Aiding::Table =>
+                {
+                    0.0
+                }
                 _ if source.stated(problem) => sigma.powi(2),
                 Source::GyroMotion => of_moves(Sensor::Gyro, moves.motion.gyro),
                 Source::AccelMotion => of_moves(Sensor::Accel, moves.motion.accel),
@@ -63,7 +67,7 @@ impl Scale {
                 Source::AccelMoving => of_moves(Sensor::Accel, moves.duration),
                 Source::Velocity => walk(Sensor::Accel) * step,
                 Source::Attitude => walk(Sensor::Gyro) * step,
-                Source::Turning => walk(Sensor::Gyro),
+                Source::RotationAtRest => walk(Sensor::Gyro),
                 Source::GyroGaussMarkov => over_step(walk(Sensor::Gyro)),
                 Source::AccelGaussMarkov => over_step(walk(Sensor::Accel)),
                 _ => 0.0,

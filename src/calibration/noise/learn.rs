@@ -81,7 +81,7 @@ fn with_noise<'a>(
         let at = solved.iterated.held.estimate.clone();
         let script = Script::new(&with_noise, priors, &at)?;
         let distances = script.replay(&with_noise, &accepted)?.distances;
-        let changed = regate(&mut accepted, &distances, problem.gate(), open);
+        let changed = regate(&mut accepted, &distances, problem.gate_limit(), open);
         open = false;
         let innovations = solved.iterated.held.innovations.iter().zip(&accepted);
         let decided: Vec<Innovation> = innovations

@@ -53,7 +53,7 @@ impl Source {
             Self::AccelMoving => vec![line(imu, keys(Sensor::Accel).by_duration)],
             Self::Velocity => vec![line(standstill, ("velocity_sigma_m_s", 1.0))],
             Self::Attitude => vec![line(standstill, ("attitude_sigma_arcsec", ARCSEC))],
-            Self::Turning => vec![line(standstill, ("turning_deg_per_sqrt_s", DEGREE))],
+            Self::RotationAtRest => vec![line(standstill, ("turning_deg_per_sqrt_s", DEGREE))],
             Self::TablePosition => vec![line(turntable, ("position_sigma_arcsec", ARCSEC))],
             Self::TableReading => vec![line(turntable, ("reading_sigma_arcsec", ARCSEC))],
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {

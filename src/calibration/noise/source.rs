@@ -29,7 +29,8 @@ pub enum Source {
     /// White attitude at standstill, without a table.
     Attitude,
     /// Turning where the body should stand still, without a table.
-    Turning,
+    #[serde(rename = "turning")]
+    RotationAtRest,
     /// Position error of the table.
     TablePosition,
     /// Reading of the table.
@@ -51,7 +52,7 @@ impl Source {
         Self::AccelMoving,
         Self::Velocity,
         Self::Attitude,
-        Self::Turning,
+        Self::RotationAtRest,
         Self::TablePosition,
         Self::TableReading,
         Self::GyroGaussMarkov,
@@ -69,7 +70,7 @@ impl Source {
             Self::AccelMoving => "velocity noise of moves by time",
             Self::Velocity => "velocity at standstill",
             Self::Attitude => "attitude at standstill",
-            Self::Turning => "turning at standstill",
+            Self::RotationAtRest => "turning at standstill",
             Self::TablePosition => "table position",
             Self::TableReading => "table reading",
             Self::GyroGaussMarkov => "Gauss-Markov bias of the gyros",
@@ -84,7 +85,7 @@ impl Source {
             Self::VelocityRandomWalk => ("ug/sqrt(Hz)", MICRO_G_PER_SQRT_HZ),
             // Over the root of ∫|ω|² dt in rad²/s or ∫|a|² dt in m²/s³.
             Self::GyroMotion | Self::AccelMotion => ("sqrt(s)", 1.0),
-            Self::GyroMoving | Self::Turning => ("deg/sqrt(s)", DEGREE),
+            Self::GyroMoving | Self::RotationAtRest => ("deg/sqrt(s)", DEGREE),
             Self::AccelMoving => ("mm/s/sqrt(s)", 1e-3),
             Self::Velocity => ("mm/s", 1e-3),
             Self::Attitude | Self::TablePosition | Self::TableReading => ("arcsec", ARCSEC),
@@ -137,9 +138,9 @@ impl Source {
             Self::AccelMotion => model.motion_noise.accel.by_motion,
             Self::GyroMoving => model.motion_noise.gyro.by_duration,
             Self::AccelMoving => model.motion_noise.accel.by_duration,
-            Self::Velocity => problem.unrest(Sensor::Accel).sqrt(),
-            Self::Attitude => problem.unrest(Sensor::Gyro).sqrt(),
-            Self::Turning => model.turning_at_rest,
+            Self::Velocity => problem.standstill_variance(Sensor::Accel).sqrt(),
+            Self::Attitude => problem.standstill_variance(Sensor::Gyro).sqrt(),
+            Self::RotationAtRest => model.turning_at_rest,
             Self::TablePosition => model.position_sigma,
             Self::TableReading => model.reading_sigma,
             Self::GyroGaussMarkov => gauss_markov(Sensor::Gyro),
@@ -156,9 +157,9 @@ impl Source {
             Self::AccelMotion => model.motion_noise.accel.by_motion = sigma,
             Self::GyroMoving => model.motion_noise.gyro.by_duration = sigma,
             Self::AccelMoving => model.motion_noise.accel.by_duration = sigma,
-            Self::Velocity => model.set_unrest(Sensor::Accel, sigma.powi(2)),
-            Self::Attitude => model.set_unrest(Sensor::Gyro, sigma.powi(2)),
-            Self::Turning => model.turning_at_rest = sigma,
+            Self::Velocity => model.set_standstill_variance(Sensor::Accel, sigma.powi(2)),
+            Self::Attitude => model.set_standstill_variance(Sensor::Gyro, sigma.powi(2)),
+            Self::RotationAtRest => model.turning_at_rest = sigma,
             Self::TablePosition => model.position_sigma = sigma,
             Self::TableReading => model.reading_sigma = sigma,
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {

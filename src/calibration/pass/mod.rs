@@ -52,7 +52,7 @@ pub fn pass(
         attitudes: Vec::new(),
         own: Vec::new(),
     };
-    let limit = problem.gate();
+    let limit = problem.gate_limit();
     let mut before = None;
     for (number, (stretch, prior)) in problem.stretches().iter().zip(priors).enumerate() {
         let known = match mode {

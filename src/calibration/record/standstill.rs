@@ -18,7 +18,7 @@ const SIGNIFICANT: f64 = 3.0;
 
 /// White 1σ at standstill of what each triad's output adds up to, beyond random walk and pulses: attitude
 /// in rad, velocity in m/s. As the run states it, else as its dwells show it.
-pub fn stillness(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
+pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     PerSensor::from_fn(|sensor| {
         let floor = *FLOOR.get(sensor);
         let given = run.standstill.sigma.get(sensor);
@@ -74,7 +74,7 @@ mod tests {
         for output in [Output::Pulse, Output::Increment] {
             scenario.output = output;
             let run = scenario.simulate(1, 0).unwrap().run;
-            assert_eq!(stillness(&run, &run.dwells(run.aiding())), FLOOR);
+            assert_eq!(standstill_sigma(&run, &run.dwells(run.aiding())), FLOOR);
         }
     }
 
@@ -88,7 +88,7 @@ mod tests {
             for dwell in &mut dwells {
                 dwell.samples.end = dwell.samples.start + 100;
             }
-            assert_eq!(stillness(&run, &dwells), FLOOR, "{number}");
+            assert_eq!(standstill_sigma(&run, &dwells), FLOOR, "{number}");
         }
     }
 
@@ -110,7 +110,7 @@ mod tests {
         for k in 0..run.recording.imu.accel.len() {
             run.recording.imu.accel.to_mut()[k] += velocity(k + 1) - velocity(k);
         }
-        let found = stillness(&run, &run.dwells(run.aiding())).accel;
+        let found = standstill_sigma(&run, &run.dwells(run.aiding())).accel;
         assert!((found / sigma - 1.0).abs() < 0.1, "{found}");
     }
 }

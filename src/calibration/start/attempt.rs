@@ -28,7 +28,7 @@ pub fn from_coarse_start<'a>(
     let tried = |start| (stated(problem, &start, progress), start);
     let mut best = tried(start);
     let mut headings: Vec<Heading> = Heading::of(&best.0).into_iter().collect();
-    if best.1.hidden {
+    if best.1.heading_unobserved {
         let others: Vec<_> = best.1.other_headings().into_par_iter().map(tried).collect();
         headings.extend(others.iter().filter_map(|(solved, _)| Heading::of(solved)));
         best = others.into_iter().fold(best, likelier);

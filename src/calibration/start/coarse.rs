@@ -40,7 +40,7 @@ pub struct CoarseStart {
     /// What is known of the initial attitude of each stretch.
     pub attitudes: Vec<AttitudePrior>,
     /// Whether the noise of the gyros hides Earth rate, so that the heading may be any.
-    pub hidden: bool,
+    pub heading_unobserved: bool,
     /// What a hand adds to the noise that is stated, where that was called for.
     pub(in crate::calibration) by_hand: Option<ByHand>,
 }
@@ -81,7 +81,7 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
         return Ok(CoarseStart {
             at: Linearisation::new(triads, TermVector::zeros(), means),
             attitudes,
-            hidden: false,
+            heading_unobserved: false,
             by_hand: None,
         });
     }
@@ -99,7 +99,7 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     Ok(CoarseStart {
         attitudes: attitudes.map(of_alignment).collect(),
         at,
-        hidden: heading_sigma.into_iter().any(AttitudePrior::hides),
+        heading_unobserved: heading_sigma.into_iter().any(AttitudePrior::hides),
         by_hand,
     })
 }

@@ -119,7 +119,7 @@ pub fn add_rates(
                 heading.error(&attitude.tr_mul(&turned)),
             ],
             by_hand: BY_HAND.map(|source| match source {
-                Source::Turning => by_turning,
+                Source::RotationAtRest => by_turning,
                 _ => 0.0,
             }),
             ..Rows::new(of(Sensor::Gyro, &partials), residual, own)

@@ -302,7 +302,7 @@ impl Move {
             of_after: level * attitude * (forces[1].error / forces[1].size),
             walk,
             by_hand: BY_HAND.map(|source| match source {
-                Source::Turning => held,
+                Source::RotationAtRest => held,
                 _ => level_variance(&source.alone()) - interpolated,
             }),
             variance: walk + of_gravity(before) + of_gravity(after),
