@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::gravity::{ANY_SCALE, ASKEW, CHANCE, Gravity};
+use super::gravity::{ANY_SCALE, ASKEW, Gravity};
 use super::least_squares::{Equation, Fit, cost, fit, fit_at};
 use super::motion::{PART, mean, means};
 use super::rests::{Rests, TOLERANCE};
 use crate::attitude::{exp, skew};
 use crate::imu::{AxisOrder, PerSensor};
-use crate::statistics::{chi_square_limit, median};
+use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 use crate::units::DEGREE;
 
 /// Output of one chip is straight to this part, 1σ, as data sheets of such chips state (MPU-6050, section 6.1: 0.2 %): a
@@ -251,7 +251,7 @@ fn bettered(moves: &[Move], first: f64, order: &Matrix3<f64>) -> Option<(Fit<PAR
     let gain = fit_at(one.at, &of_one, sigma, equations)
         .map(|one| cost_of(&of_one, &one.at) - cost_of(&of_several, &several.at));
     Some(match gain {
-        Some(gain) if gain < chi_square_limit(2.0, CHANCE) => (one, false),
+        Some(gain) if gain < chi_square_limit(2.0, FALSE_ALARM) => (one, false),
         _ => (several, true),
     })
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::least_squares::{Equation, Fit, cost, fit, fit_at};
 use super::motion::PART;
 use super::rests::TOLERANCE;
-use crate::statistics::{chi_square_limit, median};
+use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 /// Axes of one chip are askew by about this, 1σ.
@@ -16,8 +16,6 @@ pub(super) const ANY_SCALE: f64 = 2.0;
 const ABOUT_ZERO: f64 = 1.0 / STANDARD_GRAVITY;
 /// Zero of one that is not, 1σ, g: as good as anywhere.
 const ANYWHERE: f64 = 1e3;
-/// A simpler account is given up for one that is likelier by more than chance gives once in so many records.
-pub(super) const CHANCE: f64 = 1e-3;
 
 /// Logarithms of the scales, askewness, zero in units of the first scale.
 const PARAMETERS: usize = 9;
@@ -156,7 +154,7 @@ impl Sphere {
         };
         let gain =
             cost(&of_simple(&fit.at), sigma, &simple.prior, &fit.at) - self.cost_at(rests, sigma);
-        gain > chi_square_limit(parameters, CHANCE)
+        gain > chi_square_limit(parameters, FALSE_ALARM)
     }
 
     fn scale(&self) -> Vector3<f64> {

@@ -5,10 +5,9 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::gravity::CHANCE;
 use super::turns;
 use crate::imu::PerSensor;
-use crate::statistics::{SIGMA_OF_MEDIAN, median, student_limit};
+use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, student_limit};
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
@@ -182,7 +181,7 @@ fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     // As many samples are between as beside.
     let sigma = (2.0 * variance / (2 * BESIDE) as f64).sqrt();
     let change = mean(between) - 0.5 * (mean(before) + mean(after));
-    change.abs() > student_limit(degrees, 0.5 * CHANCE) * sigma
+    change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
 }
 
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
