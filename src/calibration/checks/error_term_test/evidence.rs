@@ -6,6 +6,9 @@ use statrs::function::gamma::ln_gamma;
 
 use crate::statistics::chi_square_limit;
 
+/// Data that take a smaller share of a prior variance show nothing but rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// What parameters explain of the data, against what they explain by chance.
 ///
 /// By chance the cost falls by `Σ w_k χ²₁`, w_k the share of the prior variance that the data take in the
@@ -26,12 +29,12 @@ impl Evidence {
     /// Of parameters with this gain and covariance, each over its σ before the data.
     pub fn new(gain: f64, over_prior: &DMatrix<f64>) -> Self {
         let taken = DMatrix::identity(over_prior.nrows(), over_prior.ncols()) - over_prior;
-        let total = taken.trace().max(0.0);
         let share = taken.symmetric_eigenvalues().max();
+        let shows = share > ROUNDING;
         Self {
             gain,
             share,
-            states: if share > 0.0 { total / share } else { 0.0 },
+            states: if shows { taken.trace() / share } else { 0.0 },
         }
     }
 
@@ -44,9 +47,12 @@ impl Evidence {
         }
     }
 
-    /// Limit of the gain that chance exceeds with this probability.
+    /// Limit of the gain that chance exceeds with this probability; infinite where the data show nothing of it.
     pub fn limit(&self, chance: f64) -> f64 {
-        self.share * chi_square_limit(self.states, chance)
+        match self.states > 0.0 {
+            true => self.share * chi_square_limit(self.states, chance),
+            false => f64::INFINITY,
+        }
     }
 }
 
@@ -102,6 +108,9 @@ mod tests {
         let covariance =
             DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[0.01, 0.5, 0.99, 0.99]));
         let evidence = Evidence::new(20.0, &covariance);
+        // Of what they do not show at all nothing is significant.
+        let unseen = DMatrix::identity(4, 4) * (1.0 - 1e-12);
+        assert_eq!(Evidence::new(0.0, &unseen).limit(0.5), f64::INFINITY);
         assert_relative_eq!(evidence.states, 1.51 / 0.99, max_relative = 1e-12);
         let chance = (-0.5 * evidence.significance()).exp();
         assert_relative_eq!(evidence.limit(chance), 20.0, max_relative = 1e-6);
