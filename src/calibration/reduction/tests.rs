@@ -1,6 +1,6 @@
 use super::*;
 use crate::calibration::pass::{Gate, Mode, PassResult, pass};
-use crate::calibration::{ErrorTerm, Options, Problem, UNWATCHED, estimate};
+use crate::calibration::{ErrorTerm, Options, Outcome, Problem, UNWATCHED, estimate};
 use crate::imu::Term;
 use crate::run::Aiding;
 use crate::simulation::Scenario;
@@ -61,4 +61,42 @@ fn a_prior_and_rows_are_a_pass_of_the_whole_filter_whatever_is_on() {
     against_passes("nineteen-position", &velocity, &table[1..]);
     let varying = plain.with(ErrorTerm::GaussMarkovBias).with(table[2]);
     against_passes("mems", &varying, &table[2..]);
+}
+
+#[test]
+fn a_term_that_is_off_is_zero_wherever_it_was_linearised() {
+    let order = ErrorTerm::Instrument(Term::AccelSecondOrder);
+    let scenario = Scenario::load("real-table").unwrap().with_error_term(order);
+    let run = scenario.simulate(23, 0).unwrap().run;
+    let problem = Problem::new(&run, &Options::default());
+    let mut outcome = estimate(&problem, UNWATCHED).unwrap();
+    let mut model = problem.model.clone();
+    model.switch_off(order);
+    let off = problem.with_model(model);
+    let posterior = |outcome: &Outcome| {
+        let reduction = outcome.reduction(&problem).unwrap();
+        outcome.posterior(&off, &reduction).unwrap()
+    };
+    let there = posterior(&outcome);
+    let shift = outcome.linearised_at.terms;
+    outcome.linearised_at.terms.fill(0.0);
+    let at_zero = posterior(&outcome);
+    assert!(shift.amax() > 0.0);
+    let sigma = at_zero.parameter_covariance.diagonal().map(f64::sqrt);
+    let apart = (there.parameters - at_zero.parameters).zip_map(&sigma, |apart, sigma| {
+        if sigma > 0.0 {
+            (apart / sigma).abs()
+        } else {
+            0.0
+        }
+    });
+    let moved = at_zero.parameters.zip_map(&sigma, |moved, sigma| {
+        if sigma > 0.0 {
+            (moved / sigma).abs()
+        } else {
+            0.0
+        }
+    });
+    println!("{} of {} σ", apart.amax(), moved.amax());
+    assert!(apart.amax() < 1e-2 * moved.amax(), "{}", apart.amax());
 }
