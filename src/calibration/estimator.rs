@@ -6,13 +6,12 @@ use std::collections::BTreeMap;
 use super::budget::BudgetSource;
 use super::error::CalibrationError;
 use super::gauss_newton::{Iterated, Progress, iterate};
-use super::layout::Layout;
-use super::linearisation::not_invertible;
-use super::model::Model;
+use super::linearisation::{AttitudePrior, not_invertible};
 use super::outcome::Outcome;
 use super::parameters::ParameterMatrix;
 use super::pass::{Gate, PassResult};
 use super::problem::Problem;
+use super::reduction::{Prior, Script};
 use super::several;
 use super::solved::Solved;
 use crate::calibration::checks;
@@ -98,10 +97,10 @@ fn outcome(
     } = solved;
     let model = &problem.model;
     let estimate = held.both_triads();
-    let (dwell_scatter, scattered) = scattered(&mut held, model);
     if let Some(sensor) = not_invertible(&estimate.triads) {
         return Err(CalibrationError::Singular { sensor });
     }
+    let (dwell_scatter, scattered) = scattered(&mut held, &problem, &solved.priors);
     let rounding = by_rounding(&problem, &estimate.triads);
     let mut outcome = Outcome {
         form_test,
@@ -155,15 +154,25 @@ fn outcome(
 /// How much dwells scatter, none where there are too few; and what the covariance gains where that is beyond chance.
 fn scattered(
     held: &mut PassResult,
-    model: &Model,
+    problem: &Problem,
+    priors: &[AttitudePrior],
 ) -> (Option<DwellScatter>, Option<ParameterMatrix>) {
-    let scores = held.posteriors.split_first();
-    let Some(scores) = scores.and_then(|(prior, after)| DwellScores::new(prior, after)) else {
+    let accepted: Vec<bool> = held.innovations.iter().map(|of| of.accepted).collect();
+    // Iterations may have ended where nothing can be reduced.
+    let reduction = Script::new(problem, priors, &held.at);
+    let reduction = reduction.and_then(|script| script.reduce(problem, &accepted));
+    let scores = reduction.ok().and_then(|reduction| {
+        let prior = Prior::new(&reduction.constants, &problem.model, &held.at);
+        let posterior = reduction.posterior(&prior).ok()?;
+        let scores = DwellScores::new(&reduction, &prior, &posterior)?;
+        Some((scores, reduction.constants))
+    });
+    let Some((scores, constants)) = scores else {
         return (None, None);
     };
     let gained = scores.widened().map(|widened| {
         let by_noise = held.both_triads().covariance;
-        held.widen(&Layout::new(model), &widened);
+        held.widen(&constants, &widened);
         held.both_triads().covariance - by_noise
     });
     (Some(scores.scatter), gained)

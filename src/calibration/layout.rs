@@ -21,12 +21,13 @@
 use super::budget::source::BudgetSource;
 use super::model::Model;
 use super::parameters::PARAMETERS;
+use super::parameters::auxiliary::OF_AXES;
 use super::parameters::error_term::ErrorTerm;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::several::thermal::Coefficient;
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS, Term};
 use crate::run::Aiding;
-use crate::turntable::{AXIS_ERRORS, AxisError};
+use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY};
 
 /// Attitude error φ.
 pub const ATTITUDE: usize = 0;
@@ -52,6 +53,16 @@ impl Constant {
                 Some(AxisError::Wobble) => BudgetSource::TableWobble,
                 _ => BudgetSource::TableEncoder,
             },
+        }
+    }
+
+    /// Its index among the auxiliary parameters, if it is one.
+    pub fn auxiliary(self) -> Option<usize> {
+        match self {
+            Self::Base(axis) => Some(axis),
+            Self::Axis(index) => Some(OF_AXES + index),
+            Self::Term(index) => Some(TABLE_GEOMETRY + index),
+            Self::Parameter(_) | Self::Thermal(_) | Self::Gravity => None,
         }
     }
 
@@ -142,9 +153,10 @@ impl Layout {
     }
 
     /// The same with all constants as columns: the filter is left with what moves and what is drawn anew, as gravity is
-    /// at another site.
-    pub fn reduced(self) -> Self {
-        let driving = self.driving().filter(|&of| of != Constant::Gravity);
+    /// at another site unless there is one of it.
+    pub fn reduced(self, one_gravity: bool) -> Self {
+        let driving = self.driving();
+        let driving = driving.filter(|&of| one_gravity || of != Constant::Gravity);
         let base = self.base.iter().map(|&axis| Constant::Base(axis));
         let axes = self.axes.iter().map(|&k| Constant::Axis(k));
         Self {
@@ -152,6 +164,7 @@ impl Layout {
             parameters: Vec::new(),
             terms: Vec::new(),
             thermal: Vec::new(),
+            gravity: self.gravity && !one_gravity,
             base: Vec::new(),
             axes: Vec::new(),
             ..self

@@ -253,6 +253,11 @@ impl<'a> Problem<'a> {
         there.map(|(kind, _)| kind)
     }
 
+    /// Whether gravity is the same in all recordings.
+    pub(in crate::calibration) fn one_gravity(&self) -> bool {
+        self.runs().all(|run| run.site == self.run.site)
+    }
+
     /// The dwells of all runs.
     pub fn dwells(&self) -> impl Iterator<Item = &Dwell> {
         self.stretches.iter().flat_map(|stretch| &stretch.dwells)

@@ -154,7 +154,7 @@ impl Problem<'_> {
     /// The sources of noise that its reduction has.
     fn sources(&self) -> BTreeSet<BudgetSource> {
         let model = &self.model;
-        let layout = Layout::new(model).reduced();
+        let layout = Layout::new(model).reduced(self.one_gravity());
         let mut all: BTreeSet<_> = (0..layout.size())
             .map(|state| layout.source(state))
             .collect();

@@ -1,9 +1,8 @@
 //! What the dwells say of σ without any model of noise: whether they scatter as much as the covariance of
 //! the estimate says.
 //!
-//! The filter's posterior after each dwell tells what that dwell added: information `ΔI` and a score
-//! `s = Δ(P⁻¹ θ) − ΔI θ̂`. Attitude and velocity that carry over from one dwell to the next are integrated
-//! out, so the scores are those of `p(y_u | y_1 … y_{u−1}, θ)` and independent of each other whatever they
+//! The whitened rows G of each dwell tell what it adds: information `ΔI = Gᵀ G` and a score `s = Gᵀ (ν − G θ̂)`.
+//! Attitude and velocity that carry over from one dwell to the next are integrated out, so the scores are those of `p(y_u | y_1 … y_{u−1}, θ)` and independent of each other whatever they
 //! carry. If the model is right the covariance of a score is `ΔI − ΔI P ΔI`; if it is not, the scores show
 //! their own (White 1982, "Maximum likelihood estimation of misspecified models", Econometrica 50(1);
 //! correction of the leverage of few clusters: Bell and McCaffrey 2002, Survey Methodology 28(2)).
@@ -14,18 +13,12 @@ use serde_json::json;
 
 use super::finding::{Finding, widened_by};
 use super::innovation::mean_square_interval;
+use crate::calibration::reduction::{Posterior, Prior, Reduction};
 use crate::statistics::FALSE_ALARM;
 
 /// A direction of which a dwell has less than this part of all information says nothing of the dwell but
 /// rounding.
 const SHARE: f64 = 1e-3;
-
-/// Mean and covariance of the constants of a run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Posterior {
-    pub mean: DVector<f64>,
-    pub covariance: DMatrix<f64>,
-}
 
 /// How much the dwells scatter, over what the covariance says.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,35 +49,35 @@ impl DwellScatter {
 /// The scores of dwells in units in which the covariance of the estimate is the identity.
 pub struct DwellScores {
     pub scatter: DwellScatter,
-    /// Square root of the covariance of the estimate, each constant in units of its σ.
+    /// Square root of the covariance of the estimate.
     root: DMatrix<f64>,
+    /// The constants that are estimated, of so many.
+    on: Vec<usize>,
+    all: usize,
     /// Covariance of the estimate by the scores' own scatter.
     robust: DMatrix<f64>,
 }
 
 impl DwellScores {
-    /// Of the posteriors after each dwell, the last that of the estimate; none if there are too few to say
-    /// anything.
-    pub fn new(prior: &Posterior, after: &[Posterior]) -> Option<Self> {
-        let last = after.last()?;
-        let n = last.mean.len();
-        let sigma = last.covariance.diagonal().map(f64::sqrt);
-        let over_sigma =
-            |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(i, j)] / (sigma[i] * sigma[j]));
-        let root = over_sigma(&last.covariance).cholesky()?.unpack();
-        // Information and its product with the mean, from the final mean on.
-        let whitened = |posterior: &Posterior| {
-            let factor = over_sigma(&posterior.covariance).cholesky()?;
-            let information = root.tr_mul(&factor.solve(&root));
-            let off = (&posterior.mean - &last.mean).component_div(&sigma);
-            Some((information, root.tr_mul(&factor.solve(&off))))
-        };
+    /// Of the rows of each dwell; none if there are too few to say anything.
+    pub fn new(reduction: &Reduction, prior: &Prior, posterior: &Posterior) -> Option<Self> {
+        let all = reduction.constants.len();
+        let sigma = posterior.covariance.diagonal().map(f64::sqrt);
+        let on: Vec<usize> = (0..all).filter(|&k| sigma[k] > 0.0).collect();
+        let n = on.len();
+        let correlation = DMatrix::from_fn(n, n, |i, j| {
+            posterior.covariance[(on[i], on[j])] / (sigma[on[i]] * sigma[on[j]])
+        });
+        let root = correlation.cholesky()?.unpack();
+        let scaled = DMatrix::from_fn(n, n, |i, j| sigma[on[i]] * root[(i, j)]);
+        let shares = (0..n).map(|i| scaled.row(i).norm_squared() / prior.sigma[on[i]].powi(2));
+        let before = shares.sum::<f64>();
         let mut squares = Vec::new();
         let mut robust = DMatrix::zeros(n, n);
-        let mut before = whitened(prior)?;
-        for posterior in after {
-            let now = whitened(posterior)?;
-            let (gained, score) = (&now.0 - &before.0, &now.1 - &before.1);
+        for dwell in &reduction.dwells {
+            let rows = dwell.select_columns(&on) * &scaled;
+            let residual = dwell.column(all) - dwell.columns(0, all) * &posterior.mean;
+            let (gained, score) = (rows.tr_mul(&rows), rows.tr_mul(&residual));
             let eigen = gained.symmetric_eigen();
             let mut corrected = DVector::zeros(n);
             for (share, direction) in eigen
@@ -100,11 +93,10 @@ impl DwellScores {
                 corrected.axpy(along / (1.0 - share).sqrt(), &direction, 1.0);
             }
             robust.ger(1.0, &corrected, &corrected, 1.0);
-            before = now;
         }
         // What the estimate takes of the scores they do not have: as many as there are constants that
         // dwells, and not what was known before, determine.
-        let constants = n as f64 - whitened(prior)?.0.trace();
+        let constants = n as f64 - before;
         let freedom = squares.len() as f64 - constants;
         if freedom < 1.0 {
             return None;
@@ -116,12 +108,14 @@ impl DwellScores {
                 count: squares.len(),
                 limit,
             },
-            root,
+            root: scaled,
             robust,
+            on,
+            all,
         })
     }
 
-    /// Covariance of the estimate over its σ, where the scores say more than the model does as much as
+    /// Covariance of the estimate, where the scores say more than the model does as much as
     /// they say; none if they are not too large.
     pub fn widened(&self) -> Option<DMatrix<f64>> {
         if self.scatter.mean <= self.scatter.limit {
@@ -129,7 +123,14 @@ impl DwellScores {
         }
         let mut eigen = self.robust.clone().symmetric_eigen();
         eigen.eigenvalues.apply(|value| *value = value.max(1.0));
-        Some(&self.root * eigen.recompose() * self.root.transpose())
+        let widened = &self.root * eigen.recompose() * self.root.transpose();
+        let mut covariance = DMatrix::zeros(self.all, self.all);
+        for (i, &row) in self.on.iter().enumerate() {
+            for (j, &column) in self.on.iter().enumerate() {
+                covariance[(row, column)] = widened[(i, j)];
+            }
+        }
+        Some(covariance)
     }
 }
 

@@ -21,7 +21,6 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::checks::dwell_scatter::Posterior;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::{Linearisation, Start};
 use crate::calibration::model::Model;
@@ -67,9 +66,9 @@ impl Filter {
         Self::of(Layout::new(model), model, errors)
     }
 
-    /// The same with all constants as columns.
-    pub fn reduced(model: &Model) -> Self {
-        let layout = Layout::new(model).reduced();
+    /// The same with all constants as columns, gravity where it is the same throughout.
+    pub fn reduced(model: &Model, one_gravity: bool) -> Self {
+        let layout = Layout::new(model).reduced(one_gravity);
         let columns = layout.columns().len();
         let filter = Self::of(layout, model, &PriorErrors::none());
         Self {
@@ -305,16 +304,6 @@ impl Filter {
             *coefficient.of_mut(&mut all) = self.x[state];
         }
         all
-    }
-
-    /// Mean and covariance of the errors of what is constant throughout a recording.
-    pub fn constants(&self) -> Posterior {
-        let states: Vec<usize> = self.layout.constants().collect();
-        let n = states.len();
-        Posterior {
-            mean: DVector::from_fn(n, |i, _| self.x[states[i]]),
-            covariance: DMatrix::from_fn(n, n, |i, j| self.p[(states[i], states[j])]),
-        }
     }
 
     /// Mean of a state's error.

@@ -3,7 +3,6 @@
 mod earlier;
 mod gate;
 mod mode;
-mod posteriors;
 mod result;
 mod stretch;
 
@@ -18,7 +17,6 @@ pub use crate::calibration::filter::{
 pub use crate::calibration::record::segment::Seen;
 use earlier::Earlier;
 pub use mode::{Gate, Mode};
-use posteriors::Posteriors;
 pub use result::PassResult;
 use result::Sums;
 pub use result::{Epoch, Own};
@@ -46,7 +44,7 @@ pub fn pass(
         dwells,
         innovations: Vec::new(),
         history: Vec::new(),
-        posteriors: Posteriors::default(),
+        dwells_done: 0,
         cost: 0.0,
         log_determinant: 0.0,
         attitudes: Vec::new(),
@@ -65,9 +63,6 @@ pub fn pass(
         };
         let start = stretch.start(&known, &at.initial_attitudes[number]);
         begin(&mut sums.filter, model, before, stretch, &start, at);
-        if before.is_none() {
-            sums.posteriors.begin(sums.filter.constants());
-        }
         before = Some(stretch);
         let mut one = OneStretch::new(problem, stretch, number, (mode, limit), sums)?;
         one.run()?;

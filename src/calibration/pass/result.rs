@@ -3,15 +3,13 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::earlier::Earlier;
-use super::posteriors::Posteriors;
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::checks::dwell_scatter::Posterior;
 use crate::calibration::checks::innovation::Innovation;
 use crate::calibration::checks::observability::AttitudeCovariance;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::filter::{DwellFilters, Filter};
-use crate::calibration::layout::Layout;
+use crate::calibration::layout::{Constant, Layout};
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::model::Model;
 use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_vector};
@@ -62,8 +60,6 @@ pub struct PassResult {
     pub log_determinant: f64,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
-    /// What is known of the constants before the first dwell and after each, or each so many.
-    pub posteriors: Vec<Posterior>,
 }
 
 impl PassResult {
@@ -98,7 +94,8 @@ pub struct Sums {
     pub dwells: DwellFilters,
     pub innovations: Vec<Innovation>,
     pub history: Vec<Epoch>,
-    pub posteriors: Posteriors,
+    /// Number of dwells that have ended.
+    pub dwells_done: usize,
     pub cost: f64,
     pub log_determinant: f64,
     /// What is of each recording that has ended.
@@ -179,52 +176,47 @@ impl Sums {
             log_determinant: self.log_determinant,
             innovations: self.innovations,
             history: self.history,
-            posteriors: self.posteriors.finish(),
             at: self.at,
         }
     }
 }
 
 impl PassResult {
-    /// Takes another covariance of the constants, each in units of the σ that it has.
-    pub fn widen(&mut self, layout: &Layout, widened: &DMatrix<f64>) {
-        let states: Vec<usize> = layout.constants().collect();
-        let Some(last) = self.posteriors.last() else {
-            return;
-        };
-        let sigma = last.covariance.diagonal().map(f64::sqrt);
-        let of = |one: usize, other: usize| {
-            let place = |state| states.binary_search(&state).ok();
-            let (i, j) = (place(one)?, place(other)?);
-            Some(widened.get((i, j))? * sigma[i] * sigma[j])
-        };
-        let covariance = |one, other| of(one, other).unwrap_or(0.0);
-        for (row, i) in layout.parameters() {
-            for (column, j) in layout.parameters() {
-                self.covariance[(i, j)] = covariance(row, column);
-            }
-        }
-        let auxiliary = auxiliary_states(layout);
-        for &(row, i) in &auxiliary {
-            for &(column, j) in &auxiliary {
-                self.auxiliary.covariance[(i, j)] = covariance(row, column);
-            }
-            for (parameter, index) in layout.parameters() {
-                self.auxiliary.cross[(index, i)] = covariance(parameter, row);
-            }
-        }
-        if let Some(thermal) = &mut self.thermal {
-            for (k, (row, _)) in layout.thermal().enumerate() {
-                for (l, (column, _)) in layout.thermal().enumerate() {
-                    thermal.covariance[(k, l)] = covariance(row, column);
+    /// Takes another covariance of these constants.
+    pub fn widen(&mut self, constants: &[Constant], covariance: &DMatrix<f64>) {
+        let places = || constants.iter().copied().enumerate();
+        for ((i, one), (j, other)) in places().flat_map(|of| places().map(move |by| (of, by))) {
+            let value = covariance[(i, j)];
+            let thermal = |of| {
+                let thermal = self.thermal.as_ref()?;
+                thermal.coefficients.iter().position(|&one| one == of)
+            };
+            match (one, other) {
+                (Constant::Parameter(i), Constant::Parameter(j)) => self.covariance[(i, j)] = value,
+                (Constant::Gravity, Constant::Gravity) => self.gravity.1 = value.sqrt(),
+                (Constant::Parameter(i), Constant::Thermal(of)) => {
+                    let place = thermal(of);
+                    if let Some((thermal, k)) = self.thermal.as_mut().zip(place) {
+                        thermal.cross[(i, k)] = value;
+                    }
                 }
-                for (parameter, index) in layout.parameters() {
-                    thermal.cross[(index, k)] = covariance(parameter, row);
+                (Constant::Thermal(of), Constant::Thermal(by)) => {
+                    let places = thermal(of).zip(thermal(by));
+                    if let Some((thermal, place)) = self.thermal.as_mut().zip(places) {
+                        thermal.covariance[place] = value;
+                    }
+                }
+                (Constant::Parameter(i), other) => {
+                    if let Some(k) = other.auxiliary() {
+                        self.auxiliary.cross[(i, k)] = value;
+                    }
+                }
+                (one, other) => {
+                    if let Some(place) = one.auxiliary().zip(other.auxiliary()) {
+                        self.auxiliary.covariance[place] = value;
+                    }
                 }
             }
-        }
-        if let Some(gravity) = layout.gravity() {
-            self.gravity.1 = covariance(gravity, gravity).sqrt();
         }
     }
 }

@@ -131,7 +131,7 @@ impl<'a> OneStretch<'a> {
             model,
             mode: self.mode,
             limit: self.limit,
-            dwell: sums.posteriors.dwells(),
+            dwell: sums.dwells_done,
             after_move: rest.is_some_and(|rest| rest.new_position),
             memory: &mut self.gate,
             innovations: &mut sums.innovations,
@@ -149,8 +149,7 @@ impl<'a> OneStretch<'a> {
         }
         self.remember(time);
         if rest.is_some_and(|rest| rest.last) {
-            let posterior = self.sums.filter.constants();
-            self.sums.posteriors.after_dwell(posterior);
+            self.sums.dwells_done += 1;
         }
         Ok(true)
     }

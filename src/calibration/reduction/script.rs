@@ -105,7 +105,7 @@ impl<'a> Script<'a> {
         let take = |filter: &mut Filter| {
             dwells.extend(filter.columns.as_mut().map(Columns::take_rows));
         };
-        let filter = Filter::reduced(&problem.model);
+        let filter = Filter::reduced(&problem.model, problem.one_gravity());
         let filter = self.follow(problem, accepted, filter, take, None)?;
         let columns = filter.columns.as_ref();
         Ok(Reduction {
