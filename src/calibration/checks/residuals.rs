@@ -256,4 +256,12 @@ mod tests {
         let covariance = DMatrix::identity(21, 21) * 1e-6;
         assert_eq!(of(&inputs, &errors, &covariance).groups, [2]);
     }
+
+    #[test]
+    fn sigma_grow_by_the_root_of_chi_squared_over_its_degrees() {
+        // Nothing is to be found of nine errors of 2 σ: χ² is 36.
+        let (design, errors) = (DMatrix::zeros(9, 0), DVector::repeat(9, 2.0));
+        let residuals = Residuals::new(&design, &errors, &DMatrix::identity(9, 9)).unwrap();
+        assert!((residuals.growth().unwrap() - 2.0).abs() < 1e-12);
+    }
 }

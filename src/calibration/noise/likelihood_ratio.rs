@@ -49,5 +49,8 @@ mod tests {
         assert_relative_eq!(limit(1, 0, 0.05), 3.84146, epsilon = 1e-5);
         assert_relative_eq!(limit(10, 0, 0.001), 29.588, epsilon = 1e-3);
         assert_relative_eq!(limit(0, 1, 0.025), limit(1, 0, 0.05), epsilon = 1e-9);
+        // Of two bounds one in four draws is above both, one in two above one.
+        let chi2 = |freedom: f64| ChiSquared::new(freedom).unwrap().sf(limit(0, 2, 0.01));
+        assert_relative_eq!(0.5 * chi2(1.0) + 0.25 * chi2(2.0), 0.01, epsilon = 1e-9);
     }
 }

@@ -145,3 +145,20 @@ impl Auxiliary {
             .filter(move |&k| sigma[k] > OBSERVED_BELOW * self.prior_sigma[k])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terms_of_which_only_the_sum_or_only_the_difference_is_seen_are_not_told_apart() {
+        let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
+        let (i, j) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));
+        for (correlation, inseparable) in [(-0.995, true), (0.995, true), (-0.9, false)] {
+            let mut auxiliary = Auxiliary::default();
+            (auxiliary.covariance[(i, i)], auxiliary.covariance[(j, j)]) = (4.0, 9.0);
+            auxiliary.covariance[(i, j)] = 6.0 * correlation;
+            assert_eq!(auxiliary.even_terms_inseparable(), inseparable);
+        }
+    }
+}

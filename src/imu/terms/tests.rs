@@ -127,3 +127,30 @@ fn a_gyro_that_yields_under_load_drifts_by_as_much_up_as_down_and_not_across() {
         assert!((drift(force) - expected).norm() < 1e-18, "{force}");
     }
 }
+
+#[test]
+fn a_parameter_of_an_accelerometer_adds_the_product_or_the_power_that_its_name_says() {
+    let force = Vector3::new(3.0, -5.0, 7.0);
+    let added = |term: Term, name: &str| {
+        let mut parameters = term.parameters();
+        let named = parameters.find(|&k| {
+            let of = Term::parameter_name(k);
+            of.is_some_and(|of| of.ends_with(name))
+        });
+        let mut q = TermVector::zeros();
+        q[named.unwrap()] = 1e-6;
+        Sensed { force, ..any() }.added(Sensor::Accel, &q) / 1e-6
+    };
+    let x = Vector3::x();
+    for (name, product) in [(".x.xy", -15.0), (".x.xz", 21.0), (".x.yz", -35.0)] {
+        let expected = x * product;
+        assert!(
+            (added(Term::AccelCrossCoupling, name) - expected).norm() < 1e-9,
+            "{name}"
+        );
+    }
+    let y = Vector3::y();
+    assert!((added(Term::AccelThirdOrder, ".y") - y * -125.0).norm() < 1e-9);
+    assert!((added(Term::AccelSecondOrder, ".y") - y * 25.0).norm() < 1e-9);
+    assert!((added(Term::AccelAsymmetry, ".y") - y * 5.0).norm() < 1e-9);
+}

@@ -161,7 +161,7 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
             total("all, actual", &|w| w.budget.actual),
         ])
         .note(
-            "General form, from the claimed covariance averaged over all instruments. SeparateEstimate: what the group would \
+            "General form, from the claimed covariance averaged over all instruments. Alone: what the group would \
              make by itself. Share: of the variance, what two groups make together going half to each; below zero \
              where a group makes up for another.",
         )
