@@ -35,7 +35,7 @@ impl Columns {
         }
     }
 
-    /// A state is drawn anew, whatever the parameters are.
+    /// A state is drawn anew, whatever the constants are.
     pub fn redraw(&mut self, state: usize) {
         self.of_states.column_mut(state).fill(0.0);
     }
@@ -45,8 +45,8 @@ impl Columns {
         self.of_states.column_mut(state).scale_mut(keep);
     }
 
-    /// The states that move become what `transition` makes of the first states, plus what each parameter adds to
-    /// them (rows, by parameter).
+    /// The states that move become what `transition` makes of the first states, plus what each constant adds to
+    /// them (rows, by constant).
     pub fn propagate(&mut self, moving: &[usize], transition: &DMatrix<f64>, added: &DMatrix<f64>) {
         let first = self.of_states.columns(0, transition.ncols());
         let moved = first * transition.transpose() + added;

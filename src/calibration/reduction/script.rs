@@ -1,5 +1,5 @@
-//! A pass with the linearisation held, of which navigation is done once and the filter as often as noise
-//! is tried.
+//! A pass with the linearisation held, of which navigation is done once and the filter as often as noise is tried or a
+//! variance is changed.
 
 use super::Reduction;
 use crate::calibration::error::CalibrationError;
@@ -160,7 +160,7 @@ struct Decided<'a, 'b> {
     model: &'a Model,
     stretch: &'a Stretch<'a>,
     accepted: &'a mut std::slice::Iter<'b, bool>,
-    /// Where innovations go; none where covariances alone are wanted.
+    /// Where innovations go; none where they are not asked for.
     replay: Option<&'a mut Replay>,
 }
 
