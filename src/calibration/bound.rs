@@ -2,13 +2,15 @@
 
 use nalgebra::DVector;
 
+use super::constants::Prior;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::linearisation::Linearisation;
 use super::parameters::PARAMETERS;
 use super::parameters::auxiliary::Auxiliary;
-use super::pass::{Epoch, Gate, Mode, pass};
+use super::pass::open_pass;
 use super::problem::Problem;
+use super::reduction::{Epoch, Script};
 use crate::calibration::start::coarse::initial_attitudes;
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
@@ -42,14 +44,15 @@ pub fn bound(
     let attitudes = initial_attitudes(&problem)?;
     let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
     let at = Linearisation::new(*truth, *terms, initial);
-    let result = pass(&problem, &attitudes, &at, Mode::Held(Gate::Open))?;
+    let result = open_pass(&problem, &Script::new(&problem, &attitudes, &at)?)?;
+    let prior = Prior::new(&result.reduction.constants, &problem.model, &at);
     Ok(Bound {
         estimate: Estimate {
             triads: *truth,
-            covariance: result.covariance,
+            covariance: result.posterior.parameter_covariance,
         },
-        auxiliary: result.auxiliary,
-        history: result.history,
+        auxiliary: result.auxiliary(&problem.model),
+        history: result.reduction.history(&prior, &at),
     })
 }
 
@@ -69,10 +72,11 @@ pub fn thermal_bound(
         thermal: *coefficients,
         ..Linearisation::new(*truth, TermVector::zeros(), initial)
     };
-    let result = pass(problem, &attitudes, &at, Mode::Held(Gate::Open))?;
-    let of_coefficients = result.thermal.map(|thermal| thermal.covariance.diagonal());
+    let result = open_pass(problem, &Script::new(problem, &attitudes, &at)?)?;
+    let of_coefficients = result.thermal(&problem.model);
+    let of_coefficients = of_coefficients.map(|thermal| thermal.covariance.diagonal());
     let of_coefficients = of_coefficients.unwrap_or_else(|| DVector::zeros(0));
-    let of_parameters = result.covariance.diagonal();
+    let of_parameters = result.posterior.parameter_covariance.diagonal();
     Ok(DVector::from_fn(
         PARAMETERS + of_coefficients.len(),
         |k, _| match k.checked_sub(PARAMETERS) {

@@ -1,17 +1,17 @@
-//! The estimator: coarse start, with a table a pass with feedback, and Gauss–Newton iterations with the
-//! linearisation held until nothing moves.
+//! The estimator: coarse start, and Gauss–Newton iterations with the linearisation held until nothing moves.
 
 use std::collections::BTreeMap;
 
 use super::budget::BudgetSource;
+use super::constants::Prior;
 use super::error::CalibrationError;
 use super::gauss_newton::{Iterated, Progress, iterate};
-use super::linearisation::{AttitudePrior, not_invertible};
+use super::linearisation::not_invertible;
+use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::ParameterMatrix;
-use super::pass::{Gate, PassResult};
+use super::pass::Gate;
 use super::problem::Problem;
-use super::reduction::{Prior, Script};
 use super::several;
 use super::solved::Solved;
 use crate::calibration::checks;
@@ -21,7 +21,8 @@ use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::Observability;
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::rounding::by_rounding;
-use crate::calibration::start::attempt::{from_coarse_start, learnt_or_stated};
+use crate::calibration::noise::learn;
+use crate::calibration::start::attempt::from_coarse_start;
 use crate::imu::Sensor;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
@@ -38,19 +39,33 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         true => several::solve(problem, progress)?,
         false => from_coarse_start(problem, progress)?,
     };
-    let as_stated = match solved.noise.learnt {
-        true => problem.clone(),
-        false => solved.problem.clone(),
-    };
+    // Recordings differ as they show.
+    let mut model = solved.problem.model.with_noise_of(&problem.model);
+    model.prior_sigma = problem.model.prior_sigma;
+    let as_stated = solved.problem.with_model(model);
     let solved = with_wide_prior(solved, progress)?;
-    let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated.held)?;
+    let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated)?;
     // Noise that makes up for angles that are missing is no noise.
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
-    let solved = match solved.noise.learnt || is_no_noise {
+    let solved = match is_no_noise {
         true => solved,
-        false => learnt_or_stated(&as_stated, solved, progress)?,
+        false => learn_noise(&as_stated, solved, progress)?,
     };
     outcome(&as_stated, solved, form_test)
+}
+
+/// With the noise that the data show, where they contradict what is stated.
+fn learn_noise<'a>(
+    as_stated: &Problem<'a>,
+    solved: Solved<'a>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
+    match learn(as_stated, solved.clone(), progress) {
+        Ok(learnt) if learnt.iterated.converged || !solved.iterated.converged => Ok(learnt),
+        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
+        // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
+        _ => Ok(solved),
+    }
 }
 
 /// Iterations with a prior that its estimate does not contradict: a wrong one would make outliers of correct
@@ -59,11 +74,11 @@ fn with_wide_prior<'a>(
     mut solved: Solved<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
-    let held = &solved.iterated.held;
-    let Some(model) = widened(&solved.problem.model, &held.both_triads()) else {
+    let iterated = &solved.iterated;
+    let Some(model) = widened(&solved.problem.model, &iterated.both_triads()) else {
         return Ok(solved);
     };
-    let (problem, from) = (solved.problem.with_model(model), held.estimate.clone());
+    let (problem, from) = (solved.problem.with_model(model), iterated.estimate.clone());
     let gate = Gate::Innovations;
     match iterate(
         &problem,
@@ -87,20 +102,19 @@ fn outcome(
     solved: Solved,
     form_test: Option<FormTest>,
 ) -> Result<Outcome, CalibrationError> {
-    let Solved {
-        problem,
-        iterated: Iterated {
-            mut held,
-            converged,
-        },
-        ..
-    } = solved;
+    let (problem, mut iterated) = (solved.problem, solved.iterated);
     let model = &problem.model;
-    let estimate = held.both_triads();
+    let estimate = iterated.both_triads();
+    let (dwell_scatter, scattered) = scattered(&mut iterated, model);
+    let Iterated {
+        held, converged, ..
+    } = iterated;
     if let Some(sensor) = not_invertible(&estimate.triads) {
         return Err(CalibrationError::Singular { sensor });
     }
-    let (dwell_scatter, scattered) = scattered(&mut held, &problem, &solved.priors);
+    let (attitude_sigma, attitude_covariance) = held.last_attitude();
+    let gravity = held.gravity();
+    let prior = Prior::new(&held.reduction.constants, model, &held.at);
     let rounding = by_rounding(&problem, &estimate.triads);
     let mut outcome = Outcome {
         form_test,
@@ -108,7 +122,7 @@ fn outcome(
         observability: Observability::new(
             &estimate,
             &as_stated.model.prior_sigma,
-            &held.attitude_covariance,
+            &attitude_covariance,
         ),
         covariance_by_noise: estimate.covariance,
         estimate,
@@ -116,19 +130,18 @@ fn outcome(
         prior_sigma: as_stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         prior_attitudes: solved.priors,
-        attitude_sigma: held.attitude_sigma,
-        auxiliary: held.auxiliary,
-        thermal: held.thermal,
-        own: held.own,
+        attitude_sigma,
+        auxiliary: held.auxiliary(model),
+        thermal: held.thermal(model),
+        own: held.reduction.own(&held.at, &held.posterior),
         warming: problem.warming(),
         alone: solved.alone,
-        gravity: (problem.run().site.gravity + held.gravity.0, held.gravity.1),
-        linearised_at: held.at,
+        gravity: (problem.run().site.gravity + gravity.0, gravity.1),
         converged,
         log_determinant: held.log_determinant,
         consistency: consistency(&held.innovations),
-        history: held.history,
-        feedback_history: solved.feedback_history,
+        history: held.reduction.history(&prior, &held.at),
+        linearised_at: held.at,
         innovations: held.innovations,
         aiding: model.aiding,
         velocity_sigma: problem.standstill_sigma(Sensor::Accel),
@@ -153,27 +166,19 @@ fn outcome(
 
 /// How much dwells scatter, none where there are too few; and what the covariance gains where that is beyond chance.
 fn scattered(
-    held: &mut PassResult,
-    problem: &Problem,
-    priors: &[AttitudePrior],
+    iterated: &mut Iterated,
+    model: &Model,
 ) -> (Option<DwellScatter>, Option<ParameterMatrix>) {
-    let accepted: Vec<bool> = held.innovations.iter().map(|of| of.accepted).collect();
-    // Iterations may have ended where nothing can be reduced.
-    let reduction = Script::new(problem, priors, &held.at);
-    let reduction = reduction.and_then(|script| script.reduce(problem, &accepted));
-    let scores = reduction.ok().and_then(|reduction| {
-        let prior = Prior::new(&reduction.constants, &problem.model, &held.at);
-        let posterior = reduction.posterior(&prior).ok()?;
-        let scores = DwellScores::new(&reduction, &prior, &posterior)?;
-        Some((scores, reduction.constants))
-    });
-    let Some((scores, constants)) = scores else {
+    let held = &iterated.held;
+    let prior = Prior::new(&held.reduction.constants, model, &held.at);
+    let Some(scores) = DwellScores::new(&held.reduction, &prior, &held.posterior) else {
         return (None, None);
     };
     let gained = scores.widened().map(|widened| {
-        let by_noise = held.both_triads().covariance;
-        held.widen(&constants, &widened);
-        held.both_triads().covariance - by_noise
+        let by_noise = iterated.both_triads().covariance;
+        let posterior = &mut iterated.held.posterior;
+        *posterior = posterior.clone().with_covariance(widened);
+        iterated.both_triads().covariance - by_noise
     });
     (Some(scores.scatter), gained)
 }
@@ -185,7 +190,8 @@ mod tests {
     use super::super::Options;
     use super::super::linearisation::Linearisation;
     use super::super::parameters::{from_vector, to_vector};
-    use super::super::pass::{Mode, pass};
+    use super::super::pass::pass;
+    use super::super::reduction::Script;
     use super::*;
     use crate::attitude::exp;
     use crate::imu::TermVector;
@@ -208,12 +214,17 @@ mod tests {
             let triads = from_vector(form, &problem.model.prior_mean.add_scalar(shift * PPM));
             let initial = vec![turn * prior.mean];
             let at = Linearisation::new(triads, TermVector::zeros(), initial);
-            let mode = Mode::Held(Gate::Open);
-            pass(&problem, &[prior], &at, mode).unwrap()
+            let priors = [prior];
+            let script = Script::new(&problem, &priors, &at).unwrap();
+            pass(&problem, &script, Gate::Open).unwrap()
         };
         let (here, there) = (estimate(0.0), estimate(2.0));
-        let shift = to_vector(&there.estimate.triads) - to_vector(&here.estimate.triads);
-        let sigma = here.covariance.diagonal().map(f64::sqrt);
+        let shift = to_vector(&there.estimate().triads) - to_vector(&here.estimate().triads);
+        let sigma = here
+            .posterior
+            .parameter_covariance
+            .diagonal()
+            .map(f64::sqrt);
         let largest = shift.component_div(&sigma).amax();
         assert!(largest < 1e-3, "{largest} σ");
     }

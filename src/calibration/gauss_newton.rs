@@ -3,11 +3,13 @@
 use std::ops::ControlFlow;
 
 use super::error::CalibrationError;
+use super::estimate::Estimate;
 use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
 use super::outcome::Pass;
-use super::parameters::to_vector;
-use super::pass::{Gate, Mode, PassResult, pass};
+use super::pass::{Gate, PassResult, pass};
 use super::problem::Problem;
+use super::reduction::Script;
+use crate::calibration::budget::curvature::curvature;
 use crate::calibration::checks::innovation::Innovation;
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
@@ -37,20 +39,36 @@ pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
     }
 }
 
-/// The last pass, and whether it moved nothing.
+/// The last pass, what it led to, and whether that moved nothing.
 #[derive(Clone)]
 pub struct Iterated {
     pub held: PassResult,
+    pub estimate: Linearisation,
     pub converged: bool,
 }
 
 impl Iterated {
     /// Ended with a pass: at its estimate, or where it was made if that cannot be inverted.
-    fn ended(mut held: PassResult, converged: bool) -> Self {
-        if not_invertible(&held.estimate.triads).is_some() {
-            held.estimate = held.at.clone();
+    fn ended(held: PassResult, converged: bool) -> Self {
+        let mut estimate = held.estimate();
+        if not_invertible(&estimate.triads).is_some() {
+            estimate = held.at.clone();
         }
-        Self { held, converged }
+        Self {
+            held,
+            estimate,
+            converged,
+        }
+    }
+
+    /// What it makes of both triads.
+    pub fn both_triads(&self) -> Estimate {
+        let triads = self.estimate.triads;
+        let covariance = self.held.posterior.parameter_covariance;
+        Estimate {
+            covariance: covariance + curvature(&triads, &covariance),
+            triads,
+        }
     }
 }
 
@@ -66,7 +84,7 @@ pub fn iterate(
 ) -> Result<Iterated, CalibrationError> {
     let most = passes.len() + problem.options.passes;
     let given = matches!(gate, Gate::As(_));
-    let mut decision: Option<Vec<Innovation>> = None;
+    let mut decision: Option<Vec<bool>> = None;
     let first = passes.len();
     let mut at = from;
     let mut before: Option<PassResult> = None;
@@ -80,7 +98,7 @@ pub fn iterate(
                 return before.map_or(Err(error), |last| Ok(Iterated::ended(last, false)));
             }
         };
-        let summary = summary(&result, &at, false);
+        let summary = summary(&result);
         tell(progress, &summary)?;
         passes.push(summary);
         let same_data = before.as_ref().is_some_and(|last| same_data(last, &result));
@@ -97,7 +115,7 @@ pub fn iterate(
             gate = Gate::Open;
             decision = None;
         } else if gate == Gate::Innovations && passes.len() == first + DECIDED_AFTER {
-            decision = Some(result.innovations.clone());
+            decision = Some(result.accepted());
         }
         let too_far =
             before.filter(|before| same_data && result.cost > before.cost * (1.0 + COST_RISE));
@@ -108,8 +126,7 @@ pub fn iterate(
         last_step = summary.largest_step;
         at = match &too_far {
             Some(before) => before.at.towards(&at, 0.5),
-            None if fraction < 1.0 => at.towards(&result.estimate, fraction),
-            None => result.estimate.clone(),
+            None => at.towards(&result.estimate(), fraction),
         };
         before = Some(too_far.unwrap_or(result));
     }
@@ -123,7 +140,8 @@ fn pass_towards(
     gate: Gate,
     before: Option<&PassResult>,
 ) -> Result<PassResult, CalibrationError> {
-    let mut made = pass(problem, priors, at, Mode::Held(gate));
+    let made_at = |at: &Linearisation| pass(problem, &Script::new(problem, priors, at)?, gate);
+    let mut made = made_at(at);
     let Some(before) = before else {
         return made;
     };
@@ -132,17 +150,14 @@ fn pass_towards(
             break;
         }
         *at = before.at.towards(at, 0.5);
-        made = pass(problem, priors, at, Mode::Held(gate));
+        made = made_at(at);
     }
     made
 }
 
 /// Whether two passes let the same observations in.
 fn same_data(a: &PassResult, b: &PassResult) -> bool {
-    let accepted = |result: &PassResult| -> Vec<bool> {
-        result.innovations.iter().map(|i| i.accepted).collect()
-    };
-    accepted(a) == accepted(b)
+    a.accepted() == b.accepted()
 }
 
 /// Part of all observations that are beyond the gate or were left out.
@@ -151,11 +166,14 @@ fn beyond(result: &PassResult, gate: f64) -> f64 {
     result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64
 }
 
-pub fn summary(result: &PassResult, at: &Linearisation, feedback: bool) -> Pass {
-    let sigma = result.covariance.diagonal().map(f64::sqrt);
-    let step = to_vector(&result.estimate.triads) - to_vector(&at.triads);
+fn summary(result: &PassResult) -> Pass {
+    let sigma = result
+        .posterior
+        .parameter_covariance
+        .diagonal()
+        .map(f64::sqrt);
+    let step = result.posterior.parameters;
     Pass {
-        feedback,
         largest_step: step
             .iter()
             .zip(&sigma)

@@ -5,6 +5,7 @@
 //! could be had. Nothing here prints, reads files or draws.
 
 mod checks;
+mod constants;
 mod filter;
 mod record;
 mod reduction;
@@ -58,8 +59,8 @@ pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
     parameter, parameter_index, parameter_name, sensor_and_parameter, to_vector,
 };
-pub use pass::{Epoch, Own};
 pub use problem::Problem;
+pub use reduction::{Epoch, Own};
 pub use result::at_rest::{AtRest, AxisAtRest, Second};
 pub use result::comparison::{Comparison, Named, Side, compare};
 pub use result::correction::{Calibrated, Correction, CorrectionError};

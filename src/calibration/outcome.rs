@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::budget::BudgetSource;
+use super::constants::{Posterior, Prior};
 use super::error::CalibrationError;
 use super::estimate::{Estimate, largest_growth};
 use super::linearisation::{AttitudePrior, Linearisation};
@@ -12,9 +13,8 @@ use super::model::Model;
 use super::noise::NoiseReport;
 use super::parameters::auxiliary::Auxiliary;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
-use super::pass::{Epoch, Own};
 use super::problem::Problem;
-use super::reduction::{Posterior, Prior, Reduction, Script};
+use super::reduction::{Epoch, Own, Reduction, Script};
 use crate::calibration::checks::dwell_scatter::DwellScatter;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
@@ -62,15 +62,12 @@ pub struct Outcome {
     pub observability: Observability,
     /// Where the last pass linearised.
     pub linearised_at: Linearisation,
-    /// Each pass in order; with a table, the first feeds back.
+    /// Each pass in order.
     pub passes: Vec<Pass>,
     /// Whether the last pass moved no parameter by more than the limit.
     pub converged: bool,
-    /// Estimate and σ against time in the last pass, whose σ are the true ones.
+    /// Estimate and σ against time in the last pass, as the instrument was turned.
     pub history: Vec<Epoch>,
-    /// Estimate and σ against time in the pass with feedback, as the turntable moved; empty without a
-    /// table.
-    pub feedback_history: Vec<Epoch>,
     /// What was observed at rest.
     pub aiding: Aiding,
     /// White 1σ of the velocity at standstill that the filter used in the first stretch, m/s.
@@ -154,7 +151,7 @@ impl Outcome {
         &self,
         problem: &Problem,
         reduction: &Reduction,
-    ) -> Result<Posterior, CalibrationError> {
+    ) -> Posterior {
         let constants = &reduction.constants;
         reduction.posterior(&Prior::new(constants, &problem.model, &self.linearised_at))
     }
@@ -192,8 +189,6 @@ impl Outcome {
 /// One pass over the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
-    /// Whether estimates were fed back as it went (only in the first).
-    pub feedback: bool,
     /// The largest step of any parameter from the linearisation point, in σ.
     pub largest_step: f64,
     /// Whitened innovations squared plus prior, summed.

@@ -354,12 +354,17 @@ impl<'a> Stretch<'a> {
         pair.map_or(0.0, |(end, begin)| imu.time(begin) - imu.time(end))
     }
 
+    /// 1σ of the velocity of a body that comes to rest, m/s.
+    pub fn velocity_sigma(&self) -> f64 {
+        INITIAL_VELOCITY.hypot(self.standstill_sigma.accel)
+    }
+
     /// Uncertainty at its first sample of errors referred to a point where the attitude is `at`.
     pub fn start(&self, prior: &AttitudePrior, at: &Matrix3<f64>) -> Start {
         Start {
             attitude: to_tilt_and_heading(&(prior.mean * at.transpose())),
             attitude_sigma: prior.sigma,
-            velocity_sigma: INITIAL_VELOCITY.hypot(self.standstill_sigma.accel),
+            velocity_sigma: self.velocity_sigma(),
             position_sigma: self.run.standstill.position_sigma,
         }
     }

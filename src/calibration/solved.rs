@@ -4,24 +4,18 @@ use super::gauss_newton::Iterated;
 use super::linearisation::AttitudePrior;
 use super::outcome::Pass;
 use super::parameters::ParameterMatrix;
-use super::pass::Epoch;
 use super::problem::Problem;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
 use crate::calibration::several::separate_estimate::SeparateEstimate;
-use crate::calibration::start::coarse::CoarseStart;
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]
 pub struct Solved<'a> {
     /// As it was calibrated: with the noise that was estimated and the orders of temperature that the data call for.
     pub problem: Problem<'a>,
-    /// Where the iterations of one recording began.
-    pub start: Option<CoarseStart>,
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
-    /// Of the pass with feedback, where there was one.
-    pub feedback_history: Vec<Epoch>,
     pub iterated: Iterated,
     /// Mean square by which the parameters differ from those of other headings, where Earth rate does not tell them.
     pub by_headings: ParameterMatrix,
@@ -32,8 +26,8 @@ pub struct Solved<'a> {
 }
 
 impl<'a> Solved<'a> {
-    /// With noise as it is stated.
-    pub fn stated(
+    /// With noise of which nothing is said yet.
+    pub fn new(
         problem: &Problem<'a>,
         priors: Vec<AttitudePrior>,
         iterated: Iterated,
@@ -42,10 +36,8 @@ impl<'a> Solved<'a> {
         Self {
             noise: NoiseReport::stated(problem.options.noise, None),
             problem: problem.clone(),
-            start: None,
             priors,
             passes,
-            feedback_history: Vec::new(),
             iterated,
             by_headings: ParameterMatrix::zeros(),
             alone: Vec::new(),

@@ -33,15 +33,8 @@ impl Activity {
 
     /// Tells of a pass of the filter.
     pub fn pass(&self, pass: &Pass) {
-        let kind = if pass.feedback {
-            "first pass"
-        } else {
-            "Gauss–Newton iteration"
-        };
-        self.next(format!(
-            "{kind} done, largest step {:.2} σ",
-            pass.largest_step
-        ));
+        let step = pass.largest_step;
+        self.next(format!("iteration done, largest step {step:.2} σ"));
     }
 }
 

@@ -141,17 +141,16 @@ fn observability() -> Observability {
 }
 
 fn passes() -> Vec<Pass> {
-    let pass = |feedback, largest_step, cost, rejected| Pass {
-        feedback,
+    let pass = |largest_step, cost, rejected| Pass {
         largest_step,
         cost,
         observations: 7200,
         rejected,
     };
     vec![
-        pass(true, 812.0, 9.1e5, 4),
-        pass(false, 3.1, 7310.0, 9),
-        pass(false, 0.004, 7195.2, 9),
+        pass(812.0, 9.1e5, 4),
+        pass(3.1, 7310.0, 9),
+        pass(0.004, 7195.2, 9),
     ]
 }
 
@@ -234,7 +233,6 @@ fn outcome(
         passes: passes(),
         converged: true,
         log_determinant: 0.0,
-        feedback_history: history(0.8),
         history: history(0.3),
         innovations,
         consistency: consistency(),

@@ -15,11 +15,11 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
+use super::constants::{Prior, of_parameters};
 use super::error::CalibrationError;
 use super::outcome::Outcome;
 use super::parameters::{PARAMETERS, ParameterMatrix};
 use super::problem::Problem;
-use super::reduction::Prior;
 use crate::calibration::budget::curvature::curvature;
 use crate::calibration::layout::Layout;
 use crate::imu::{MotionNoise, Sensor};
@@ -70,7 +70,7 @@ impl Budget {
         };
         let own = reduction(None)?;
         let prior = Prior::new(&own.constants, &problem.model, &outcome.linearised_at);
-        let posterior = own.posterior(&prior)?;
+        let posterior = own.posterior(&prior);
         let of_noise = |source: BudgetSource| {
             let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|factor| {
                 let reduction = reduction(Some((source, factor)))?;
@@ -78,12 +78,12 @@ impl Budget {
             });
             let fall = (less? - more?) / (2.0 * STEP);
             let part = &posterior.covariance * fall * &posterior.covariance;
-            Ok::<_, CalibrationError>((source, own.of_parameters(&part)))
+            Ok::<_, CalibrationError>((source, of_parameters(&own.constants, &part)))
         };
         let sources = problem.sources().into_par_iter();
         let mut by_source = sources.map(of_noise).collect::<Result<Vec<_>, _>>()?;
-        for (source, part) in own.by_prior(&posterior, &prior) {
-            by_source.push((source, own.of_parameters(&part)));
+        for (source, part) in prior.parts(&posterior) {
+            by_source.push((source, of_parameters(&own.constants, &part)));
         }
         let filter: ParameterMatrix = by_source.iter().map(|(_, part)| part).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
@@ -154,7 +154,7 @@ impl Problem<'_> {
     /// The sources of noise that its reduction has.
     fn sources(&self) -> BTreeSet<BudgetSource> {
         let model = &self.model;
-        let layout = Layout::new(model).reduced(self.one_gravity());
+        let layout = Layout::new(model, self.one_gravity());
         let mut all: BTreeSet<_> = (0..layout.size())
             .map(|state| layout.source(state))
             .collect();

@@ -1,8 +1,8 @@
 use super::*;
-use crate::calibration::checks::innovation::Innovation;
 use crate::calibration::gauss_newton::UNWATCHED;
 use crate::calibration::model::Model;
-use crate::calibration::pass::{Gate, Mode, PassResult, pass};
+use crate::calibration::pass::{Gate, PassResult, pass};
+use crate::calibration::reduction::Script;
 use crate::calibration::{ErrorTerm, NoisePolicy, Options, estimate};
 use crate::imu::{Sensor, Term};
 use crate::run::{Aiding, Run};
@@ -27,8 +27,8 @@ fn difference(a: &ParameterMatrix, b: &ParameterMatrix) -> f64 {
 
 fn once_more(problem: &Problem, outcome: &Outcome) -> PassResult {
     let (priors, at) = (&outcome.prior_attitudes, &outcome.linearised_at);
-    let gate: &[Innovation] = &outcome.innovations;
-    pass(problem, priors, at, Mode::Held(Gate::As(gate))).unwrap()
+    let script = Script::new(problem, priors, at).unwrap();
+    pass(problem, &script, Gate::As(&outcome.accepted())).unwrap()
 }
 
 #[test]
@@ -103,7 +103,8 @@ fn held_against_passes(run: &Run, options: &Options) -> usize {
         let covariance = |factor: f64| {
             let mut model = model.clone();
             change(&mut model, factor.sqrt());
-            once_more(&problem.with_model(model), &outcome).covariance
+            let again = once_more(&problem.with_model(model), &outcome);
+            again.posterior.parameter_covariance
         };
         let lost = (covariance(1.0 + STEP) - covariance(1.0 - STEP)) / (2.0 * STEP);
         let apart = lost - part.covariance;

@@ -13,7 +13,8 @@ use serde_json::json;
 
 use super::finding::{Finding, widened_by};
 use super::innovation::mean_square_interval;
-use crate::calibration::reduction::{Posterior, Prior, Reduction};
+use crate::calibration::constants::{Posterior, Prior};
+use crate::calibration::reduction::Reduction;
 use crate::statistics::FALSE_ALARM;
 
 /// A direction of which a dwell has less than this part of all information says nothing of the dwell but
@@ -74,7 +75,7 @@ impl DwellScores {
         let before = shares.sum::<f64>();
         let mut squares = Vec::new();
         let mut robust = DMatrix::zeros(n, n);
-        for dwell in &reduction.dwells {
+        for dwell in reduction.dwells() {
             let rows = dwell.select_columns(&on) * &scaled;
             let residual = dwell.column(all) - dwell.columns(0, all) * &posterior.mean;
             let (gained, score) = (rows.tr_mul(&rows), rows.tr_mul(&residual));

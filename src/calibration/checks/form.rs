@@ -4,11 +4,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::Finding;
+use crate::calibration::constants::Prior;
 use crate::calibration::error::CalibrationError;
+use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::parameters::in_general_form;
-use crate::calibration::pass::{Gate, Mode, PassResult, pass};
 use crate::calibration::problem::Problem;
+use crate::calibration::reduction::Script;
 use crate::imu::InstallationForm;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
@@ -47,13 +49,13 @@ impl FormTest {
     }
 }
 
-/// Tests the form of a converged pass by one more in the general form, linearised at the same
+/// Tests the form of a converged pass by what the record says in the general form, linearised at the same
 /// estimate (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many
 /// angles as the general one, which no data can reject.
 pub fn form_test(
     restricted: &Problem,
     priors: &[AttitudePrior],
-    held: &PassResult,
+    iterated: &Iterated,
 ) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();
@@ -63,13 +65,15 @@ pub fn form_test(
     }
     let model = restricted.model.in_form(restricted.run(), general);
     let at = Linearisation {
-        triads: in_general_form(&held.estimate.triads),
-        ..held.estimate.clone()
+        triads: in_general_form(&iterated.estimate.triads),
+        ..iterated.estimate.clone()
     };
-    let gate = Gate::As(&held.innovations);
-    let free = pass(&restricted.with_model(model), priors, &at, Mode::Held(gate))?;
+    let general = restricted.with_model(model);
+    let script = Script::new(&general, priors, &at)?;
+    let free = script.reduce(&general, &iterated.held.accepted())?;
+    let free = free.posterior(&Prior::new(&free.constants, &general.model, &at));
     Ok(Some(FormTest {
-        gain: held.cost - free.cost,
+        gain: iterated.held.posterior.cost - free.cost,
         angles: more,
         limit: chi_square_limit(more as f64, FALSE_ALARM),
     }))

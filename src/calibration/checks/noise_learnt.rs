@@ -8,11 +8,7 @@ use crate::calibration::noise::{NoiseReport, SourceFigures};
 /// The finding of a report of noise that was learnt because the data contradict what is stated.
 pub fn of_report(noise: &NoiseReport) -> Option<Finding> {
     let test = noise.test.filter(|test| noise.learnt && test.rejected)?;
-    Some(noise_learnt(
-        test.ratio.unwrap_or(f64::NAN),
-        test.ratio_limit,
-        &noise.sources,
-    ))
+    Some(noise_learnt(test.ratio, test.limit, &noise.sources))
 }
 
 /// Noise that was learnt: −2 ln of the likelihood ratio of stated to learnt noise, its limit, and the sources.

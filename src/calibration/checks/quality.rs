@@ -9,8 +9,9 @@ use crate::attitude::{exp, level, log, tilt};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::outcome::Outcome;
-use crate::calibration::pass::{Gate, Mode, pass};
+use crate::calibration::pass::{Gate, pass};
 use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::reduction::Script;
 use crate::calibration::start::closed_form::{ClosedForm, Reference, six_position_by};
 use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
@@ -87,11 +88,11 @@ impl Outcome {
             ..self.linearised_at.clone()
         };
         let half = every_other(problem).and_then(|half| {
-            let mode = Mode::Held(Gate::Innovations);
+            let script = Script::new(&half, &self.prior_attitudes, &self.linearised_at);
             // Half the dwells may be too few.
-            pass(&half, &self.prior_attitudes, &self.linearised_at, mode).ok()
+            pass(&half, &script.ok()?, Gate::Innovations).ok()
         });
-        let held_out = half.map(|half| measures(problem, &half.estimate, |k| k % 2 == 1));
+        let held_out = half.map(|half| measures(problem, &half.estimate(), |k| k % 2 == 1));
         Ok(Quality {
             all: measures(problem, &estimate, |_| true)?,
             held_out: held_out.transpose()?,

@@ -1,23 +1,25 @@
-//! What constants that are no states do to a filter.
+//! What constants do to a filter.
 //!
-//! The filter is linear: with such constants at q instead of zero its mean would be `x + U q`, and its
+//! The filter is linear: with constants at q instead of zero its mean would be `x + U q`, and its
 //! innovations `ν − G q` with the same covariance. U is carried along; whitened rows `[G ν]` are kept. Estimate and
 //! covariance of q, and what q does to every state, are those of a filter that has q among its states, of any prior
 //! and any part of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)),
 //! without the cost of that filter.
 
-use faer::MatRef;
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::Linear;
+use crate::calibration::constants::triangle;
 
-/// Constants that are no states, and what they do to a filter.
+/// What constants do to a filter.
 #[derive(Debug, Clone)]
 pub struct Columns {
     /// U, a column for each state.
     pub of_states: DMatrix<f64>,
-    /// Whitened rows `[G ν]`, one after the other.
+    /// Whitened rows `[G ν]`, one after the other …
     rows: Vec<f64>,
+    /// … and how many of these numbers were looked at.
+    looked_at: usize,
     /// Squares of what was observed that no constant and no state has a part in.
     pub squares: f64,
     /// Logarithm of the determinant of the covariance of what was observed, the constants given.
@@ -30,6 +32,7 @@ impl Columns {
         Self {
             of_states: DMatrix::zeros(constants, states),
             rows: Vec::new(),
+            looked_at: 0,
             squares: 0.0,
             log_determinant: 0.0,
         }
@@ -81,22 +84,26 @@ impl Columns {
         }
     }
 
+    /// The rows that were not looked at before.
+    pub fn new_rows(&mut self) -> DMatrix<f64> {
+        let rows = self.matrix(&self.rows[self.looked_at..]);
+        self.looked_at = self.rows.len();
+        rows
+    }
+
     /// The rows since they were last taken, a triangle of them where they are more than that has.
     pub fn take_rows(&mut self) -> DMatrix<f64> {
-        let columns = self.of_states.nrows() + 1;
-        let rows = std::mem::take(&mut self.rows);
-        let rows = DMatrix::from_row_slice(rows.len() / columns, columns, &rows);
-        match rows.nrows() > columns {
+        let rows = self.matrix(&self.rows);
+        self.rows.clear();
+        self.looked_at = 0;
+        match rows.nrows() > rows.ncols() {
             true => triangle(&rows),
             false => rows,
         }
     }
-}
 
-/// The upper triangle that has the same squares as these rows, by Householder's reflections.
-pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
-    let rows = MatRef::from_column_major_slice(rows.as_slice(), rows.nrows(), rows.ncols());
-    let qr = rows.qr();
-    let triangle = qr.thin_R();
-    DMatrix::from_fn(triangle.nrows(), triangle.ncols(), |i, j| triangle[(i, j)])
+    fn matrix(&self, rows: &[f64]) -> DMatrix<f64> {
+        let columns = self.of_states.nrows() + 1;
+        DMatrix::from_row_slice(rows.len() / columns, columns, rows)
+    }
 }

@@ -79,6 +79,11 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
         }
     }
 
+    /// Whether innovations are worked out.
+    pub fn has_innovations(&self) -> bool {
+        self.given.is_some()
+    }
+
     /// Errors of a state become more by a known amount.
     pub fn refer(&mut self, state: usize, by: f64) {
         self.mean[state] += by;

@@ -4,6 +4,9 @@ use super::Filter;
 use super::dwell_update::{ObservationJudge, Taken};
 use super::gain_cache::GainCache;
 use super::step_at_rest::begins;
+use crate::calibration::constants::Known;
+use crate::calibration::model::Model;
+use crate::calibration::problem::Stretch;
 use crate::calibration::record::segment::Segment;
 
 /// Takes parts of dwells into filters of one kind: what moves in them is always the same.
@@ -33,18 +36,20 @@ impl DwellFilters {
         })
     }
 
-    /// Takes in a part of a dwell.
+    /// Takes in a part of a dwell. Innovations are worked out where it is told what is `known` of the constants.
     pub fn take_in(
         &mut self,
         filter: &mut Filter,
         segment: &Segment,
-        observer: &mut impl ObservationJudge,
+        of: (&Model, &Stretch),
+        known: Option<&Known>,
+        judge: &mut impl ObservationJudge,
     ) -> Taken {
         match &mut self.0 {
-            Moving::Navigation(gains) => filter.update_dwell(segment, gains, observer),
-            Moving::Three(gains) => filter.update_dwell(segment, gains, observer),
-            Moving::Six(gains) => filter.update_dwell(segment, gains, observer),
-            Moving::Nine(gains) => filter.update_dwell(segment, gains, observer),
+            Moving::Navigation(gains) => filter.update_dwell((segment, gains), of, known, judge),
+            Moving::Three(gains) => filter.update_dwell((segment, gains), of, known, judge),
+            Moving::Six(gains) => filter.update_dwell((segment, gains), of, known, judge),
+            Moving::Nine(gains) => filter.update_dwell((segment, gains), of, known, judge),
         }
     }
 }

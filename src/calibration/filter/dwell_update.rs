@@ -6,8 +6,11 @@ use super::gain_cache::GainCache;
 use super::measurement::ScalarInnovation;
 use super::step_at_rest::Map;
 use crate::calibration::checks::innovation::Observation;
+use crate::calibration::constants::Known;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
-use crate::calibration::record::segment::{Seen, Segment, Standing};
+use crate::calibration::model::Model;
+use crate::calibration::problem::Stretch;
+use crate::calibration::record::segment::{Segment, Standing};
 
 /// What is done with an innovation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,21 +29,19 @@ pub struct Innovations {
     pub scalars: [ScalarInnovation; 3],
 }
 
-/// Who decides on innovations, and what variance the observations have.
+/// Who decides on observations.
 pub trait ObservationJudge {
-    /// Of each component.
-    fn variance(&self, seen: &Seen) -> f64;
+    /// By its innovation.
     fn judge(&mut self, innovations: Innovations) -> Verdict;
 
-    /// Whether verdicts are known: innovations are not worked out then.
-    fn verdicts_are_known(&self) -> bool {
-        false
-    }
+    /// Whether the next one is let in, where innovations are not worked out.
+    fn is_let_in(&mut self) -> bool;
 
-    /// The verdict that is known on the next observation.
-    fn known_verdict(&mut self) -> Verdict {
-        Verdict::Accepted
-    }
+    /// A dwell begins, after a move or not.
+    fn begin(&mut self, _after_move: bool) {}
+
+    /// The dwell that has begun begins once more.
+    fn begin_again(&mut self) {}
 }
 
 /// What a part of a dwell did.
@@ -53,12 +54,13 @@ pub enum Taken {
 }
 
 impl Filter {
-    /// Takes in a part of a dwell.
+    /// Takes in a part of a dwell. Innovations are worked out where it is told what is `known` of the constants.
     pub fn update_dwell<const M: usize, const G: usize>(
         &mut self,
-        segment: &Segment,
-        gains: &mut GainCache<M, G>,
-        observer: &mut impl ObservationJudge,
+        (segment, gains): (&Segment, &mut GainCache<M, G>),
+        of: (&Model, &Stretch),
+        known: Option<&Known>,
+        judge: &mut impl ObservationJudge,
     ) -> Taken {
         let Some(first) = segment.models.first() else {
             return Taken::Whole;
@@ -68,17 +70,15 @@ impl Filter {
         gains.tidy();
         let models = self.models(segment, gains);
         let across = &map.given.states * &self.p;
-        let given = (!observer.verdicts_are_known()).then(|| self.given(&map.given, &across));
+        let given = known.map(|known| self.given(&map.given, &across, known));
         let mut dwell = DwellFilter::new(given, gains);
-        match self.through(&mut dwell, (segment, &models), observer) {
+        match self.through(&mut dwell, (segment, &models), of, judge) {
             Taken::Whole => {}
             other => return other,
         }
         let outcome = dwell.outcome();
-        if let Some(columns) = &mut self.columns {
-            columns.squares += outcome.squares;
-            columns.log_determinant += outcome.log_determinant;
-        }
+        self.columns.squares += outcome.squares;
+        self.columns.log_determinant += outcome.log_determinant;
         if !outcome.values.is_empty() {
             let measured = map.given.combined(&outcome.measured);
             let across = &outcome.measured * across;
@@ -105,16 +105,12 @@ impl Filter {
         &self,
         dwell: &mut DwellFilter<M, G>,
         (segment, models): (&Segment, &[usize]),
-        observer: &mut impl ObservationJudge,
+        (model, stretch): (&Model, &Stretch),
+        judge: &mut impl ObservationJudge,
     ) -> Taken {
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
         for step in &segment.steps {
-            let Standing {
-                time,
-                model,
-                referred,
-                seen,
-            } = step;
+            let Standing { time, referred, .. } = step;
             let turned = turn.map(|turn| (turn, referred[0]));
             let errors = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(*referred);
             for (first, by) in errors.chain(turned) {
@@ -122,8 +118,8 @@ impl Filter {
                     dwell.refer(first + axis, by[axis]);
                 }
             }
-            dwell.propagate(models[*model]);
-            for seen in &segment.seen[seen.clone()] {
+            dwell.propagate(models[step.model]);
+            for seen in &segment.seen[step.seen.clone()] {
                 let state = match seen.kind {
                     Observation::Velocity => VELOCITY,
                     Observation::Table => ATTITUDE,
@@ -132,11 +128,10 @@ impl Filter {
                 let observed = Observed {
                     state,
                     residual: seen.residual,
-                    variance: observer.variance(seen),
+                    variance: stretch.observation_variance(model, seen.kind, seen.readings),
                 };
-                if observer.verdicts_are_known() {
-                    let accepted = observer.known_verdict() == Verdict::Accepted;
-                    if accepted && dwell.update_unjudged(&observed).is_none() {
+                if !dwell.has_innovations() {
+                    if judge.is_let_in() && dwell.update_unjudged(&observed).is_none() {
                         return Taken::Diverged;
                     }
                     continue;
@@ -149,7 +144,7 @@ impl Filter {
                     kind: seen.kind,
                     scalars: prediction.scalars,
                 };
-                match observer.judge(innovations) {
+                match judge.judge(innovations) {
                     Verdict::Accepted => dwell.update(&prediction),
                     Verdict::Rejected => {}
                     Verdict::Abandoned => return Taken::Abandoned,

@@ -1,4 +1,4 @@
-//! The Kalman filter: covariance in block form, measurements one scalar at a time.
+//! The Kalman filter over what moves or is drawn anew. What constants do to it are columns that it carries.
 
 pub mod columns;
 pub mod dwell_filter;
@@ -17,17 +17,16 @@ mod update;
 pub use dwell_filters::DwellFilters;
 pub use dwell_update::{Innovations, ObservationJudge, Taken, Verdict};
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
-use crate::calibration::linearisation::{Linearisation, Start};
+use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector, to_vector};
 use crate::calibration::record::segment::between;
 use crate::calibration::several::day_to_day::{DayToDay, Difference, Turned};
-use crate::imu::{PerSensor, TermVector, ThermalCoefficients};
+use crate::imu::PerSensor;
 use crate::navigation::{ProcessNoise, State};
 use columns::Columns;
 
@@ -45,8 +44,8 @@ pub struct Filter {
     day_to_day: DayToDay,
     /// What the mounting of the recording does to the parameters, where it has its own.
     turned: Option<Turned>,
-    /// What constants that are no states do.
-    pub columns: Option<Columns>,
+    /// What constants do.
+    pub columns: Columns,
     /// The source whose variance is multiplied, and by what, see [`Model::weight`].
     varied: Option<(BudgetSource, f64)>,
 }
@@ -61,61 +60,25 @@ pub enum Since<'a> {
 }
 
 impl Filter {
-    /// Before the first stretch begins, with the means of what is constant.
-    pub fn new(model: &Model, errors: &PriorErrors) -> Self {
-        Self::of(Layout::new(model), model, errors)
-    }
-
-    /// The same with all constants as columns, gravity where it is the same throughout.
-    pub fn reduced(model: &Model, one_gravity: bool) -> Self {
-        let layout = Layout::new(model).reduced(one_gravity);
-        let columns = layout.columns().len();
-        let filter = Self::of(layout, model, &PriorErrors::none());
-        Self {
-            columns: Some(Columns::new(columns, filter.x.len())),
-            ..filter
-        }
-    }
-
-    fn of(layout: Layout, model: &Model, errors: &PriorErrors) -> Self {
+    /// Before the first stretch begins, of recordings with one gravity or with more.
+    pub fn new(model: &Model, one_gravity: bool) -> Self {
+        let layout = Layout::new(model, one_gravity);
         let n = layout.size();
-        let (mut x, mut p) = (DVector::zeros(n), DMatrix::zeros(n, n));
-        for (state, index) in layout.parameters() {
-            x[state] = errors.parameters[index];
-            p[(state, state)] = model.prior_sigma[index].powi(2);
-        }
-        for (state, index) in layout.terms() {
-            x[state] = errors.terms[index];
-            p[(state, state)] = model.term_sigma[index].powi(2);
-        }
-        if let Some(thermal) = model.thermal.as_deref() {
-            for (state, coefficient) in layout.thermal() {
-                x[state] = coefficient.of(&errors.thermal);
-                p[(state, state)] = coefficient.of(&thermal.sigma).powi(2);
-            }
-        }
-        for (state, axis) in layout.table_base() {
-            p[(state, state)] = model.geometry.base[axis].powi(2);
-        }
-        for (state, k) in layout.table_axes() {
-            p[(state, state)] = model.geometry.axes[k].powi(2);
-        }
         let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
             let variation = model.noise.get(sensor).gauss_markov?;
             Some((state, variation.sigma, variation.correlation_time))
         });
-        let varying = varying.collect();
         Self {
+            varying: varying.collect(),
+            columns: Columns::new(layout.constants().len(), n),
             layout,
-            x,
-            p,
+            x: DVector::zeros(n),
+            p: DMatrix::zeros(n, n),
             rotation_at_rest: model.turning_at_rest
                 * model.weight(BudgetSource::RotationAtRest).sqrt(),
             noise: model.process_noise(),
-            varying,
             day_to_day: model.day_to_day,
             turned: None,
-            columns: None,
             varied: model.varied,
         }
     }
@@ -164,9 +127,7 @@ impl Filter {
     /// Forgets a state: its error is drawn anew, independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
-        if let Some(columns) = &mut self.columns {
-            columns.redraw(state);
-        }
+        self.columns.redraw(state);
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
         self.p[(state, state)] = sigma.powi(2) * self.weight_of(state);
@@ -185,6 +146,11 @@ impl Filter {
         if let Some(table) = self.layout.table_position() {
             (table..table + 3).for_each(|state| self.redraw(state, 0.0, sigma));
         }
+    }
+
+    /// The body has come to rest after a move by hand, from which nothing is learnt of its velocity.
+    pub fn redraw_velocity(&mut self, sigma: f64) {
+        (VELOCITY..VELOCITY + 3).for_each(|state| self.redraw(state, 0.0, sigma));
     }
 
     /// The body does not turn from now on: what the computed attitude does is an error.
@@ -208,11 +174,9 @@ impl Filter {
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;
-            if let Some(columns) = &mut self.columns {
-                for row in 0..3 {
-                    let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
-                    columns.add(first + row, turned);
-                }
+            for row in 0..3 {
+                let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
+                self.columns.add(first + row, turned);
             }
             let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
             let mut of_error = self.p.fixed_rows_mut::<3>(first);
@@ -234,78 +198,6 @@ impl Filter {
         }
     }
 
-    /// Estimated errors that a pass with feedback takes out of the mean.
-    pub fn take_feedback(&mut self) -> Feedback {
-        let feedback = Feedback {
-            attitude: self.at(ATTITUDE),
-            velocity: self.at(VELOCITY),
-            position: self.at(POSITION),
-            initial_attitude: self.initial_attitude(),
-            parameters: self.parameters(),
-            terms: self.terms(),
-        };
-        let constants = self.layout.parameters().chain(self.layout.terms());
-        let initial = self.layout.initial_attitude();
-        let taken = (0..NAVIGATION)
-            .chain(constants.map(|(state, _)| state))
-            .chain(initial..initial + 3);
-        for state in taken.collect::<Vec<_>>() {
-            self.x[state] = 0.0;
-        }
-        feedback
-    }
-
-    fn at(&self, first: usize) -> Vector3<f64> {
-        self.x.fixed_rows::<3>(first).into_owned()
-    }
-
-    /// Mean of the parameter errors δθ.
-    pub fn parameters(&self) -> ParameterVector {
-        let mut all = ParameterVector::zeros();
-        for (state, index) in self.layout.parameters() {
-            all[index] = self.x[state];
-        }
-        all
-    }
-
-    /// Covariance of the parameter errors; zero where fixed.
-    pub fn parameter_covariance(&self) -> ParameterMatrix {
-        let mut all = ParameterMatrix::zeros();
-        for (row, i) in self.layout.parameters() {
-            for (column, j) in self.layout.parameters() {
-                all[(i, j)] = self.p[(row, column)];
-            }
-        }
-        all
-    }
-
-    /// 1σ of the parameter errors.
-    pub fn parameter_sigma(&self) -> ParameterVector {
-        let mut all = ParameterVector::zeros();
-        for (state, index) in self.layout.parameters() {
-            all[index] = self.p[(state, state)].max(0.0).sqrt();
-        }
-        all
-    }
-
-    /// Mean of the errors of the error terms' parameters; zero where off.
-    pub fn terms(&self) -> TermVector {
-        let mut all = TermVector::zeros();
-        for (state, index) in self.layout.terms() {
-            all[index] = self.x[state];
-        }
-        all
-    }
-
-    /// Mean of the errors of the coefficients of temperature; zero where off.
-    pub fn thermal(&self) -> PerSensor<ThermalCoefficients> {
-        let mut all = PerSensor::<ThermalCoefficients>::default();
-        for (state, coefficient) in self.layout.thermal() {
-            *coefficient.of_mut(&mut all) = self.x[state];
-        }
-        all
-    }
-
     /// Mean of a state's error.
     pub fn mean(&self, state: usize) -> f64 {
         self.x[state]
@@ -315,62 +207,6 @@ impl Filter {
     pub fn covariance(&self, one: usize, other: usize) -> f64 {
         self.p[(one, other)]
     }
-
-    /// Mean and 1σ of the error of gravity, true − stated; zero where it is no state.
-    pub fn gravity(&self) -> (f64, f64) {
-        let of = |state: usize| (self.x[state], self.p[(state, state)].max(0.0).sqrt());
-        self.layout.gravity().map_or((0.0, 0.0), of)
-    }
-
-    /// 1σ of the initial attitude error φ₀ of this stretch, East, North and Up.
-    pub fn initial_attitude_sigma(&self) -> Vector3<f64> {
-        let first = self.layout.initial_attitude();
-        Vector3::from_fn(|axis, _| self.p[(first + axis, first + axis)].max(0.0).sqrt())
-    }
-
-    /// Mean of the initial attitude error φ₀ of this stretch.
-    pub fn initial_attitude(&self) -> Vector3<f64> {
-        self.at(self.layout.initial_attitude())
-    }
-}
-
-/// Means of the errors of what is constant, where a pass linearises away from the prior's mean.
-#[derive(Debug, Clone)]
-pub struct PriorErrors {
-    pub parameters: ParameterVector,
-    pub terms: TermVector,
-    pub thermal: PerSensor<ThermalCoefficients>,
-}
-
-impl PriorErrors {
-    /// Where a pass begins with what is known.
-    pub fn none() -> Self {
-        Self {
-            parameters: ParameterVector::zeros(),
-            terms: TermVector::zeros(),
-            thermal: PerSensor::default(),
-        }
-    }
-
-    /// At a point of linearisation.
-    pub fn at(model: &Model, at: &Linearisation) -> Self {
-        Self {
-            parameters: model.prior_mean - to_vector(&at.triads),
-            terms: -at.terms,
-            thermal: PerSensor::from_fn(|sensor| -at.thermal.get(sensor)),
-        }
-    }
-}
-
-/// What a pass with feedback takes out of the mean.
-#[derive(Debug, Clone, Copy)]
-pub struct Feedback {
-    pub attitude: Vector3<f64>,
-    pub velocity: Vector3<f64>,
-    pub position: Vector3<f64>,
-    pub initial_attitude: Vector3<f64>,
-    pub parameters: ParameterVector,
-    pub terms: TermVector,
 }
 
 const _: () = assert!(NAVIGATION == crate::navigation::error_model::STATES);

@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 
 use super::Filter;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::layout::{ATTITUDE, Constant, NAVIGATION};
+use crate::calibration::constants::Constant;
+use crate::calibration::layout::{ATTITUDE, NAVIGATION};
 use crate::calibration::parameters::{ParameterVector, parameter, sensor_and_parameter};
 use crate::calibration::several::day_to_day::OwnState;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
@@ -40,14 +41,14 @@ impl Filter {
                 (None, _) => f64::from(moving[row] == k),
             }
         });
-        let columns: Vec<_> = self.column_effects(block).collect();
-        let added = DMatrix::from_fn(columns.len(), MOVING, |k, place| columns[k][own(place)]);
+        let constants: Vec<_> = self.constant_effects(block).collect();
+        let added = DMatrix::from_fn(constants.len(), MOVING, |k, place| constants[k][own(place)]);
         self.carry(&moving, transition, &noise, &added);
     }
 
     /// Only the rows of Φ of the states that move differ from identity. Of `Φ P Φᵀ + Q` only their rows and
     /// columns change. `transition` holds these rows, a column for each of the first states; `added` what
-    /// constants that are no states add, a row each.
+    /// constants add, a row each.
     pub fn carry(
         &mut self,
         moving: &[usize],
@@ -69,9 +70,7 @@ impl Filter {
                 self.p[(at_row, at_column)] = corner[(row, column)];
             }
         }
-        if let Some(columns) = &mut self.columns {
-            columns.propagate(moving, &transition, added);
-        }
+        self.columns.propagate(moving, &transition, added);
     }
 
     /// Covariance that a block adds to the navigation errors.
@@ -105,9 +104,8 @@ impl Filter {
         let layout = &self.layout;
         let navigation = block.navigation.column_iter();
         let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
-        let constants = layout
-            .driving()
-            .map(|constant| self.effect(block, constant));
+        let gravity = layout.gravity().map(|_| Constant::Gravity);
+        let gravity = gravity.map(|gravity| self.effect(block, gravity));
         // A bias does the same whether it varies or stays.
         let varying = layout.varying_biases().map(|(_, sensor, constant)| {
             let columns = block.parameters.get(sensor);
@@ -122,22 +120,21 @@ impl Filter {
             }
         });
         navigation
-            .chain(constants)
+            .chain(gravity)
             .chain(varying)
             .chain(own)
             .collect()
     }
 
-    /// The same of each constant that is no state.
-    pub fn column_effects<'a>(
+    /// What each constant makes of the navigation errors.
+    pub fn constant_effects<'a>(
         &'a self,
         block: &'a Block,
     ) -> impl Iterator<Item = [f64; NAVIGATION]> + 'a {
-        let columns = self.layout.columns().iter();
-        columns.map(|&constant| self.effect(block, constant))
+        let constants = self.layout.constants().iter();
+        constants.map(|&constant| self.effect(block, constant))
     }
 
-    /// What a constant makes of the navigation errors.
     fn effect(&self, block: &Block, constant: Constant) -> [f64; NAVIGATION] {
         match constant {
             Constant::Parameter(index) => match &self.turned {
@@ -174,9 +171,7 @@ impl Filter {
             let (state, sigma, correlation_time) = self.varying[k];
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
-            if let Some(columns) = &mut self.columns {
-                columns.scale(state, keep);
-            }
+            self.columns.scale(state, keep);
             self.p.row_mut(state).scale_mut(keep);
             self.p.column_mut(state).scale_mut(keep);
             let driven = sigma.powi(2) * self.weight_of(state);

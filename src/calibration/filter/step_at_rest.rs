@@ -6,7 +6,8 @@ use super::Filter;
 use super::gain_cache::StepModel;
 use super::input_prior::InputPrior;
 use super::linear::Linear;
-use crate::calibration::layout::{ATTITUDE, Constant, NAVIGATION, POSITION, VELOCITY};
+use crate::calibration::constants::{Constant, Known};
+use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::segment::Segment;
 use crate::navigation::Block;
 
@@ -55,7 +56,7 @@ impl Filter {
                 }
             }
         }
-        for (k, column) in self.column_effects(block).enumerate() {
+        for (k, column) in self.constant_effects(block).enumerate() {
             for (row, rate) in rates(block, &column).into_iter().enumerate() {
                 given.columns[(first + row, k)] = rate;
             }
@@ -78,19 +79,12 @@ impl Filter {
     /// By how much the attitude of the table is off.
     fn table_map(&self, segment: &Segment) -> Linear {
         let mut table = self.none(3);
-        let position = self.layout.table_position().into_iter();
-        let position = position.flat_map(|first| (0..3).map(move |axis| (first + axis, axis)));
-        for (state, axis) in position.chain(self.layout.table_base()) {
-            table.states[(axis, state)] = 1.0;
-        }
         let response = segment.axes.as_deref();
         for axis in 0..3 {
-            if let Some(response) = response {
-                for (state, k) in self.layout.table_axes() {
-                    table.states[(axis, state)] = response[(axis, k)];
-                }
+            if let Some(position) = self.layout.table_position() {
+                table.states[(axis, position + axis)] = 1.0;
             }
-            for (k, constant) in self.layout.columns().iter().enumerate() {
+            for (k, constant) in self.layout.constants().iter().enumerate() {
                 table.columns[(axis, k)] = match constant {
                     Constant::Base(of) => f64::from(*of == axis),
                     Constant::Axis(of) => response.map_or(0.0, |response| response[(axis, *of)]),
@@ -101,10 +95,17 @@ impl Filter {
         table
     }
 
-    /// What is known of `g` before, given its covariance with all states.
-    pub fn given<const G: usize>(&self, rows: &Linear, across: &DMatrix<f64>) -> InputPrior<G> {
-        let mean = &rows.states * &self.x;
-        let covariance = across * rows.states.transpose();
+    /// What is known of `g` before, given its covariance with all states and what is known of the constants.
+    pub fn given<const G: usize>(
+        &self,
+        rows: &Linear,
+        across: &DMatrix<f64>,
+        known: &Known,
+    ) -> InputPrior<G> {
+        let by_constants = &rows.states * self.columns.of_states.transpose() + &rows.columns;
+        let (of_constants, root) = known.through(&by_constants);
+        let mean = &rows.states * &self.x + of_constants;
+        let covariance = across * rows.states.transpose() + &root * root.transpose();
         InputPrior::new(
             std::array::from_fn(|i| mean[i]),
             std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),

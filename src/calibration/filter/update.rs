@@ -9,7 +9,7 @@ use super::measurement::Measurement;
 impl Filter {
     /// So many quantities that no error does anything to.
     pub fn none(&self, rows: usize) -> Linear {
-        Linear::zeros(rows, self.x.len(), self.layout.columns().len())
+        Linear::zeros(rows, self.x.len(), self.layout.constants().len())
     }
 
     /// Takes in a measurement.
@@ -50,8 +50,6 @@ impl Filter {
         self.p.gemm(1.0, &gain, &rest.transpose(), 1.0);
         self.p.gemm(1.0, &rest, &gain.transpose(), 1.0);
         self.p.fill_lower_triangle_with_upper_triangle();
-        if let Some(columns) = &mut self.columns {
-            columns.update(h, &gain, (&whiten, &whitened));
-        }
+        self.columns.update(h, &gain, (&whiten, &whitened));
     }
 }

@@ -51,15 +51,14 @@ impl Scale {
         };
         // As much in a step as the random walk.
         let over_step = |variance: f64| if step > 0.0 { variance / step } else { 0.0 };
+        let table = problem.model.aiding == Aiding::Table;
         let reference = |source: Source| {
             let sigma = source.sigma(problem);
             match source {
                 // Beside a table's readings it says nothing.
-                Source::Attitude | Source::RotationAtRest
-                    if problem.model.aiding == Aiding::Table =>
-                {
-                    0.0
-                }
+                Source::Attitude | Source::RotationAtRest if table => 0.0,
+                // By hand velocity begins anew after each move.
+                Source::AccelMotion | Source::AccelMoving if !table => 0.0,
                 _ if source.stated(problem) => sigma.powi(2),
                 Source::GyroMotion => of_moves(Sensor::Gyro, moves.motion.gyro),
                 Source::AccelMotion => of_moves(Sensor::Accel, moves.motion.accel),
@@ -93,18 +92,20 @@ impl Scale {
         self.initial
     }
 
+    /// What is stated, and of what is not as much as the stated random walks make.
+    pub fn broad(&self) -> Factors {
+        let mut broad = self.initial;
+        for k in self.present() {
+            if !self.stated[k] {
+                broad.0[k] = broad.0[k].max(1.0);
+            }
+        }
+        broad
+    }
+
     /// The sources that the run can have.
     pub fn present(&self) -> Vec<usize> {
         (0..SOURCES).filter(|&k| self.reference[k] > 0.0).collect()
-    }
-
-    /// What a source has that the data do not call for: what is stated, else nothing.
-    pub fn needless(&self, source: usize) -> f64 {
-        if self.stated[source] {
-            self.initial.0[source]
-        } else {
-            0.0
-        }
     }
 
     /// Whether a figure of it is stated that is not zero.

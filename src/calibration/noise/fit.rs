@@ -1,4 +1,4 @@
-//! Fisher scoring over the factors, and the score test of a point.
+//! Which sources the data call for, and Fisher scoring over their factors.
 //!
 //! Source: gradient and expected information of a Gaussian likelihood by its innovations, Gupta and Mehra
 //! 1974, "Computational aspects of maximum likelihood estimation and reduction in sensitivity function
@@ -9,12 +9,18 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::factors::{Factors, SOURCES, Scale};
+use super::likelihood_ratio::limit;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::problem::Problem;
 use crate::calibration::reduction::{Replay, Script};
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
+/// Chance that scores call for a likelihood ratio which is not needed. The score of a variance is as skewed as χ², so it
+/// does not decide; but it costs no fit.
+const SCREEN: f64 = 0.05;
+/// Chance that a source which is not there is kept.
+const NEEDLESS: f64 = 0.05;
 /// Step of ln σ, or of a variance that is zero over its reference, for differences.
 const DIFFERENCE: f64 = 1e-3;
 /// A variance that is not stated and below this of its reference is none.
@@ -49,6 +55,8 @@ pub struct Slope {
 #[derive(Debug, Clone)]
 pub struct Fit {
     pub factors: Factors,
+    /// Those that are not as stated.
+    pub sources: Vec<usize>,
     /// −2 ln of the likelihood there, without the prior of factors.
     pub deviance: f64,
 }
@@ -110,21 +118,103 @@ impl Likelihood<'_> {
             .sum()
     }
 
+    /// The factors of largest posterior density of all sources, from those of another point of linearisation on; as
+    /// stated where the score of no source is beyond chance.
+    pub fn fit(&self, before: Option<&Fit>) -> Result<Fit, CalibrationError> {
+        let present = self.scale.present();
+        let stated = self.scale.initial();
+        let start = match before {
+            Some(before) => before.factors,
+            None => {
+                let slope = self.slope(&stated, &present)?;
+                if !self.is_called_for(&slope, &stated, &present) {
+                    return Ok(Fit {
+                        factors: stated,
+                        sources: Vec::new(),
+                        deviance: slope.here.deviance(),
+                    });
+                }
+                self.scale.broad()
+            }
+        };
+        let of_before = |k: &usize| before.is_none_or(|before| before.sources.contains(k));
+        let mut sources: Vec<usize> = present.into_iter().filter(of_before).collect();
+        let mut factors = self.settled(&start, &sources)?;
+        if before.is_none() {
+            sources = self.called_for(&mut factors, &sources)?;
+            factors = self.settled(&factors, &sources)?;
+        }
+        Ok(Fit {
+            factors,
+            deviance: self.replay(&factors)?.deviance(),
+            sources,
+        })
+    }
+
+    /// Those of these sources that the data call for, at the factors of largest posterior density; the others become
+    /// nothing.
+    ///
+    /// A variance cannot be below zero, so fitting every source gives a small one to about half of those that are not
+    /// there, and their sum makes σ of the parameters too large. The least of those that nobody states goes first, then
+    /// the least of what the others make of it, in the quadratic model of the likelihood.
+    fn called_for(
+        &self,
+        factors: &mut Factors,
+        sources: &[usize],
+    ) -> Result<Vec<usize>, CalibrationError> {
+        let at = *factors;
+        let above_zero = sources.iter().copied().filter(|&k| at.0[k] > 0.0);
+        let mut left: Vec<usize> = above_zero.collect();
+        let slope = self.slope(&at, &left)?;
+        let (_, information) = self.posterior(&slope, &at, &left);
+        let Some(inverse) = information.cholesky().map(|root| root.inverse()) else {
+            return Ok(left);
+        };
+        // Variances, each in itself; 1σ of one is twice that of ln σ.
+        let mut values = DVector::<f64>::from_element(left.len(), 1.0);
+        let mut covariance = inverse * 4.0;
+        let limit = limit(0, 1, NEEDLESS);
+        loop {
+            let ratio = |i: &usize| values[*i].max(0.0).powi(2) / covariance[(*i, *i)];
+            let unstated = (0..left.len()).filter(|&i| !self.scale.is_stated(left[i]));
+            let least = unstated.min_by(|i, j| ratio(i).total_cmp(&ratio(j)));
+            let Some(least) = least.filter(|least| ratio(least) < limit) else {
+                return Ok(left);
+            };
+            let variance = covariance[(least, least)];
+            let column = covariance.column(least) / variance;
+            let value = values[least];
+            values -= &column * value;
+            covariance -= &column * column.transpose() * variance;
+            values = values.remove_row(least);
+            covariance = covariance.remove_row(least).remove_column(least);
+            factors.0[left.remove(least)] = 0.0;
+        }
+    }
+
+    /// Whether the score of any source is beyond chance.
+    fn is_called_for(&self, slope: &Slope, stated: &Factors, present: &[usize]) -> bool {
+        let beyond = (0..present.len()).filter(|&i| {
+            let one_sided = usize::from(stated.0[present[i]] == 0.0);
+            let limit = limit(1 - one_sided, one_sided, SCREEN / present.len() as f64);
+            slope.statistic(i, one_sided == 1) > limit
+        });
+        beyond.count() > 0
+    }
+
     /// The factors of largest posterior density of these sources, the others held.
     ///
     /// A variance that is zero and would go below rests until the others have settled; then each is
     /// looked at once more.
-    pub fn fit(&self, start: &Factors, sources: &[usize]) -> Result<Fit, CalibrationError> {
+    fn settled(&self, start: &Factors, sources: &[usize]) -> Result<Factors, CalibrationError> {
         let mut at = *start;
         let mut resting: Vec<usize> = Vec::new();
         let mut looked_again = false;
-        let mut deviance = f64::INFINITY;
         for _ in 0..STEPS {
             let moving = sources.iter().filter(|k| !resting.contains(k));
             let moving: Vec<usize> = moving.copied().collect();
             let slope = self.slope(&at, &moving)?;
-            deviance = slope.here.deviance();
-            let cost = deviance + self.penalty(&at);
+            let cost = slope.here.deviance() + self.penalty(&at);
             let (gradient, information) = self.posterior(&slope, &at, &moving);
             let (free, rests): (Vec<usize>, Vec<usize>) =
                 (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || gradient[i] > 0.0);
@@ -150,10 +240,7 @@ impl Likelihood<'_> {
             };
             at = there;
         }
-        Ok(Fit {
-            factors: at,
-            deviance,
-        })
+        Ok(at)
     }
 
     /// Score and information with those of the prior.
@@ -231,33 +318,12 @@ fn solve(mut information: DMatrix<f64>, score: &DVector<f64>) -> Option<DVector<
 }
 
 impl Slope {
-    /// Score statistic against any factors at all (Rao 1948): twice what the quadratic model of the
-    /// likelihood gains at most, where those of `bounded` cannot fall.
-    pub fn statistic(&self, bounded: &[usize]) -> f64 {
-        let n = self.score.len();
-        let mut largest = 0f64;
-        // The best point of a cone is the best of one of its faces that lies in it.
-        for face in 0..1usize << bounded.len() {
-            let at_zero = |i: &usize| {
-                let place = bounded.iter().position(|b| b == i);
-                place.is_some_and(|place| face >> place & 1 == 0)
-            };
-            let kept: Vec<usize> = (0..n).filter(|i| !at_zero(i)).collect();
-            let score = DVector::from_fn(kept.len(), |i, _| self.score[kept[i]]);
-            let information = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-                self.information[(kept[i], kept[j])]
-            });
-            let Some(step) = information.cholesky().map(|factor| factor.solve(&score)) else {
-                continue;
-            };
-            let inside = kept
-                .iter()
-                .zip(&step)
-                .all(|(i, &step)| step >= 0.0 || !bounded.contains(i));
-            if inside {
-                largest = largest.max(score.dot(&step));
-            }
+    /// Score statistic of one factor; zero where a variance at zero would fall.
+    fn statistic(&self, factor: usize, bounded: bool) -> f64 {
+        let (score, information) = (self.score[factor], self.information[(factor, factor)]);
+        match information > 0.0 && (score > 0.0 || !bounded) {
+            true => score.powi(2) / information,
+            false => 0.0,
         }
-        largest
     }
 }

@@ -5,9 +5,8 @@ use super::fit::{Fit, Likelihood};
 use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
-use super::selection::Selection;
 use super::source::Source;
-use crate::calibration::checks::innovation::{Innovation, Observation};
+use crate::calibration::checks::innovation::Observation;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::gauss_newton::{Progress, iterate};
 use crate::calibration::pass::Gate;
@@ -17,9 +16,6 @@ use crate::calibration::reduction::Script;
 use crate::calibration::solved::Solved;
 use crate::statistics::FALSE_ALARM;
 
-/// Chance that the score test calls for a likelihood ratio which it does not need. The score of a variance
-/// is as skewed as χ², so it does not decide; but it costs no fit.
-const SCREEN: f64 = 0.05;
 /// Points of linearisation at most.
 const ROUNDS: usize = 6;
 /// A change of −2 ln of the likelihood from one point of linearisation to the next that is nothing: a
@@ -34,76 +30,85 @@ const LONGEST: usize = 10;
 /// What 95 % stay below, in σ.
 const ONE_SIDED: f64 = 1.645;
 
-/// Keeps stated noise or estimates it, as the problem's options say, from what was solved with stated noise.
-pub fn learn<'a>(stated: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
-    let problem = &stated.problem.clone();
-    let policy = problem.options.noise;
+/// Keeps stated noise or estimates it, as the problem's options say, from what was solved with some noise, and iterates
+/// with that: noise at one point of linearisation, and again until neither moves.
+pub fn learn<'a>(
+    as_stated: &Problem<'a>,
+    solved: Solved<'a>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
+    let policy = as_stated.options.noise;
     if policy == NoisePolicy::Stated {
-        return Ok(stated);
+        return Ok(solved);
     }
-    let at = stated.iterated.held.estimate.clone();
-    let accepted = let_in(&stated.iterated.held.innovations);
-    let thinned = Thinned::new(problem, (accepted.len() / ENOUGH).clamp(1, LONGEST));
-    let script = Script::new(&thinned.problem, &stated.priors, &at)?;
-    let scale = Scale::new(problem, &script.moves());
+    let model = solved.problem.model.with_noise_of(&as_stated.model);
+    let as_stated = solved.problem.with_model(model);
+    let accepted = solved.iterated.held.accepted();
+    let thinned = Thinned::new(&as_stated, (accepted.len() / ENOUGH).clamp(1, LONGEST));
+    let script = Script::new(&thinned.problem, &solved.priors, &solved.iterated.estimate)?;
+    let scale = Scale::new(&as_stated, &script.moves());
     let likelihood = thinned.likelihood(&script, &scale, &accepted);
-    let (test, fitted) = likelihood.test(policy)?;
-    let contradicted = policy != NoisePolicy::Auto || test.rejected || !stated.iterated.converged;
-    let Some(fitted) = fitted.filter(|_| contradicted) else {
-        return Ok(Solved {
-            noise: NoiseReport::stated(policy, Some(test)),
-            ..stated
-        });
-    };
-    let selection = likelihood.select(&fitted.factors, scale.present())?;
-    with_noise(stated, (selection, test), &scale, accepted, progress)
+    let fit = likelihood.fit(None)?;
+    let test = likelihood.test(&fit)?;
+    if test.rejected || policy == NoisePolicy::Learnt {
+        return with_noise(&as_stated, solved.clone(), (fit, test), &scale, progress);
+    }
+    let noise = NoiseReport::stated(policy, Some(test));
+    if solved.problem.model == as_stated.model {
+        return Ok(Solved { noise, ..solved });
+    }
+    let mut passes = solved.passes;
+    let (from, gate) = (solved.iterated.estimate, Gate::Innovations);
+    let iterated = iterate(
+        &as_stated,
+        &solved.priors,
+        from,
+        gate,
+        &mut passes,
+        progress,
+    )?;
+    Ok(Solved {
+        noise,
+        problem: as_stated,
+        iterated,
+        passes,
+        ..solved
+    })
 }
 
 /// Iterates with noise that was estimated at one point of linearisation, and estimates it there again, until neither
 /// moves.
 fn with_noise<'a>(
+    as_stated: &Problem<'a>,
     mut solved: Solved<'a>,
-    (mut selection, test): (Selection, NoiseTest),
+    (mut fit, test): (Fit, NoiseTest),
     scale: &Scale,
-    mut accepted: Vec<bool>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
-    let problem = &solved.problem.clone();
-    let priors = &solved.priors.clone();
-    // Stated noise may have thrown the gate open; the estimated one decides once.
+    let mut accepted = solved.iterated.held.accepted();
+    // Other noise may have thrown the gate open; the estimated one decides once.
     let mut open = accepted.iter().all(|&accepted| accepted);
     // Near the end all observations count: few cannot tell white noise from random walk.
-    let whole = Thinned::new(problem, 1);
-    let mut before = None;
+    let whole = Thinned::new(as_stated, 1);
     for round in 1.. {
-        let factors = selection.fit.factors;
-        let with_noise = problem.with_model(scale.apply(&factors, &problem.model));
-        let at = solved.iterated.held.estimate.clone();
-        let script = Script::new(&with_noise, priors, &at)?;
-        let distances = script.replay(&with_noise, &accepted)?.distances;
-        let changed = regate(&mut accepted, &distances, problem.gate_limit(), open);
+        solved.problem = as_stated.with_model(scale.apply(&fit.factors, &as_stated.model));
+        let (problem, priors) = (&solved.problem, &solved.priors);
+        let at = solved.iterated.estimate;
+        let script = Script::new(problem, priors, &at)?;
+        let distances = script.replay(problem, &accepted)?.distances;
+        regate(&mut accepted, &distances, problem.gate_limit(), open);
         open = false;
-        let innovations = solved.iterated.held.innovations.iter().zip(&accepted);
-        let decided: Vec<Innovation> = innovations
-            .map(|(&innovation, &accepted)| Innovation {
-                accepted,
-                ..innovation
-            })
-            .collect();
-        let (gate, passes) = (Gate::As(&decided), &mut solved.passes);
-        solved.iterated = iterate(&with_noise, priors, at, gate, passes, progress)?;
-        let at = &solved.iterated.held.estimate;
-        let script = Script::new(&whole.problem, priors, at)?;
+        let (gate, passes) = (Gate::As(&accepted), &mut solved.passes);
+        solved.iterated = iterate(problem, priors, at.clone(), gate, passes, progress)?;
+        let script = Script::new(&whole.problem, priors, &solved.iterated.estimate)?;
         let likelihood = whole.likelihood(&script, scale, &accepted);
-        let now = likelihood.replay(&factors)?.deviance();
-        let moved = before.is_none_or(|before: f64| (now - before).abs() > SETTLED);
-        if (!changed && !moved) || round == ROUNDS {
-            solved.noise = likelihood.report(problem.options.noise, test, &factors)?;
-            solved.problem = with_noise;
+        let now = likelihood.fit(Some(&fit))?;
+        let settled = now.sources == fit.sources && (now.deviance - fit.deviance).abs() < SETTLED;
+        if settled || round == ROUNDS {
+            solved.noise = likelihood.report(as_stated.options.noise, test, &fit.factors)?;
             break;
         }
-        before = Some(now);
-        selection = likelihood.select(&factors, selection.sources)?;
+        fit = now;
     }
     Ok(solved)
 }
@@ -164,47 +169,33 @@ impl<'a> Thinned<'a> {
     }
 }
 
-fn let_in(innovations: &[Innovation]) -> Vec<bool> {
-    innovations.iter().map(|i| i.accepted).collect()
-}
-
 /// Lets in what the gate allows; leaves out what it does not where that is still `open`. Otherwise the set
-/// only grows, so it cannot toggle. Whether anything changed.
-fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) -> bool {
-    let mut changed = false;
+/// only grows, so it cannot toggle.
+fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) {
     for (accepted, &distance) in accepted.iter_mut().zip(distances) {
         let sound = distance <= gate;
-        if *accepted != sound && (sound || open) {
+        if sound || open {
             *accepted = sound;
-            changed = true;
         }
     }
-    changed
 }
 
 impl Likelihood<'_> {
-    /// The test of what is stated, and the fit of all factors where one was made.
-    fn test(&self, policy: NoisePolicy) -> Result<(NoiseTest, Option<Fit>), CalibrationError> {
-        let sources = self.scale.present();
+    /// The test of what is stated against a fit.
+    fn test(&self, fit: &Fit) -> Result<NoiseTest, CalibrationError> {
         let stated = self.scale.initial();
-        let slope = self.slope(&stated, &sources)?;
-        let (bounded, free): (Vec<usize>, Vec<usize>) =
-            (0..sources.len()).partition(|&i| stated.0[sources[i]] == 0.0);
-        let mut test = NoiseTest {
-            score: slope.statistic(&bounded),
-            score_limit: limit(free.len(), bounded.len(), SCREEN),
-            ratio: None,
-            ratio_limit: limit(free.len(), bounded.len(), FALSE_ALARM),
-            rejected: false,
+        let free = fit.sources.iter();
+        let (bounded, free): (Vec<usize>, Vec<usize>) = free.partition(|&&k| stated.0[k] == 0.0);
+        let ratio = match fit.sources.is_empty() {
+            true => 0.0,
+            false => self.replay(&stated)?.deviance() - fit.deviance,
         };
-        if policy == NoisePolicy::Auto && test.score <= test.score_limit {
-            return Ok((test, None));
-        }
-        let all = self.fit(&stated, &sources)?;
-        let ratio = slope.here.deviance() - all.deviance;
-        test.ratio = Some(ratio);
-        test.rejected = ratio > test.ratio_limit;
-        Ok((test, Some(all)))
+        let limit = limit(free.len(), bounded.len(), FALSE_ALARM);
+        Ok(NoiseTest {
+            ratio,
+            limit,
+            rejected: ratio > limit,
+        })
     }
 
     fn report(

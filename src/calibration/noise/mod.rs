@@ -13,7 +13,6 @@ mod likelihood_ratio;
 mod policy;
 mod report;
 mod run_toml;
-mod selection;
 mod source;
 
 pub use by_hand::{BY_HAND, ByHand, Parts};

@@ -22,21 +22,15 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// The test of stated noise against what the data show, at one false alarm in a thousand runs.
-///
-/// −2 ln of the likelihood ratio against all factors at once. It is worked out where the score test, which costs no
-/// fit, is beyond its 5 % point.
+/// The test of stated noise against what the data show: −2 ln of the likelihood ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
-    /// Score statistic against all factors …
-    pub score: f64,
-    /// … and its 5 % point.
-    pub score_limit: f64,
-    /// Likelihood ratio against all factors …
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ratio: Option<f64>,
-    /// … and what it stays below if what is stated is right.
-    pub ratio_limit: f64,
+    /// Of stated noise to that which the data call for …
+    #[serde(default)]
+    pub ratio: f64,
+    /// … and what it stays below in 999 of 1000 runs if what is stated is right.
+    #[serde(rename = "ratio_limit")]
+    pub limit: f64,
     /// Whether the data contradict what is stated.
     pub rejected: bool,
 }

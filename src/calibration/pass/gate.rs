@@ -2,12 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::mode::{Gate, Mode};
 use crate::calibration::checks::innovation::{Innovation, Observation};
 use crate::calibration::filter::{Innovations, ObservationJudge, Verdict};
-use crate::calibration::model::Model;
-use crate::calibration::problem::Stretch;
-use crate::calibration::record::segment::Seen;
 
 /// After this many rejections in a row the gate doubts itself rather than the data.
 const REOPEN: usize = 5;
@@ -17,58 +13,80 @@ const BEHIND_THE_FIRST: usize = 2;
 /// At most this many observations of a dwell are left out for having closed the gate.
 const MOST_CLOSING: usize = 3;
 
+/// Which observations a pass lets in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Gate<'a> {
+    /// All.
+    Open,
+    /// Those that its innovations do not make outliers.
+    Innovations,
+    /// Those of another pass, in their order.
+    As(&'a [bool]),
+}
+
+/// Judges innovations.
+pub struct Judge<'a> {
+    gate: Gate<'a>,
+    /// Squared whitened innovation beyond which an observation is an outlier.
+    limit: f64,
+    pub innovations: Vec<Innovation>,
+    pub sums: Sums,
+    dwell: Dwell,
+}
+
+/// Over all innovations.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sums {
+    /// Whitened innovations squared; a rejected one counts as much as the gate lets pass.
+    pub cost: f64,
+    /// Logarithm of the determinant of the covariance of those let in.
+    pub log_determinant: f64,
+}
+
 /// What the gate remembers of a dwell.
 #[derive(Debug, Clone, Default)]
-pub struct Memory {
-    /// Number of the dwell's first innovation.
+struct Dwell {
+    /// Number of those that have begun before.
+    number: Option<usize>,
+    after_move: bool,
+    /// Number of its first innovation, and sums before it.
     first: usize,
+    before: Sums,
     /// Rejections in a row of each kind of observation.
     row: [usize; Observation::ALL.len()],
     /// Observations that are left out because they closed the gate to those after them.
     closing: Vec<usize>,
 }
 
-/// Judges the innovations of a dwell.
-pub struct Judge<'a> {
-    pub stretch: &'a Stretch<'a>,
-    pub model: &'a Model,
-    pub mode: Mode<'a>,
-    /// Squared whitened innovation beyond which an observation is an outlier.
-    pub limit: f64,
-    pub dwell: usize,
-    pub after_move: bool,
-    pub memory: &'a mut Memory,
-    pub innovations: &'a mut Vec<Innovation>,
-    pub cost: &'a mut f64,
-    pub log_determinant: &'a mut f64,
-}
-
-impl Memory {
-    /// A dwell begins after so many innovations.
-    pub fn of_dwell(first: usize) -> Self {
+impl<'a> Judge<'a> {
+    pub fn new(gate: Gate<'a>, limit: f64) -> Self {
         Self {
-            first,
-            ..Self::default()
+            gate,
+            limit,
+            innovations: Vec::new(),
+            sums: Sums::default(),
+            dwell: Dwell::default(),
         }
-    }
-
-    /// Begins the dwell once more without the observation that closed the gate.
-    pub fn again(&mut self) {
-        self.row = Default::default();
     }
 
     /// The observation that closed the gate: where several in a row were rejected, the dwell's first of
     /// their kind that was not. None if there is no such thing, or were too many already.
-    fn closing(&self, innovations: &[Innovation]) -> Option<usize> {
-        if self.closing.len() >= MOST_CLOSING {
+    fn closing(&self) -> Option<usize> {
+        let Dwell {
+            first,
+            row,
+            closing,
+            ..
+        } = &self.dwell;
+        if closing.len() >= MOST_CLOSING {
             return None;
         }
-        let row = |kind: Observation| self.row[kind as usize];
+        let row = |kind: Observation| row[kind as usize];
         let mut closed = Observation::ALL
             .into_iter()
             .filter(|&kind| row(kind) >= BEHIND_THE_FIRST);
         closed.find_map(|kind| {
-            let of_dwell = innovations.iter().enumerate().skip(self.first);
+            let of_dwell = self.innovations.iter().enumerate().skip(*first);
             let mut let_in = of_dwell.filter(|(_, i)| i.accepted && i.observation == kind);
             let (first, _) = let_in.next()?;
             let most = match let_in.next() {
@@ -78,12 +96,39 @@ impl Memory {
             (row(kind) >= most).then_some(first)
         })
     }
+
+    fn is_accepted(&self, index: usize, kind: Observation, distance: f64) -> bool {
+        match self.gate {
+            Gate::Open => true,
+            Gate::As(other) => other.get(index).copied().unwrap_or(true),
+            Gate::Innovations => {
+                let sound = distance <= self.limit && !self.dwell.closing.contains(&index);
+                sound || self.dwell.row[kind as usize] >= REOPEN
+            }
+        }
+    }
 }
 
 impl ObservationJudge for Judge<'_> {
-    fn variance(&self, seen: &Seen) -> f64 {
-        self.stretch
-            .observation_variance(self.model, seen.kind, seen.readings)
+    fn is_let_in(&mut self) -> bool {
+        true
+    }
+
+    fn begin(&mut self, after_move: bool) {
+        self.dwell = Dwell {
+            number: Some(self.dwell.number.map_or(0, |number| number + 1)),
+            after_move,
+            first: self.innovations.len(),
+            before: self.sums,
+            ..Dwell::default()
+        };
+    }
+
+    /// Without the observation that closed the gate.
+    fn begin_again(&mut self) {
+        self.dwell.row = Default::default();
+        self.innovations.truncate(self.dwell.first);
+        self.sums = self.dwell.before;
     }
 
     fn judge(&mut self, innovations: Innovations) -> Verdict {
@@ -94,42 +139,35 @@ impl ObservationJudge for Judge<'_> {
         } = innovations;
         let whitened = Vector3::from(scalars.map(|s| s.innovation / s.variance.sqrt()));
         let distance = whitened.norm_squared();
-        let index = self.innovations.len();
-        let row = &mut self.memory.row[kind as usize];
-        let accepted = match self.mode {
-            Mode::Held(Gate::Open) => true,
-            Mode::Held(Gate::As(other)) => other.get(index).is_none_or(|i| i.accepted),
-            Mode::Held(Gate::Innovations) | Mode::Feedback => {
-                let sound = distance <= self.limit && !self.memory.closing.contains(&index);
-                sound || *row >= REOPEN
-            }
-        };
+        let accepted = self.is_accepted(self.innovations.len(), kind, distance);
+        let row = &mut self.dwell.row[kind as usize];
         if accepted {
             *row = 0;
-            *self.cost += distance;
+            self.sums.cost += distance;
             let of_each = scalars.map(|s| s.variance);
-            *self.log_determinant += of_each.iter().product::<f64>().ln();
+            self.sums.log_determinant += of_each.iter().product::<f64>().ln();
         } else {
             *row += 1;
-            *self.cost += self.limit;
+            self.sums.cost += self.limit;
         }
         self.innovations.push(Innovation {
             time,
             observation: kind,
             whitened: whitened.into(),
             accepted,
-            dwell: self.dwell,
-            after_move: self.after_move,
+            dwell: self.dwell.number.unwrap_or(0),
+            after_move: self.dwell.after_move,
         });
         if accepted {
             return Verdict::Accepted;
         }
-        if matches!(self.mode, Mode::Held(Gate::As(_))) {
-            return Verdict::Rejected;
-        }
-        match self.memory.closing(self.innovations) {
+        let closing = match self.gate {
+            Gate::Innovations => self.closing(),
+            Gate::Open | Gate::As(_) => None,
+        };
+        match closing {
             Some(closing) => {
-                self.memory.closing.push(closing);
+                self.dwell.closing.push(closing);
                 Verdict::Abandoned
             }
             None => Verdict::Rejected,

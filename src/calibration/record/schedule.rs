@@ -111,8 +111,8 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
 }
 
 impl AtRest {
-    /// Where a pass without feedback linearises while the table is at rest: in the table's mean attitude, else
-    /// in the computed one, levelled.
+    /// Where a pass linearises while the table is at rest: in the table's mean attitude, else in the computed one,
+    /// levelled.
     ///
     /// Both are within arc seconds of the truth in every pass, so what noise adds up to over a long
     /// record never leaves the linear range; nor does a tilt that it makes change what a wrong heading

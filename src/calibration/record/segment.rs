@@ -57,27 +57,21 @@ pub struct Seen {
 /// held by hand keeps its attitude, too.
 const STEPS: usize = 100;
 
-/// Where the linearisation follows the estimates, a part of a dwell is so many times as long as the one before:
-/// what a dwell tells first changes them most.
-const GROWTH: usize = 4;
-
 /// The parts of a dwell, one after the other.
 #[derive(Debug, Clone)]
 pub struct Segments<'a> {
     /// From the next part's first on.
     steps: &'a [Step],
     begun: bool,
-    /// Steps that a part has at most, and samples.
-    length: usize,
+    /// Samples that a part has at most.
     longest: usize,
 }
 
 /// The parts of a dwell, given the steps from its first on.
-pub fn segments(steps: &[Step], linearisation_held: bool) -> Segments<'_> {
+pub fn segments(steps: &[Step]) -> Segments<'_> {
     Segments {
         steps,
         begun: false,
-        length: if linearisation_held { STEPS } else { 1 },
         longest: STEPS * steps.first().map_or(0, |step| step.samples.len()),
     }
 }
@@ -101,10 +95,9 @@ impl<'a> Iterator for Segments<'a> {
             let within = number == 0 || step.samples.end <= end;
             ((begins || !at_rest.first) && within).then_some((step, at_rest))
         });
-        let part: Vec<_> = of_dwell.take(self.length).collect();
+        let part: Vec<_> = of_dwell.take(STEPS).collect();
         self.steps = &self.steps[part.len()..];
         self.begun = true;
-        self.length = STEPS.min(GROWTH * self.length);
         (!part.is_empty()).then_some(part)
     }
 }
@@ -140,7 +133,6 @@ impl Models {
         &mut self,
         length: usize,
         bridged: bool,
-        tied: bool,
         made: impl FnOnce(Option<&Block>) -> Block,
     ) -> usize {
         let as_long = |model: Option<(usize, usize)>| {
@@ -149,8 +141,7 @@ impl Models {
         };
         let number = as_long(self.whole).filter(|_| !bridged);
         let number = number.unwrap_or_else(|| {
-            // A pass that holds its linearisation stays in one attitude.
-            let like = as_long(self.last).filter(|_| tied && bridged);
+            let like = as_long(self.last).filter(|_| bridged);
             let model = made(like.and_then(|number| self.all.get(number)));
             self.all.push(model);
             self.all.len() - 1
@@ -164,14 +155,12 @@ impl Models {
 }
 
 impl Segment {
-    /// Navigates from where the navigator is. A pass that holds its linearisation begins each step at the
-    /// same state of rest, `tied`, and what the step before led to is referred to it; `held` is the attitude
-    /// that was computed when the body came to rest.
+    /// Navigates from where the navigator is. Each step begins at the same state of rest, and what the step before led
+    /// to is referred to it; `held` is the attitude that was computed when the body came to rest.
     pub fn navigate(
         navigator: &mut Navigator,
         (problem, stretch): (&Problem, &Stretch),
         steps: &[(&Step, &AtRest)],
-        tied: bool,
         held: &Matrix3<f64>,
     ) -> Self {
         let begin = navigator.state;
@@ -192,19 +181,17 @@ impl Segment {
         let mut models = Models::default();
         for (step, at_rest) in steps {
             let mut referred = Default::default();
-            if tied && !segment.steps.is_empty() {
+            if !segment.steps.is_empty() {
                 let from = navigator.state;
                 referred = between(&from, &begin);
                 navigator.state = begin;
             }
             let bridged = imu.bridged(&step.samples).next().is_some();
-            let model = models.of_step(step.samples.len(), bridged, tied, |like| match like {
+            let model = models.of_step(step.samples.len(), bridged, |like| match like {
                 Some(model) => navigator.standing_like(model, &step.samples),
                 None => {
-                    let state = if tied { &begin } else { &navigator.state };
-                    let attitude = state.attitude;
                     navigator.warm(&whole);
-                    navigator.standing(&attitude, step.samples.clone())
+                    navigator.standing(&begin.attitude, step.samples.clone())
                 }
             });
             navigator.warm(&step.samples);

@@ -5,173 +5,162 @@
 //! give the estimate of any part of the constants, without another pass.
 
 mod script;
+mod smoothed;
 
-use std::collections::BTreeMap;
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use nalgebra::{DMatrix, DVector};
-
-use super::budget::BudgetSource;
-use super::error::CalibrationError;
-use super::filter::columns::triangle;
-use super::layout::Constant;
+use super::constants::{Constant, Known, Posterior, Prior, triangle};
 use super::linearisation::Linearisation;
-use super::model::Model;
-use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
+use super::parameters::{ParameterVector, from_vector, to_vector};
+use crate::attitude::from_tilt_and_heading;
 use crate::calibration::several::thermal::Coefficient;
-use crate::imu::Sensor;
 pub use script::{Moves, Replay, Script};
+pub use smoothed::{Own, Smoothed};
 
-/// Whitened rows of all dwells.
+/// Whitened rows of all dwells, and the states that go with them.
 #[derive(Debug, Clone)]
 pub struct Reduction {
     /// The constants that rows have columns of; the last column is what was observed.
     pub constants: Vec<Constant>,
-    /// The rows of each dwell.
-    pub dwells: Vec<DMatrix<f64>>,
+    pub parts: Vec<Part>,
     /// Squares that no constant has a part in.
     pub squares: f64,
     /// Logarithm of the determinant of the covariance of all that was observed, the constants given.
     pub log_determinant: f64,
+    /// Initial attitude of each stretch.
+    pub attitudes: Vec<Smoothed>,
+    /// What each recording has of its own; empty where none has anything.
+    pub own: Vec<Smoothed>,
+    /// Gravity at the last site, where there are several.
+    pub gravity: Option<Smoothed>,
 }
 
-/// What is known of constants beforehand, as errors of the point of linearisation.
+/// What a part of a dwell left.
 #[derive(Debug, Clone)]
-pub struct Prior {
-    pub mean: DVector<f64>,
-    /// 1σ of each; zero of what is known to be at its mean.
-    pub sigma: DVector<f64>,
+pub struct Part {
+    /// Number of the dwell.
+    pub dwell: usize,
+    /// When it ended, s.
+    pub time: f64,
+    pub rows: DMatrix<f64>,
 }
 
-/// What is known of constants with the data.
-#[derive(Debug, Clone)]
-pub struct Posterior {
-    /// Errors of all constants.
-    pub mean: DVector<f64>,
-    /// Errors of the parameters of both triads.
-    pub parameters: ParameterVector,
-    /// Of all constants; zero of what was known.
-    pub covariance: DMatrix<f64>,
-    /// Of the parameters of both triads.
-    pub parameter_covariance: ParameterMatrix,
-    /// Squared residuals over their σ, with those of the prior.
-    pub cost: f64,
-    /// −2 ln of the likelihood, except a constant.
-    pub deviance: f64,
+/// What was known of the parameters of both triads at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Epoch {
+    /// Time, s.
+    pub time: f64,
+    /// Parameters of both triads.
+    pub estimate: ParameterVector,
+    /// 1σ of each.
+    pub sigma: ParameterVector,
 }
 
 impl Reduction {
-    /// One triangle of the rows of all dwells: what remains of them where no dwell is looked at alone.
+    /// The rows of each dwell.
+    pub fn dwells(&self) -> impl Iterator<Item = DMatrix<f64>> + '_ {
+        let dwells = self.parts.chunk_by(|one, other| one.dwell == other.dwell);
+        dwells.map(|parts| self.stacked(parts))
+    }
+
+    fn stacked(&self, parts: &[Part]) -> DMatrix<f64> {
+        let count = parts.iter().map(|part| part.rows.nrows()).sum();
+        let mut all = DMatrix::zeros(count, self.constants.len() + 1);
+        let mut first = 0;
+        for Part { rows, .. } in parts {
+            all.rows_mut(first, rows.nrows()).copy_from(rows);
+            first += rows.nrows();
+        }
+        all
+    }
+
+    /// One triangle of all rows: what remains of them where no dwell is looked at alone.
     pub fn folded(mut self) -> Self {
-        let columns = self.constants.len() + 1;
-        let empty = DMatrix::zeros(0, columns);
-        let folded = self.dwells.iter().fold(empty, |folded, dwell| {
-            let (above, below) = (folded.nrows(), dwell.nrows());
-            let mut both = folded.resize_vertically(above + below, 0.0);
-            both.rows_mut(above, below).copy_from(dwell);
-            match both.nrows() > columns {
-                true => triangle(&both),
-                false => both,
-            }
-        });
-        self.dwells = vec![folded];
+        let rows = triangle(&self.stacked(&self.parts));
+        self.parts = vec![Part {
+            dwell: 0,
+            time: self.parts.last().map_or(0.0, |part| part.time),
+            rows,
+        }];
         self
     }
 
     /// With what is known beforehand.
-    ///
-    /// # Errors
-    /// [`CalibrationError::Singular`] where that and the data together leave a constant open.
-    pub fn posterior(&self, prior: &Prior) -> Result<Posterior, CalibrationError> {
-        let all = self.constants.len();
-        let on: Vec<usize> = (0..all).filter(|&k| prior.sigma[k] > 0.0).collect();
-        let off: Vec<usize> = (0..all).filter(|&k| prior.sigma[k] == 0.0).collect();
-        let known = prior.mean.select_rows(&off);
-        let n = on.len();
-        let count: usize = self.dwells.iter().map(DMatrix::nrows).sum();
-        let mut stacked = DMatrix::zeros(n + count, n + 1);
-        for (row, &k) in on.iter().enumerate() {
-            stacked[(row, row)] = prior.sigma[k].recip();
-            stacked[(row, n)] = prior.mean[k] / prior.sigma[k];
+    pub fn posterior(&self, prior: &Prior) -> Posterior {
+        let mut known = Known::new(prior.clone());
+        known.learn(self.parts.iter().map(|part| &part.rows));
+        self.posterior_of(&known)
+    }
+
+    /// With what is known where all rows are among it.
+    pub fn posterior_of(&self, known: &Known) -> Posterior {
+        let of_rows = known.posterior();
+        Posterior {
+            cost: of_rows.cost + self.squares,
+            deviance: of_rows.deviance + self.squares + self.log_determinant,
+            ..of_rows
         }
-        let mut first = n;
-        for dwell in &self.dwells {
-            let mut rows = stacked.rows_mut(first, dwell.nrows());
-            rows.columns_mut(0, n).copy_from(&dwell.select_columns(&on));
-            let observed = dwell.column(all) - dwell.select_columns(&off) * &known;
-            rows.set_column(n, &observed);
-            first += dwell.nrows();
-        }
-        let triangle = triangle(&stacked);
-        let root = triangle.view((0, 0), (n, n));
-        let mut inverse = DMatrix::identity(n, n);
-        if !root.solve_upper_triangular_mut(&mut inverse) {
-            return Err(CalibrationError::Singular {
-                sensor: Sensor::Gyro,
-            });
-        }
-        let last = triangle.get((n, n)).copied().unwrap_or(0.0);
-        let logarithms = root.diagonal().map(|of| of.abs().ln()).sum();
-        let of_prior: f64 = on.iter().map(|&k| prior.sigma[k].ln()).sum();
-        let mut mean = prior.mean.clone();
-        let found = &inverse * triangle.view((0, n), (n, 1));
-        let within = &inverse * inverse.transpose();
-        let mut covariance = DMatrix::zeros(all, all);
-        for (i, &row) in on.iter().enumerate() {
-            mean[row] = found[i];
-            for (j, &column) in on.iter().enumerate() {
-                covariance[(row, column)] = within[(i, j)];
+    }
+
+    /// Estimate and σ against time, as part after part comes in.
+    pub fn history(&self, prior: &Prior, at: &Linearisation) -> Vec<Epoch> {
+        let mut known = Known::new(prior.clone());
+        let parts = self.parts.iter().map(|part| {
+            known.learn(std::iter::once(&part.rows));
+            let posterior = known.posterior();
+            let variance = posterior.parameter_covariance.diagonal();
+            Epoch {
+                time: part.time,
+                estimate: to_vector(&at.triads) + posterior.parameters,
+                sigma: variance.map(f64::sqrt),
             }
-        }
-        let mut parameters = ParameterVector::zeros();
-        for (row, index) in self.parameters() {
-            parameters[index] = mean[row];
-        }
-        let cost = self.squares + last.powi(2);
-        Ok(Posterior {
-            parameter_covariance: self.of_parameters(&covariance),
-            covariance,
-            parameters,
-            mean,
-            cost,
-            deviance: cost + self.log_determinant + 2.0 * (logarithms + of_prior),
-        })
+        });
+        parts.collect()
     }
 
     /// Information of the constants by the rows alone.
     pub fn information(&self) -> DMatrix<f64> {
         let n = self.constants.len();
         let mut information = DMatrix::zeros(n, n);
-        for dwell in &self.dwells {
-            let rows = dwell.columns(0, n);
+        for part in &self.parts {
+            let rows = part.rows.columns(0, n);
             information += rows.tr_mul(&rows);
         }
         information
     }
 
-    /// What prior σ of a model add to a covariance by their sources, which is exact: `P P₀⁻¹ P`.
-    pub fn by_prior(&self, of: &Posterior, prior: &Prior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
-        let mut parts = BTreeMap::new();
-        for (k, constant) in self.constants.iter().enumerate() {
-            if prior.sigma[k] > 0.0 {
-                let column = of.covariance.column(k) / prior.sigma[k];
-                let n = self.constants.len();
-                let zeros = || DMatrix::zeros(n, n);
-                let part = parts.entry(constant.source()).or_insert_with(zeros);
-                *part += &column * column.transpose();
-            }
-        }
-        parts
+    /// By how much each recording differs, linearised `at` a point.
+    pub fn own(&self, at: &Linearisation, posterior: &Posterior) -> Vec<Own> {
+        let each = self.own.iter().enumerate();
+        each.map(|(recording, own)| own.difference(at.own(recording), posterior))
+            .collect()
     }
 
-    /// A matrix of the constants as one of the parameters of both triads.
-    pub fn of_parameters(&self, of_constants: &DMatrix<f64>) -> ParameterMatrix {
-        let mut parameters = ParameterMatrix::zeros();
-        for (row, i) in self.parameters() {
-            for (column, j) in self.parameters() {
-                parameters[(i, j)] = of_constants[(row, column)];
+    /// Where the next pass linearises after one `at` a point.
+    pub fn estimate(&self, at: &Linearisation, posterior: &Posterior) -> Linearisation {
+        let initial_attitude = |(at, error): (&Matrix3<f64>, &Smoothed)| {
+            let (mean, _) = error.given(posterior);
+            from_tilt_and_heading(&Vector3::from_column_slice(mean.as_slice())) * at
+        };
+        let attitudes = at.initial_attitudes.iter().zip(&self.attitudes);
+        let own = self.own(at, posterior);
+        let mut estimate = Linearisation {
+            triads: from_vector(
+                at.triads.gyro.form,
+                &(to_vector(&at.triads) + posterior.parameters),
+            ),
+            own: own.iter().map(|own| own.values).collect(),
+            initial_attitudes: attitudes.map(initial_attitude).collect(),
+            ..at.clone()
+        };
+        for (constant, error) in self.constants.iter().zip(&posterior.mean) {
+            match constant {
+                Constant::Term(index) => estimate.terms[*index] += error,
+                Constant::Thermal(of) => *of.of_mut(&mut estimate.thermal) += error,
+                _ => {}
             }
         }
-        parameters
+        estimate
     }
 
     /// The coefficients of temperature among the constants, with their places.
@@ -181,48 +170,6 @@ impl Reduction {
             Constant::Thermal(coefficient) => Some((place, *coefficient)),
             _ => None,
         })
-    }
-
-    /// The parameters of both triads among the constants: place and index of each.
-    fn parameters(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let places = self.constants.iter().enumerate();
-        places.filter_map(|(place, constant)| match constant {
-            Constant::Parameter(index) => Some((place, *index)),
-            _ => None,
-        })
-    }
-}
-
-impl Posterior {
-    /// What the covariance of another one lacks if this one's prior is right: the mean square error of what that
-    /// one finds is the covariance here and the square of what is between them.
-    pub fn added_to(&self, other: &Self) -> ParameterMatrix {
-        let change = self.parameters - other.parameters;
-        self.parameter_covariance - other.parameter_covariance + change * change.transpose()
-    }
-}
-
-impl Prior {
-    /// Of these constants, by a model, as errors of this point.
-    pub fn new(constants: &[Constant], model: &Model, at: &Linearisation) -> Self {
-        let parameters = model.prior_mean - to_vector(&at.triads);
-        let of = |constant: &Constant| match *constant {
-            Constant::Parameter(index) => (parameters[index], model.prior_sigma[index]),
-            Constant::Term(index) => (-at.terms[index], model.term_sigma[index]),
-            Constant::Thermal(of) => {
-                let sigma = model.thermal.as_deref();
-                let sigma = sigma.map_or(0.0, |thermal| of.of(&thermal.sigma));
-                (-of.of(&at.thermal), sigma)
-            }
-            Constant::Gravity => (0.0, model.gravity_sigma),
-            Constant::Base(axis) => (0.0, model.geometry.base[axis]),
-            Constant::Axis(index) => (0.0, model.geometry.axes[index]),
-        };
-        let (mean, sigma): (Vec<f64>, Vec<f64>) = constants.iter().map(of).unzip();
-        Self {
-            mean: mean.into(),
-            sigma: sigma.into(),
-        }
     }
 }
 

@@ -1,23 +1,29 @@
-//! A pass with the linearisation held, of which navigation is done once and the filter as often as noise is tried or a
-//! variance is changed.
+//! What happens in a record at one point of linearisation: navigation is done once, the filter as often as noise is tried
+//! or a variance is changed.
 
-use super::Reduction;
+use super::smoothed::Smoothed;
+use super::{Part, Reduction};
+use crate::calibration::constants::{Known, Prior};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::filter::columns::Columns;
+use crate::calibration::filter::measurement::ScalarInnovation;
+use crate::calibration::filter::{
+    DwellFilters, Filter, Innovations, ObservationJudge, Since, Taken, Verdict,
+};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
-use crate::calibration::pass::{
-    DwellFilters, Filter, Innovations, ObservationJudge, PriorErrors, ScalarInnovation, Seen,
-    Taken, Verdict, begin,
-};
 use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::record::events::{Event, Events};
+use crate::calibration::record::events::{Event, Rest, events};
 use crate::imu::{PerSensor, Sensor};
 
-/// What a pass does at one point of linearisation, whatever the noise.
+/// Rows of a dwell are kept apart for each second …
+const APART: f64 = 1.0;
+/// … or for so many times in a recording, if that is longer.
+const EPOCHS: f64 = 3600.0;
+
+/// What happens at one point of linearisation, whatever the noise.
 pub struct Script<'a> {
-    at: &'a Linearisation,
+    pub at: &'a Linearisation,
     priors: &'a [AttitudePrior],
     /// Of each stretch.
     events: Vec<Vec<Event>>,
@@ -52,20 +58,18 @@ impl Replay {
 impl<'a> Script<'a> {
     /// Navigates once through all stretches of a problem, linearised at this point.
     pub fn new(
-        problem: &'a Problem<'a>,
+        problem: &Problem,
         priors: &'a [AttitudePrior],
         at: &'a Linearisation,
     ) -> Result<Self, CalibrationError> {
-        let layout = Layout::new(&problem.model);
+        let layout = Layout::new(&problem.model, problem.one_gravity());
         let stretches = problem.stretches().iter().zip(&at.initial_attitudes);
-        let events = stretches.map(|(stretch, initial)| {
-            let of = (problem, stretch);
-            Ok(Events::new(of, &layout, (at, initial), true)?.collect())
-        });
+        let events =
+            stretches.map(|(stretch, initial)| events((problem, stretch), &layout, (at, initial)));
         Ok(Self {
             at,
             priors,
-            events: events.collect::<Result<_, CalibrationError>>()?,
+            events: events.collect::<Result<_, _>>()?,
         })
     }
 
@@ -85,125 +89,237 @@ impl<'a> Script<'a> {
         moves
     }
 
-    /// The filter's pass with the noise of a problem's model. `accepted` tells of each observation of
-    /// three components whether it is let in; those beyond its end are.
-    pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
-        let mut replay = Replay::default();
-        let model = &problem.model;
-        let filter = Filter::new(model, &PriorErrors::at(model, self.at));
-        self.follow(problem, accepted, filter, |_| {}, Some(&mut replay))?;
-        Ok(replay)
+    /// What is known of the constants before the data.
+    pub fn known(&self, problem: &Problem) -> Known {
+        let layout = Layout::new(&problem.model, problem.one_gravity());
+        Known::new(Prior::new(layout.constants(), &problem.model, self.at))
     }
 
-    /// What such a pass says of the constants.
+    /// Innovations with the noise of a problem's model. `accepted` tells of each observation of
+    /// three components whether it is let in; those beyond its end are.
+    pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
+        let mut decided = Decided::new(accepted);
+        let mut known = self.known(problem);
+        self.follow(problem, &mut decided, Some(&mut known))?;
+        Ok(decided.replay)
+    }
+
+    /// What the record says of the constants, without innovations.
     pub fn reduce(
         &self,
         problem: &Problem,
         accepted: &[bool],
     ) -> Result<Reduction, CalibrationError> {
-        let mut dwells = Vec::new();
-        let take = |filter: &mut Filter| {
-            dwells.extend(filter.columns.as_mut().map(Columns::take_rows));
+        self.follow(problem, &mut Decided::new(accepted), None)
+    }
+
+    /// Takes a filter through the record. What is `known` of the constants, if it is told, learns as it goes.
+    pub fn follow(
+        &self,
+        problem: &Problem,
+        judge: &mut impl ObservationJudge,
+        known: Option<&mut Known>,
+    ) -> Result<Reduction, CalibrationError> {
+        let filter = Filter::new(&problem.model, problem.one_gravity());
+        let mut follower = Follower {
+            dwells: DwellFilters::of(&filter),
+            filter,
+            known,
+            parts: Vec::new(),
+            dwell: 0,
         };
-        let filter = Filter::reduced(&problem.model, problem.one_gravity());
-        let filter = self.follow(problem, accepted, filter, take, None)?;
-        let columns = filter.columns.as_ref();
+        let (mut attitudes, mut own) = (Vec::new(), Vec::new());
+        let mut before = None;
+        let stretches = problem.stretches();
+        for (number, (stretch, events)) in stretches.iter().zip(&self.events).enumerate() {
+            self.begin(&mut follower.filter, problem, before, (stretch, number));
+            before = Some(stretch);
+            follower.through(events, (&problem.model, stretch), judge)?;
+            let filter = &follower.filter;
+            attitudes.push(Smoothed::of(filter, filter.layout.initial_attitude(), 3));
+            let next = stretches.get(number + 1);
+            if next.is_none_or(|next| next.recording != stretch.recording) {
+                own.extend(Smoothed::of_recording(filter));
+            }
+        }
+        let Follower { filter, parts, .. } = follower;
         Ok(Reduction {
-            constants: filter.layout.columns().to_vec(),
-            squares: columns.map_or(0.0, |columns| columns.squares),
-            log_determinant: columns.map_or(0.0, |columns| columns.log_determinant),
-            dwells,
+            constants: filter.layout.constants().to_vec(),
+            parts,
+            squares: filter.columns.squares,
+            log_determinant: filter.columns.log_determinant,
+            attitudes,
+            own,
+            gravity: filter
+                .layout
+                .gravity()
+                .map(|state| Smoothed::of(&filter, state, 1)),
         })
     }
 
-    fn follow(
+    /// A stretch begins after another: what is of another recording or site starts anew.
+    fn begin(
         &self,
+        filter: &mut Filter,
         problem: &Problem,
-        accepted: &[bool],
-        mut filter: Filter,
-        mut after_dwell: impl FnMut(&mut Filter),
-        mut replay: Option<&mut Replay>,
-    ) -> Result<Filter, CalibrationError> {
+        before: Option<&Stretch>,
+        (stretch, number): (&Stretch, usize),
+    ) {
         let model = &problem.model;
-        let mut dwells = DwellFilters::of(&filter);
-        let mut accepted = accepted.iter();
-        let mut before = None;
-        let stretches = problem.stretches().iter().zip(self.priors);
-        let of_each = self.events.iter().zip(&self.at.initial_attitudes);
-        for ((stretch, prior), (events, initial)) in stretches.zip(of_each) {
-            let start = stretch.start(prior, initial);
-            begin(&mut filter, model, before, stretch, &start, self.at);
-            before = Some(stretch);
-            let mut decided = Decided {
-                model,
-                stretch,
-                accepted: &mut accepted,
-                replay: replay.as_deref_mut(),
+        let start = stretch.start(&self.priors[number], &self.at.initial_attitudes[number]);
+        let own = self.at.own(stretch.recording);
+        let turned = (model.day_to_day.mounting > 0.0).then(|| own.response(&self.at.triads));
+        let since = match before.filter(|before| before.recording == stretch.recording) {
+            Some(before) => Since::Lost(before.time_until(stretch)),
+            None => Since::Anew(&own, turned.as_ref()),
+        };
+        let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
+        let gravity = moved.then_some(stretch.run.site.gravity_sigma);
+        filter.begin(&start, model.position_sigma, since, gravity);
+    }
+}
+
+/// A filter on its way through a record.
+struct Follower<'k> {
+    filter: Filter,
+    dwells: DwellFilters,
+    known: Option<&'k mut Known>,
+    parts: Vec<Part>,
+    /// Number of dwells that have ended.
+    dwell: usize,
+}
+
+/// Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an outlier that it lets in
+/// closes the gate to the good observations that follow.
+struct Begin {
+    event: usize,
+    filter: Filter,
+    known: Option<Known>,
+    parts: usize,
+}
+
+impl Follower<'_> {
+    fn through(
+        &mut self,
+        events: &[Event],
+        of: (&Model, &Stretch),
+        judge: &mut impl ObservationJudge,
+    ) -> Result<(), CalibrationError> {
+        let apart = APART.max(of.1.run.recording.imu.duration() / EPOCHS);
+        let mut begin: Option<Begin> = None;
+        let mut next = 0;
+        while let Some(event) = events.get(next) {
+            next += 1;
+            let rest = match event {
+                Event::Move(block, _) => {
+                    self.filter.propagate(block);
+                    continue;
+                }
+                Event::Rest(rest) => rest,
             };
-            for event in events {
-                let of = (&mut filter, &mut dwells);
-                let taken = event.take_in(of, (model, stretch), &mut decided);
-                if taken != Taken::Whole || !decided.is_finite() {
-                    return Err(CalibrationError::Diverged { time: event.end() });
+            if rest.first && begin.as_ref().is_none_or(|begin| begin.event + 1 != next) {
+                judge.begin(rest.new_position);
+                begin = self.known.is_some().then(|| self.here(next - 1));
+            }
+            match (self.rest(rest, of, judge), &begin) {
+                (Taken::Whole, _) => self.keep(rest, apart)?,
+                (Taken::Abandoned, Some(begin)) => {
+                    judge.begin_again();
+                    self.go_back(begin);
+                    next = begin.event;
                 }
-                if matches!(event, Event::Rest(rest) if rest.last) {
-                    after_dwell(&mut filter);
-                }
+                _ => return Err(CalibrationError::Diverged { time: event.end() }),
             }
         }
-        Ok(filter)
+        Ok(())
     }
-}
 
-/// Lets in what was decided before.
-struct Decided<'a, 'b> {
-    model: &'a Model,
-    stretch: &'a Stretch<'a>,
-    accepted: &'a mut std::slice::Iter<'b, bool>,
-    /// Where innovations go; none where they are not asked for.
-    replay: Option<&'a mut Replay>,
-}
+    fn rest(
+        &mut self,
+        rest: &Rest,
+        of: (&Model, &Stretch),
+        judge: &mut impl ObservationJudge,
+    ) -> Taken {
+        rest.begin(&mut self.filter, of.0, of.1);
+        self.learn();
+        let known = self.known.as_deref();
+        self.dwells
+            .take_in(&mut self.filter, &rest.segment, of, known, judge)
+    }
 
-impl Decided<'_, '_> {
-    fn verdict(&mut self) -> Verdict {
-        match self.accepted.next() {
-            Some(false) => Verdict::Rejected,
-            _ => Verdict::Accepted,
+    fn learn(&mut self) {
+        if let Some(known) = &mut self.known {
+            known.learn(std::iter::once(&self.filter.columns.new_rows()));
         }
     }
 
-    /// Whether the last innovation is.
-    fn is_finite(&self) -> bool {
-        let replay = self.replay.as_deref();
-        let last = replay.and_then(|replay| replay.distances.last());
-        last.is_none_or(|distance| distance.is_finite())
+    /// Keeps the rows of a part, with those of the next one unless that is a second off.
+    fn keep(&mut self, rest: &Rest, apart: f64) -> Result<(), CalibrationError> {
+        self.learn();
+        let time = rest.segment.end();
+        let before = self.parts.last().filter(|part| part.dwell == self.dwell);
+        if !rest.last && before.is_some_and(|before| time - before.time < apart) {
+            return Ok(());
+        }
+        let rows = self.filter.columns.take_rows();
+        if !rows.iter().all(|value| value.is_finite()) {
+            return Err(CalibrationError::Diverged { time });
+        }
+        self.parts.push(Part {
+            dwell: self.dwell,
+            time,
+            rows,
+        });
+        self.dwell += usize::from(rest.last);
+        Ok(())
+    }
+
+    fn here(&self, event: usize) -> Begin {
+        Begin {
+            event,
+            filter: self.filter.clone(),
+            known: self.known.as_deref().cloned(),
+            parts: self.parts.len(),
+        }
+    }
+
+    fn go_back(&mut self, begin: &Begin) {
+        self.filter = begin.filter.clone();
+        self.parts.truncate(begin.parts);
+        if let (Some(known), Some(before)) = (&mut self.known, &begin.known) {
+            **known = before.clone();
+        }
     }
 }
 
-impl ObservationJudge for Decided<'_, '_> {
-    fn variance(&self, seen: &Seen) -> f64 {
-        self.stretch
-            .observation_variance(self.model, seen.kind, seen.readings)
-    }
+/// Lets in what was decided before, and keeps innovations.
+struct Decided<'a> {
+    accepted: std::slice::Iter<'a, bool>,
+    replay: Replay,
+}
 
-    fn verdicts_are_known(&self) -> bool {
-        self.replay.is_none()
+impl<'a> Decided<'a> {
+    fn new(accepted: &'a [bool]) -> Self {
+        Self {
+            accepted: accepted.iter(),
+            replay: Replay::default(),
+        }
     }
+}
 
-    fn known_verdict(&mut self) -> Verdict {
-        self.verdict()
+impl ObservationJudge for Decided<'_> {
+    fn is_let_in(&mut self) -> bool {
+        self.accepted.next().is_none_or(|&accepted| accepted)
     }
 
     fn judge(&mut self, innovations: Innovations) -> Verdict {
-        let verdict = self.verdict();
-        if let Some(replay) = &mut self.replay {
-            let three = innovations.scalars;
-            let squares = three.map(|s| s.innovation.powi(2) / s.variance);
-            replay.distances.push(squares.iter().sum());
-            if verdict == Verdict::Accepted {
-                replay.scalars.extend(three);
-            }
+        let three = innovations.scalars;
+        let squares = three.map(|s| s.innovation.powi(2) / s.variance);
+        self.replay.distances.push(squares.iter().sum());
+        if !self.is_let_in() {
+            return Verdict::Rejected;
         }
-        verdict
+        self.replay.scalars.extend(three);
+        Verdict::Accepted
     }
 }

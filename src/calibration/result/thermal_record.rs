@@ -9,7 +9,7 @@ use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{
     PARAMETERS, ParameterVector, factor, parameter_index, parameter_name, sensor_and_parameter,
 };
-use crate::calibration::pass::Own;
+use crate::calibration::reduction::Own;
 use crate::calibration::several::thermal::Thermal;
 use crate::imu::{
     AXES, HIGHEST_ORDER, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients,

@@ -134,8 +134,8 @@ pub fn solve<'a>(
     let mut passes = Vec::new();
     let gate = Gate::Innovations;
     let mut iterated = iterate(&problem, &priors, at, gate, &mut passes, progress)?;
-    if let Some(thermal) = &iterated.held.thermal {
-        let selected = order::select(&problem, &priors, &iterated.held, thermal)?;
+    if let Some(thermal) = iterated.held.thermal(&problem.model) {
+        let selected = order::select(&problem, &iterated, &thermal);
         findings.extend(selected.finding(problem.model.form));
         if selected.model != thermal.model {
             let mut model = problem.model.clone();
@@ -148,7 +148,7 @@ pub fn solve<'a>(
     Ok(Solved {
         alone,
         findings,
-        ..Solved::stated(&problem, priors, iterated, passes)
+        ..Solved::new(&problem, priors, iterated, passes)
     })
 }
 

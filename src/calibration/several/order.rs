@@ -3,12 +3,11 @@
 use super::thermal::{Coefficient, Thermal};
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::observability::temperature_not_seen;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::parameters::{OBSERVED_BELOW, from_vector, parameter_name, to_vector};
-use crate::calibration::pass::PassResult;
+use crate::calibration::constants::Prior;
+use crate::calibration::gauss_newton::Iterated;
+use crate::calibration::linearisation::Linearisation;
+use crate::calibration::parameters::{OBSERVED_BELOW, parameter_name};
 use crate::calibration::problem::Problem;
-use crate::calibration::reduction::{Posterior, Prior, Script};
 use crate::imu::{InstallationForm, ParameterKind, RATE, Sensor, ThermalModel, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
@@ -31,17 +30,11 @@ struct Order {
 
 /// Takes the highest order of a kind of parameters off while the data do not call for it: where it is zero, the
 /// ratio of likelihoods with and without it is χ² of as many degrees as it has coefficients (Wilks).
-pub fn select(
-    problem: &Problem,
-    priors: &[AttitudePrior],
-    held: &PassResult,
-    thermal: &Thermal,
-) -> Result<Selected, CalibrationError> {
-    let accepted: Vec<bool> = held.innovations.iter().map(|of| of.accepted).collect();
-    let script = Script::new(problem, priors, &held.at)?;
-    let reduction = script.reduce(problem, &accepted)?.folded();
+pub fn select(problem: &Problem, iterated: &Iterated, thermal: &Thermal) -> Selected {
+    let held = &iterated.held;
+    let reduction = held.reduction.clone().folded();
     let known = Prior::new(&reduction.constants, &problem.model, &held.at);
-    let with = |model: &ThermalModel| -> Result<Posterior, CalibrationError> {
+    let with = |model: &ThermalModel| {
         let mut prior = known.clone();
         for (place, coefficient) in reduction.coefficients() {
             prior.sigma[place] = coefficient.of(&model.sigma);
@@ -49,7 +42,7 @@ pub fn select(
         reduction.posterior(&prior)
     };
     let mut model = thermal.model.clone();
-    let mut now = with(&model)?;
+    let mut now = with(&model);
     loop {
         let of_order = |order: Order| {
             let of = Coefficient::all(problem.model.form, Some(&model)).into_iter();
@@ -61,30 +54,22 @@ pub fn select(
             without
         };
         let candidates = highest(problem.model.form, &model).into_iter();
-        let least = candidates.filter_map(|order| {
+        let least = candidates.map(|order| {
             let without = without(order);
-            let posterior = with(&without).ok()?;
+            let posterior = with(&without);
             let limit = chi_square_limit(of_order(order).count() as f64, FALSE_ALARM);
-            Some(((posterior.cost - now.cost) / limit, without, posterior))
+            ((posterior.cost - now.cost) / limit, without, posterior)
         });
         match least.min_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((ratio, without, posterior)) if ratio < 1.0 => (model, now) = (without, posterior),
             _ => break,
         }
     }
-    let mut at = held.estimate.clone();
-    at.triads = from_vector(
-        at.triads.gyro.form,
-        &(to_vector(&held.at.triads) + now.parameters),
-    );
-    for (place, coefficient) in reduction.coefficients() {
-        *coefficient.of_mut(&mut at.thermal) = coefficient.of(&held.at.thermal) + now.mean[place];
-    }
-    Ok(Selected {
+    Selected {
         model,
-        at,
+        at: reduction.estimate(&held.at, &now),
         unseen: unseen(thermal),
-    })
+    }
 }
 
 /// Coefficients of first order of which little more is known than before.

@@ -86,8 +86,8 @@ fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> 
     let passes = &mut Vec::new();
     let gate = Gate::Innovations;
     let iterated = iterate(&problem, &priors, at, gate, passes, UNWATCHED).ok()?;
-    let stated = Solved::stated(&problem, priors, iterated, Vec::new());
-    let learnt = learn(stated, UNWATCHED).ok()?;
+    let stated = Solved::new(&problem, priors, iterated, Vec::new());
+    let learnt = learn(&problem, stated, UNWATCHED).ok()?;
     let of_all = || plain(&problem, &learnt.problem.model).model;
     learnt.noise.learnt.then(of_all)
 }
@@ -132,9 +132,9 @@ fn of(
     let solved = stands.then(|| from_coarse_start(plain, UNWATCHED));
     Ok(match solved {
         Some(Ok(solved)) => {
-            let solved = learn(solved.clone(), UNWATCHED).unwrap_or(solved);
+            let solved = learn(plain, solved.clone(), UNWATCHED).unwrap_or(solved);
             let (contradicted, iterated) = (solved.noise.learnt, solved.iterated);
-            let at = &iterated.held.estimate;
+            let at = &iterated.estimate;
             let alone = alone(
                 (to_vector(&at.triads), solved.by_headings),
                 solved.priors,
@@ -185,8 +185,8 @@ fn with_noise(alone: &SeparateEstimate, recording: &Problem) -> Option<Estimate>
 
 fn estimate(iterated: Iterated, by_headings: ParameterMatrix) -> Option<Estimate> {
     iterated.converged.then_some(Estimate {
-        triads: iterated.held.estimate.triads,
-        covariance: iterated.held.covariance + by_headings,
+        triads: iterated.estimate.triads,
+        covariance: iterated.held.posterior.parameter_covariance + by_headings,
     })
 }
 

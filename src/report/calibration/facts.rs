@@ -112,16 +112,12 @@ impl Report<'_> {
             None => ("zero velocity in dwells", "the IMU's own readings"),
         };
         if let Some(outcome) = self.outcome {
-            let iterations = outcome.passes.iter().filter(|pass| !pass.feedback).count();
-            let first = match iterations < outcome.passes.len() {
-                true => "a first pass with feedback and ",
-                false => "",
-            };
+            let iterations = outcome.passes.len();
             let velocity = sigma(outcome.velocity_sigma / MILLISECOND);
             facts.push(
                 "filter",
                 format!(
-                    "error-state EKF, {first}{iterations} Gauss–Newton iterations; velocity in dwells {velocity} \
+                    "error-state EKF, {iterations} Gauss–Newton iterations; velocity in dwells {velocity} \
                      mm/s (1σ, white)"
                 ),
             );

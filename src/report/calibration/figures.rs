@@ -120,11 +120,6 @@ impl Report<'_> {
                 ))
                 .with(Series::zero())
                 .with(
-                    Series::line(of(&outcome.feedback_history, &error))
-                        .nth(1)
-                        .width(0.9),
-                )
-                .with(
                     Series::line(of(history, &error))
                         .color(Color::Ink)
                         .width(1.75),
@@ -136,14 +131,10 @@ impl Report<'_> {
             panels.extend(indices.into_iter().map(|index| panel(group, index)));
             panels.resize(panels.len().next_multiple_of(3), Panel::blank(""));
         }
-        let first = match outcome.feedback_history.is_empty() {
-            true => "",
-            false => "; thin line: the first pass, with feedback, from the coarse start on",
-        };
         let caption = format!(
-            "Thick line: estimate of the last pass minus {minus}; band: its ±3σ{first}. The vertical axis is \
-             linear within the final σ of the group and logarithmic beyond, and ends at {EXTENT} times that σ; \
-             what lies beyond is drawn at its edge. The thick line should stay in its band."
+            "Line: estimate as the instrument is turned, minus {minus}; band: its ±3σ. The vertical axis is linear \
+             within the final σ of the group and logarithmic beyond, and ends at {EXTENT} times that σ; what lies \
+             beyond is drawn at its edge. The line should stay in its band."
         );
         let drawn = !outcome.history.is_empty() && !panels.is_empty();
         let heading = "Estimates and their ±3σ bands";

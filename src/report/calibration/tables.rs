@@ -146,11 +146,6 @@ pub(super) fn passes(outcome: &Outcome) -> Table {
     let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
         cells![
             (n + 1).to_string(),
-            if pass.feedback {
-                "first, with feedback"
-            } else {
-                "Gauss–Newton"
-            },
             three_digits(pass.largest_step),
             number::whole(pass.cost),
             count(pass.observations),
@@ -160,7 +155,6 @@ pub(super) fn passes(outcome: &Outcome) -> Table {
     });
     let columns = [
         "pass",
-        "kind",
         "largest step, σ",
         "cost",
         "scalars",

@@ -215,8 +215,6 @@ fn a_closed_form_alone_is_reported() {
 fn a_run_without_a_table_is_reported() {
     let mut made_up = synthetic(InstallationForm::General);
     made_up.run.recording.table = None;
-    made_up.outcome.feedback_history.clear();
-    made_up.outcome.passes.retain(|pass| !pass.feedback);
     let innovations = &mut made_up.outcome.innovations;
     innovations.retain(|i| i.observation == Observation::Velocity);
     made_up.outcome.consistency.table = Nis {

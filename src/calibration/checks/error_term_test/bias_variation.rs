@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::{ErrorTermTest, Role};
 use crate::calibration::checks::finding::{Finding, widened_by};
+use crate::calibration::constants::Posterior;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::model::usual_variation;
 use crate::calibration::noise::LOG_SIGMA;
@@ -12,7 +13,6 @@ use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::ParameterMatrix;
 use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::problem::Problem;
-use crate::calibration::reduction::Posterior;
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
@@ -55,7 +55,7 @@ pub fn bias_variation(
     if sensors.is_empty() {
         return Ok(None);
     }
-    let own = outcome.posterior(problem, &outcome.reduction(problem)?)?;
+    let own = outcome.posterior(problem, &outcome.reduction(problem)?);
     let of_sensors = sensors.par_iter().map(|&sensor| {
         let stated = stated.get(sensor);
         of_one(problem, outcome, &own, sensor, stated)
@@ -103,11 +103,10 @@ fn of_one(
         });
         // What the filter cannot run with is not likely.
         let problem = problem.with_model(model);
-        let reduction = script.reduce(&problem, &accepted);
-        let Ok(with) = reduction.and_then(|reduction| outcome.posterior(&problem, &reduction))
-        else {
+        let Ok(reduction) = script.reduce(&problem, &accepted) else {
             continue;
         };
+        let with = outcome.posterior(&problem, &reduction);
         let ratio = (0.5 * (own.deviance - with.deviance)).exp();
         let weight = ratio * density(sigma) * density(time) / all;
         if weight.is_finite() {

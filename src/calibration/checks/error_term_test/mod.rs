@@ -12,13 +12,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::{Finding, widened_by};
+use crate::calibration::constants::Posterior;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::parameters::group::Group;
 use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
 use crate::calibration::problem::Problem;
-use crate::calibration::reduction::Posterior;
 use crate::statistics::FALSE_ALARM;
 pub use bias_variation::{bias_variation, biases_may_vary};
 use evidence::ln_survival;
@@ -173,7 +173,7 @@ pub fn test_error_terms(
 /// −2 ln of the chance that stated noise which is right gives as much to the learnt one.
 fn significance_of_noise(outcome: &Outcome) -> f64 {
     let noise = &outcome.noise;
-    let ratio = noise.test.and_then(|test| test.ratio).unwrap_or(0.0);
+    let ratio = noise.test.map_or(0.0, |test| test.ratio);
     -2.0 * ln_survival(noise.sources.len().max(1) as f64, ratio)
 }
 
@@ -199,7 +199,7 @@ impl<'a> Tested<'a> {
         // The longer of the two first: a thread that is done with something else can take the other.
         let other = &problem.with_model(other);
         let (otherwise, terms) = rayon::join(
-            || outcome.posterior(other, &outcome.reduction(other)?),
+            || Ok::<_, CalibrationError>(outcome.posterior(other, &outcome.reduction(other)?)),
             || TermsOn::new(problem, outcome),
         );
         let mut tested = Self {
@@ -229,11 +229,11 @@ impl<'a> Tested<'a> {
     /// The test of a constant term, with costs of the whole record. `None` if that is singular.
     fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
         let (with, without, evidence, left_off) = if on {
-            let (without, evidence) = self.terms.without(term)?;
+            let (without, evidence) = self.terms.without(term);
             (None, Some(without), evidence, None)
         } else {
             let evidence = self.terms.evidence(term, &[])?;
-            let with = self.terms.with(&[term])?;
+            let with = self.terms.with(&[term]);
             (Some(with), None, evidence, self.terms.left_off(term))
         };
         let own = &self.terms.own;
@@ -335,7 +335,7 @@ impl<'a> Tested<'a> {
         Some(Explanation {
             ln_likelihood_ratio: ratio,
             of_term: ratio,
-            added: added + self.terms.added(others)?,
+            added: added + self.terms.added(others),
         })
     }
 }
@@ -343,7 +343,8 @@ impl<'a> Tested<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::pass::{Gate, Mode, PassResult, pass};
+    use crate::calibration::pass::{Gate, PassResult, pass};
+    use crate::calibration::reduction::Script;
     use crate::calibration::{Options, UNWATCHED, estimate};
     use crate::imu::Term;
     use crate::simulation::Scenario;
@@ -352,14 +353,9 @@ mod tests {
 
     /// A pass of the filter that has all that is on among its states.
     fn last_pass(problem: &Problem, outcome: &Outcome) -> PassResult {
-        let mode = Mode::Held(Gate::As(&outcome.innovations));
-        pass(
-            problem,
-            &outcome.prior_attitudes,
-            &outcome.linearised_at,
-            mode,
-        )
-        .unwrap()
+        let at = &outcome.linearised_at;
+        let script = Script::new(problem, &outcome.prior_attitudes, at).unwrap();
+        pass(problem, &script, Gate::As(&outcome.accepted())).unwrap()
     }
 
     /// The test of a term against two passes.
@@ -371,7 +367,10 @@ mod tests {
         for (group, factor) in Group::all().zip(test.sigma_factors) {
             let rms = |of: &PassResult| {
                 let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
-                of_group.map(|i| of.covariance[(i, i)]).sum::<f64>().sqrt()
+                of_group
+                    .map(|i| of.posterior.parameter_covariance[(i, i)])
+                    .sum::<f64>()
+                    .sqrt()
             };
             assert_relative_eq!(
                 factor.unwrap(),

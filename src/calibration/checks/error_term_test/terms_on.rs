@@ -4,13 +4,14 @@ use nalgebra::DMatrix;
 
 use super::evidence::Evidence;
 use super::explanation::{Explanation, UnmodelledEffect};
+use crate::calibration::constants::{Posterior, Prior};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::model::Model;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
 use crate::calibration::problem::Problem;
-use crate::calibration::reduction::{Posterior, Prior, Reduction};
+use crate::calibration::reduction::Reduction;
 
 /// What a calibrated record says of every constant that it can hold, whatever is on.
 pub struct TermsOn<'a> {
@@ -28,7 +29,7 @@ impl<'a> TermsOn<'a> {
         let reduction = outcome.reduction(&problem.with_model(everything))?.folded();
         let prior = Prior::new(&reduction.constants, &problem.model, &outcome.linearised_at);
         Ok(Self {
-            own: reduction.posterior(&prior)?,
+            own: reduction.posterior(&prior),
             model: &problem.model,
             outcome,
             reduction,
@@ -36,10 +37,10 @@ impl<'a> TermsOn<'a> {
     }
 
     /// With these terms on beside those of the model, each with its usual σ.
-    pub fn with(&self, terms: &[ErrorTerm]) -> Option<Posterior> {
+    pub fn with(&self, terms: &[ErrorTerm]) -> Posterior {
         let mut model = self.model.clone();
         terms.iter().for_each(|&term| model.switch_on(term));
-        self.reduction.posterior(&self.prior(&model)).ok()
+        self.reduction.posterior(&self.prior(&model))
     }
 
     fn prior(&self, model: &Model) -> Prior {
@@ -71,12 +72,12 @@ impl<'a> TermsOn<'a> {
         let mut usual_model = self.model.clone();
         usual_model.switch_on(term);
         let sigma = self.prior(&usual_model).sigma;
-        let shown = self.with(&[term])?.added_to(&self.own).diagonal();
+        let shown = self.with(&[term]).added_to(&self.own).diagonal();
         let mut squares = ParameterVector::zeros();
         for &k in &of {
             let mut there = own.clone();
             there.mean[k] += sigma[k];
-            let change = self.reduction.posterior(&there).ok()?.parameters - self.own.parameters;
+            let change = self.reduction.posterior(&there).parameters - self.own.parameters;
             squares += change.component_mul(&change);
         }
         (!of.is_empty()).then(|| UnmodelledEffect {
@@ -87,14 +88,14 @@ impl<'a> TermsOn<'a> {
 
     /// What a term explains where these others are on; absent if the reduction does not have it.
     pub fn evidence(&self, term: ErrorTerm, others: &[ErrorTerm]) -> Option<Evidence> {
-        let without = self.with(others)?;
+        let without = self.with(others);
         let mut model = self.model.clone();
         others
             .iter()
             .chain([&term])
             .for_each(|&on| model.switch_on(on));
         let prior = self.prior(&model);
-        let with = self.reduction.posterior(&prior).ok()?;
+        let with = self.reduction.posterior(&prior);
         let over_prior = self.over_prior(term, &with, &prior);
         (!over_prior.is_empty()).then(|| Evidence::new(without.cost - with.cost, &over_prior))
     }
@@ -105,12 +106,12 @@ impl<'a> TermsOn<'a> {
         let mut model = self.model.clone();
         model.switch_on(term);
         let alone = self.prior(&model);
-        let alone = self.over_prior(term, &self.reduction.posterior(&alone).ok()?, &alone);
+        let alone = self.over_prior(term, &self.reduction.posterior(&alone), &alone);
         if alone.is_empty() || alone.symmetric_eigenvalues().min() >= 0.5 {
             return None;
         }
-        let before = self.with(others)?;
-        let with = self.with(&[others, &[term]].concat())?;
+        let before = self.with(others);
+        let with = self.with(&[others, &[term]].concat());
         Some(Explanation {
             ln_likelihood_ratio: 0.5 * (self.own.deviance - with.deviance),
             of_term: 0.5 * (before.deviance - with.deviance),
@@ -119,17 +120,17 @@ impl<'a> TermsOn<'a> {
     }
 
     /// Mean square by which terms that were off change the parameters.
-    pub fn added(&self, terms: &[ErrorTerm]) -> Option<ParameterMatrix> {
-        Some(self.with(terms)?.added_to(&self.own))
+    pub fn added(&self, terms: &[ErrorTerm]) -> ParameterMatrix {
+        self.with(terms).added_to(&self.own)
     }
 
     /// The calibration without a term that is on, and what the term explains.
-    pub fn without(&self, term: ErrorTerm) -> Option<(Posterior, Evidence)> {
+    pub fn without(&self, term: ErrorTerm) -> (Posterior, Evidence) {
         let mut model = self.model.clone();
         model.switch_off(term);
-        let without = self.reduction.posterior(&self.prior(&model)).ok()?;
+        let without = self.reduction.posterior(&self.prior(&model));
         let over_prior = self.over_prior(term, &self.own, &self.prior(self.model));
         let evidence = Evidence::new(without.cost - self.own.cost, &over_prior);
-        Some((without, evidence))
+        (without, evidence)
     }
 }

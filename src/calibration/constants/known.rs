@@ -1,0 +1,98 @@
+//! What is known of constants so far: the prior and whitened rows `[G ν]` as one triangle.
+
+use faer::MatRef;
+use nalgebra::{DMatrix, DVector};
+
+use super::{Posterior, Prior};
+
+/// What is known of constants so far.
+#[derive(Debug, Clone)]
+pub struct Known {
+    prior: Prior,
+    /// Those that the prior leaves open, and those that it has at its mean.
+    open: Vec<usize>,
+    fixed: Vec<usize>,
+    /// Rows of the open ones, and what they measured: an upper triangle.
+    root: DMatrix<f64>,
+}
+
+impl Known {
+    /// Before the data.
+    pub fn new(prior: Prior) -> Self {
+        let all = 0..prior.sigma.len();
+        let (open, fixed): (Vec<usize>, Vec<usize>) = all.partition(|&k| prior.sigma[k] > 0.0);
+        let n = open.len();
+        let mut root = DMatrix::zeros(n, n + 1);
+        for (row, &k) in open.iter().enumerate() {
+            root[(row, row)] = prior.sigma[k].recip();
+            root[(row, n)] = prior.mean[k] / prior.sigma[k];
+        }
+        Self {
+            prior,
+            open,
+            fixed,
+            root,
+        }
+    }
+
+    /// Takes in rows of all constants.
+    pub fn learn<'a>(&mut self, rows: impl Iterator<Item = &'a DMatrix<f64>> + Clone) {
+        let (n, all) = (self.open.len(), self.prior.sigma.len());
+        let known = self.prior.mean.select_rows(&self.fixed);
+        let mut first = self.root.nrows();
+        let count: usize = rows.clone().map(DMatrix::nrows).sum();
+        let mut stacked = self.root.clone().resize_vertically(first + count, 0.0);
+        for rows in rows {
+            let mut of_these = stacked.rows_mut(first, rows.nrows());
+            of_these
+                .columns_mut(0, n)
+                .copy_from(&rows.select_columns(&self.open));
+            let observed = rows.column(all) - rows.select_columns(&self.fixed) * &known;
+            of_these.set_column(n, &observed);
+            first += rows.nrows();
+        }
+        if count > 0 {
+            self.root = triangle(&stacked);
+        }
+    }
+
+    /// What is known of combinations of the constants, a row of weights each: mean, and a root of the covariance.
+    pub fn through(&self, weights: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let n = self.open.len();
+        let mut across = weights.select_columns(&self.open).transpose();
+        let root = self.root.view((0, 0), (n, n));
+        if !root.tr_solve_upper_triangular_mut(&mut across) {
+            across.fill(f64::NAN);
+        }
+        let root = across.transpose();
+        let fixed = weights.select_columns(&self.fixed) * self.prior.mean.select_rows(&self.fixed);
+        (
+            fixed + &root * self.root.view((0, n), (n, 1)).column(0),
+            root,
+        )
+    }
+
+    /// Estimate and covariance. Where a constant is open still they are no numbers.
+    pub fn posterior(&self) -> Posterior {
+        let (n, all) = (self.open.len(), self.prior.sigma.len());
+        let (mean, root) = self.through(&DMatrix::identity(all, all));
+        let last = self.root.get((n, n)).copied().unwrap_or(0.0);
+        let logarithms: f64 = (0..n).map(|k| self.root[(k, k)].abs().ln()).sum();
+        let of_prior: f64 = self.open.iter().map(|&k| self.prior.sigma[k].ln()).sum();
+        Posterior::new(
+            &self.prior.constants,
+            mean,
+            &root * root.transpose(),
+            last.powi(2),
+            2.0 * (logarithms + of_prior),
+        )
+    }
+}
+
+/// The upper triangle that has the same squares as these rows, by Householder's reflections.
+pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let rows = MatRef::from_column_major_slice(rows.as_slice(), rows.nrows(), rows.ncols());
+    let qr = rows.qr();
+    let triangle = qr.thin_R();
+    DMatrix::from_fn(triangle.nrows(), triangle.ncols(), |i, j| triangle[(i, j)])
+}

@@ -1,0 +1,78 @@
+//! The constants of a record, what is known of them beforehand, and with the data.
+
+mod known;
+mod posterior;
+mod prior;
+
+use super::budget::source::BudgetSource;
+use super::parameters::auxiliary::OF_AXES;
+use super::parameters::error_term::ErrorTerm;
+use crate::calibration::several::thermal::Coefficient;
+use crate::imu::Term;
+use crate::turntable::{AxisError, TABLE_GEOMETRY};
+pub use known::{Known, triangle};
+pub use posterior::{Posterior, of_parameters};
+pub use prior::Prior;
+
+/// What is the same throughout a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Constant {
+    /// A parameter of both triads, by its index.
+    Parameter(usize),
+    /// A parameter of the error terms, by its index.
+    Term(usize),
+    Thermal(Coefficient),
+    Gravity,
+    /// An error of the table's base, by its axis.
+    Base(usize),
+    /// An error of the table's axes, by its index.
+    Axis(usize),
+}
+
+impl Constant {
+    /// What is known of it before.
+    pub fn source(self) -> BudgetSource {
+        match self {
+            Self::Parameter(_) => BudgetSource::Prior,
+            Self::Term(index) => Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term),
+            Self::Thermal(_) => BudgetSource::Temperature,
+            Self::Gravity => BudgetSource::Gravity,
+            Self::Base(2) => BudgetSource::TableNorth,
+            Self::Base(_) => BudgetSource::TableLevel,
+            Self::Axis(index) => match AxisError::of(index) {
+                Some(AxisError::Tilt) => BudgetSource::TableSquareness,
+                Some(AxisError::Wobble) => BudgetSource::TableWobble,
+                _ => BudgetSource::TableEncoder,
+            },
+        }
+    }
+
+    /// Its index among the auxiliary parameters, if it is one.
+    pub fn auxiliary(self) -> Option<usize> {
+        match self {
+            Self::Base(axis) => Some(axis),
+            Self::Axis(index) => Some(OF_AXES + index),
+            Self::Term(index) => Some(TABLE_GEOMETRY + index),
+            Self::Parameter(_) | Self::Thermal(_) | Self::Gravity => None,
+        }
+    }
+
+    /// The error term that it is of, if it is of one.
+    pub fn error_term(self) -> Option<ErrorTerm> {
+        match self {
+            Self::Term(index) => Term::of(index).map(ErrorTerm::Instrument),
+            Self::Base(_) => Some(ErrorTerm::TableBase),
+            Self::Axis(index) => AxisError::of(index).map(ErrorTerm::TableAxes),
+            Self::Parameter(_) | Self::Thermal(_) | Self::Gravity => None,
+        }
+    }
+}
+
+/// The parameters of both triads among constants: place and index of each.
+pub fn parameters(constants: &[Constant]) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let places = constants.iter().enumerate();
+    places.filter_map(|(place, constant)| match constant {
+        Constant::Parameter(index) => Some((place, *index)),
+        _ => None,
+    })
+}
