@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::beta::beta_reg;
+use statrs::function::gamma::ln_gamma;
 use statrs::statistics::{Data, OrderStatistics};
 
 /// Rate of false alarms of a whole list of checks; each check has its share of it.
@@ -15,6 +16,35 @@ pub(crate) const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 /// freedom, for then nothing is beyond chance.
 pub(crate) fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - chance))
+}
+
+/// ln of the chance that χ² with this many degrees of freedom is above `x`, however small it is.
+pub(crate) fn ln_survival(freedom: f64, x: f64) -> f64 {
+    let (a, z) = (0.5 * freedom, 0.5 * x);
+    if z < a + 1.0 {
+        return ChiSquared::new(freedom).map_or(0.0, |chi2| chi2.sf(x.max(0.0)).ln());
+    }
+    // Continued fraction of the incomplete gamma function, NIST Digital Library of Mathematical
+    // Functions, §8.9.2, by Lentz's method.
+    const TINY: f64 = 1e-300;
+    const TERMS: usize = 1000;
+    let mut b = z + 1.0 - a;
+    let mut c = 1.0 / TINY;
+    let mut d = 1.0 / b;
+    let mut fraction = d;
+    for k in 1..TERMS {
+        let k = k as f64;
+        let numerator = -k * (k - a);
+        b += 2.0;
+        let bounded = |value: f64| if value.abs() < TINY { TINY } else { value };
+        d = 1.0 / bounded(numerator * d + b);
+        c = bounded(b + numerator / c);
+        fraction *= d * c;
+        if (d * c - 1.0).abs() < f64::EPSILON {
+            break;
+        }
+    }
+    a * z.ln() - z - ln_gamma(a) + fraction.ln()
 }
 
 /// Degrees of freedom from which t is the normal distribution and its first correction, to 1e-7.
@@ -83,5 +113,18 @@ mod tests {
         let limits: Vec<f64> = degrees.map(|of| student_limit(of, 0.022_75)).collect();
         assert!(limits.windows(2).all(|two| two[1] < two[0] + 1e-6));
         assert_relative_eq!(*limits.last().unwrap(), 2.0, epsilon = 1e-4);
+    }
+
+    #[test]
+    fn the_tail_of_chi_squared_is_right_where_it_can_be_represented_and_goes_on_beyond() {
+        for freedom in [0.7, 1.0, 3.0, 24.0] {
+            let chi2 = ChiSquared::new(freedom).unwrap();
+            for x in [0.1, 1.0, 10.0, 30.0, 300.0] {
+                let expected = chi2.sf(x).ln();
+                assert_relative_eq!(ln_survival(freedom, x), expected, max_relative = 1e-9);
+            }
+        }
+        // Two degrees of freedom: exp(−x/2).
+        assert_relative_eq!(ln_survival(2.0, 1e5), -5e4, max_relative = 1e-12);
     }
 }

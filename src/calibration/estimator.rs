@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use super::budget::BudgetSource;
 use super::constants::Prior;
 use super::error::CalibrationError;
 use super::gauss_newton::{Iterated, Progress, iterate};
-use super::linearisation::not_invertible;
+use super::linearisation::{UNKNOWN_HEADING, not_invertible};
 use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::ParameterMatrix;
@@ -15,15 +17,20 @@ use super::problem::Problem;
 use super::several;
 use super::solved::Solved;
 use crate::calibration::checks;
+use crate::calibration::checks::disturbance::{Disturbed, disturbed};
 use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
 use crate::calibration::checks::form::{FormTest, form_test};
 use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::Observability;
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::rounding::by_rounding;
+use crate::calibration::checks::settling;
 use crate::calibration::noise::learn;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::imu::Sensor;
+
+/// More than one disturbance in so many dwells is no disturbance.
+const DWELLS_OF_ONE: usize = 6;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
 ///
@@ -39,6 +46,8 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         true => several::solve(problem, progress)?,
         false => from_coarse_start(problem, progress)?,
     };
+    let solved = without_disturbances(solved, progress)?;
+    let solved = settled(solved, progress)?;
     // Recordings differ as they show.
     let mut model = solved.problem.model.with_noise_of(&problem.model);
     model.prior_sigma = problem.model.prior_sigma;
@@ -52,6 +61,42 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         false => learn_noise(&as_stated, solved, progress)?,
     };
     outcome(&as_stated, solved, form_test)
+}
+
+/// Without the time after each stop in which the attitude settles, as long as more of it shows.
+fn settled<'a>(mut solved: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
+    loop {
+        let steps = settling::settling(&solved.problem, &solved.iterated.held.innovations);
+        if steps == 0 {
+            return Ok(solved);
+        }
+        let problem = solved.problem.settled(steps);
+        let (from, gate) = (solved.iterated.estimate.clone(), Gate::Innovations);
+        let (priors, passes) = (&solved.priors, &mut solved.passes);
+        solved.iterated = iterate(&problem, priors, from, gate, passes, progress)?;
+        solved.problem = problem;
+        solved.settling += steps;
+    }
+}
+
+/// Without what happened once: the largest is taken out first, as long as one is beyond chance.
+fn without_disturbances<'a>(
+    mut solved: Solved<'a>,
+    progress: Progress,
+) -> Result<Solved<'a>, CalibrationError> {
+    let most = solved.problem.dwells().count() / DWELLS_OF_ONE;
+    while solved.disturbances.len() < most {
+        let Some(found) = disturbed(&solved.problem, &solved.priors, &solved.iterated)? else {
+            break;
+        };
+        let problem = found.taken_out(&solved.problem);
+        let (from, gate) = (solved.iterated.estimate.clone(), Gate::Innovations);
+        let (priors, passes) = (&solved.priors, &mut solved.passes);
+        solved.iterated = iterate(&problem, priors, from, gate, passes, progress)?;
+        solved.problem = problem;
+        solved.disturbances.push(found);
+    }
+    Ok(solved)
 }
 
 /// With the noise that the data show, where they contradict what is stated.
@@ -129,8 +174,13 @@ fn outcome(
         covariance_parts: BTreeMap::new(),
         prior_sigma: as_stated.model.prior_sigma,
         prior_mean: model.prior_mean,
+        attitude_sigma: match solved.priors.last() {
+            Some(prior) if prior.earth_rate_sigma > 0.0 => {
+                Vector3::new(attitude_sigma.x, attitude_sigma.y, UNKNOWN_HEADING)
+            }
+            _ => attitude_sigma,
+        },
         prior_attitudes: solved.priors,
-        attitude_sigma,
         auxiliary: held.auxiliary(model),
         thermal: held.thermal(model),
         own: held.reduction.own(&held.at, &held.posterior),
@@ -146,17 +196,23 @@ fn outcome(
         aiding: model.aiding,
         velocity_sigma: problem.standstill_sigma(Sensor::Accel),
         model: model.clone(),
+        settling: solved.settling,
+        disturbances: solved.disturbances,
         noise: solved.noise,
         passes: solved.passes,
         findings: Vec::new(),
     };
-    outcome.set_part(BudgetSource::Headings, solved.by_headings);
     if let Some(scattered) = scattered {
         outcome.set_part(BudgetSource::DwellScatter, scattered);
     }
     let growth = outcome.growth_by(BudgetSource::DwellScatter);
     outcome.set_part(BudgetSource::Rounding, rounding);
     outcome.findings = checks::findings(as_stated, &outcome);
+    outcome
+        .findings
+        .extend(settling::finding(as_stated, outcome.settling));
+    let disturbed = outcome.disturbances.iter().map(Disturbed::finding);
+    outcome.findings.extend(disturbed.collect::<Vec<_>>());
     outcome.findings.extend(solved.findings);
     if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
         outcome.findings.push(scatter.finding(growth));

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
-use super::outcome::Pass;
 use super::pass::{Gate, PassResult, pass};
 use super::problem::Problem;
 use super::reduction::Script;
@@ -24,6 +23,19 @@ const MOST_OUTLIERS: f64 = 0.05;
 
 /// A step that leads where no pass can be made is shortened by half so many times at most: to a thousandth.
 const MOST_SHORTENED: usize = 10;
+
+/// One pass over the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pass {
+    /// The largest step of any parameter from the linearisation point, in σ.
+    pub largest_step: f64,
+    /// Whitened innovations squared plus prior, summed.
+    pub cost: f64,
+    /// Number of scalar observations that entered the cost.
+    pub observations: usize,
+    /// Number of observations (of three components) that the gate rejected.
+    pub rejected: usize,
+}
 
 /// Told after each pass, may stop the work; the command line draws it.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) -> ControlFlow<()> + Sync);

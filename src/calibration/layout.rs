@@ -7,6 +7,7 @@
 //! | velocity | 3 | δV = computed − true, East-North-Up, m/s |
 //! | position | 3 | δp = computed − true, East-North-Up, m |
 //! | gravity | 1 | true − stated magnitude of gravity, m/s²; where recordings are of several sites and it has a σ |
+//! | Earth rate | 2 | true − computed Earth rate along East and North, rad/s; without a table, where it is drawn for each stretch whose heading is not known |
 //! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
 //! | of the recording | one for each parameter that is not common to all, and 3 of its mounting, rad | by how much it differs in this recording, see [`crate::calibration::several::day_to_day::Difference`] |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
@@ -20,6 +21,7 @@
 //! | temperature | one for each coefficient that is on | true − estimated, see [`crate::imu::ThermalModel`] |
 //! | gravity | 1 | as above, where all recordings are of one site |
 //! | table base | one for each of East, North, Up that is on | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where a σ of it is stated |
+//! | disturbances | 3 each | see [`super::constants::Disturbance`] |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
 use super::budget::source::BudgetSource;
@@ -46,6 +48,8 @@ pub const NAVIGATION: usize = 9;
 pub struct Layout {
     /// Whether gravity's error is a state.
     gravity: bool,
+    /// Whether level Earth rate is.
+    earth_rate: bool,
     /// Triad and axis of each bias that varies.
     varying: Vec<(Sensor, usize)>,
     /// What each state of the recording is.
@@ -68,6 +72,7 @@ impl Layout {
         let gravity = model.gravity_sigma > 0.0;
         Self {
             gravity: gravity && !one_gravity,
+            earth_rate: model.aiding == Aiding::Velocity,
             varying: triads
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
                 .collect(),
@@ -106,6 +111,11 @@ impl Layout {
         self.gravity.then_some(NAVIGATION)
     }
 
+    /// Level Earth rate, if it is a state.
+    pub fn earth_rate(&self) -> Option<usize> {
+        self.earth_rate.then(|| self.earth_rate_begin())
+    }
+
     /// State, triad and index of the constant part among the triad's parameters of each varying bias.
     pub fn varying_biases(&self) -> impl Iterator<Item = (usize, Sensor, usize)> + '_ {
         let states = placed(self.varying_begin(), &self.varying);
@@ -135,8 +145,10 @@ impl Layout {
         if let Some((_, sensor, _)) = varying.find(|&(varying, ..)| varying == state) {
             return BudgetSource::wander(sensor);
         }
+        let of_earth_rate = |first: usize| (first..first + 2).contains(&state);
         match state {
             VELOCITY..NAVIGATION => BudgetSource::Place,
+            _ if self.earth_rate().is_some_and(of_earth_rate) => BudgetSource::Headings,
             _ if within(self.table_position()) => BudgetSource::TablePosition,
             _ if within(self.turn_at_rest()) => BudgetSource::RotationAtRest,
             _ if self.gravity() == Some(state) => BudgetSource::Gravity,
@@ -145,8 +157,12 @@ impl Layout {
         }
     }
 
-    fn varying_begin(&self) -> usize {
+    fn earth_rate_begin(&self) -> usize {
         NAVIGATION + usize::from(self.gravity)
+    }
+
+    fn varying_begin(&self) -> usize {
+        self.earth_rate_begin() + 2 * usize::from(self.earth_rate)
     }
 
     fn own_begin(&self) -> usize {
@@ -165,6 +181,9 @@ fn constants(model: &Model, gravity: bool) -> Vec<Constant> {
     let thermal = Coefficient::all(model.form, model.thermal.as_deref()).into_iter();
     let base = (0..3).filter(|&axis| model.geometry.base[axis] > 0.0);
     let axes = (0..AXIS_ERRORS).filter(|&k| model.geometry.axes[k] > 0.0);
+    let disturbances = model.disturbances.iter();
+    let disturbances =
+        disturbances.flat_map(|&of| (0..3).map(move |k| Constant::Disturbance(of, k)));
     parameters
         .map(Constant::Parameter)
         .chain(terms.map(Constant::Term))
@@ -172,6 +191,7 @@ fn constants(model: &Model, gravity: bool) -> Vec<Constant> {
         .chain(gravity.then_some(Constant::Gravity))
         .chain(base.map(Constant::Base))
         .chain(axes.map(Constant::Axis))
+        .chain(disturbances)
         .collect()
 }
 
@@ -207,6 +227,6 @@ mod tests {
         assert_eq!(sizes(&level, Options::default()), (15, 26));
         // Three parameters fix the body frame.
         let velocity = Options::default().aiding(Aiding::Velocity);
-        assert_eq!(sizes(&run, velocity), (9 + 3 + 3, 21));
+        assert_eq!(sizes(&run, velocity), (9 + 2 + 3 + 3, 21));
     }
 }

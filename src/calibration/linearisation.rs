@@ -1,5 +1,6 @@
 //! Where a pass linearises, and what is known of attitudes before it.
 
+use std::f64::consts::{PI, SQRT_2};
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
@@ -9,13 +10,14 @@ use super::model::Model;
 use super::parameters::{from_vector, parameter, to_vector};
 use crate::attitude::{exp, log};
 use crate::calibration::several::day_to_day::Difference;
+use crate::earth::Site;
 use crate::imu::{
     PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, TermVector, ThermalCoefficients,
     Triad,
 };
 use crate::run::Run;
 use crate::turntable::TableAccuracy;
-use crate::units::{ARCSEC, DEGREE};
+use crate::units::DEGREE;
 
 /// The point at which a pass linearises.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,10 +130,13 @@ pub struct AttitudePrior {
     pub mean: Matrix3<f64>,
     /// 1σ about East, North and Up, rad; the last is that of the heading.
     pub sigma: Vector3<f64>,
+    /// 1σ of Earth rate along East and along North of this attitude, rad/s: where its heading is not known, the heading
+    /// is fixed and Earth rate may point anywhere. Zero where the heading is known.
+    pub earth_rate_sigma: f64,
 }
 
-/// 1σ of the initial attitude before anything is known of it but one reading, rad.
-const READ_ATTITUDE: f64 = 60.0 * ARCSEC;
+/// 1σ of the initial attitude before anything is known of it but one reading, rad: that may be a wrong one.
+const READ_ATTITUDE: f64 = DEGREE;
 /// So many times what the prior of the accelerometers leaves of the initial level without a table: what gave it is in
 /// the observations, too, so that it has to be told by these.
 const LEVEL_SIGMAS: f64 = 10.0;
@@ -139,10 +144,12 @@ const LEVEL_SIGMAS: f64 = 10.0;
 const HEADING: f64 = 15.0 * DEGREE;
 /// … so many times what Earth rate leaves of it.
 const HEADING_SIGMAS: f64 = 3.0;
-/// A heading less known than this, rad, is hidden: it may be in any quadrant, and …
+/// A heading less known than this, rad, is hidden: it may be any, and is fixed to within …
 const HIDDEN: f64 = 45.0 * DEGREE;
-/// … within one, has the standard deviation of a uniform distribution, rad.
-const IN_QUADRANT: f64 = 90.0 * DEGREE / 3.464_101_615_137_754_6;
+/// … this, rad: a number so small that it is none, where a state needs a σ.
+const FIXED: f64 = 1e-6;
+/// 1σ of a heading that may be any, rad.
+pub const UNKNOWN_HEADING: f64 = PI / 1.732_050_807_568_877_2;
 
 impl AttitudePrior {
     /// From a reading of a table.
@@ -153,6 +160,7 @@ impl AttitudePrior {
         Self {
             mean,
             sigma: Vector3::repeat(READ_ATTITUDE.max(10.0 * known)),
+            earth_rate_sigma: 0.0,
         }
     }
 
@@ -162,24 +170,19 @@ impl AttitudePrior {
         mean: Matrix3<f64>,
         heading_sigma: f64,
         model: &Model,
-        gravity: f64,
+        site: &Site,
     ) -> Self {
-        let level = LEVEL_SIGMAS * known_level(model, gravity);
+        let level = LEVEL_SIGMAS * known_level(model, site.gravity);
         let heading = (HEADING_SIGMAS * heading_sigma).max(HEADING);
-        let heading = if heading > HIDDEN {
-            IN_QUADRANT
-        } else {
-            heading
+        let (heading, earth_rate_sigma) = match heading > HIDDEN {
+            true => (FIXED, site.earth_rate_n().xy().norm() / SQRT_2),
+            false => (heading, 0.0),
         };
         Self {
             mean,
             sigma: Vector3::new(level, level, heading),
+            earth_rate_sigma,
         }
-    }
-
-    /// Whether noise of the gyros hides a heading of this 1σ, so that it may be any.
-    pub(in crate::calibration) fn hides(heading_sigma: f64) -> bool {
-        HEADING_SIGMAS * heading_sigma > HIDDEN
     }
 }
 
@@ -211,4 +214,6 @@ pub struct Start {
     pub velocity_sigma: f64,
     /// m
     pub position_sigma: f64,
+    /// Mean of the error of Earth rate along East and North, and 1σ of each, rad/s.
+    pub earth_rate: ([f64; 2], f64),
 }

@@ -33,6 +33,7 @@ mod solved;
 
 pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
+pub use checks::disturbance::Disturbed;
 pub use checks::dwell_scatter::DwellScatter;
 pub use checks::error_term_test::{ErrorTermTest, Role, UnmodelledEffect, test_error_terms};
 pub use checks::finding::Finding;
@@ -41,15 +42,17 @@ pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_squ
 pub use checks::observability::{AttitudePart, Direction, Observability, Part};
 pub use checks::quality::{Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
+pub use constants::{Disturbance, DisturbanceKind};
 pub use error::{CalibrationError, ComparisonError};
 pub use estimate::Estimate;
 pub use estimator::estimate;
+pub use gauss_newton::Pass;
 pub use gauss_newton::{Progress, UNWATCHED};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use options::Options;
-pub use outcome::{Outcome, Pass};
+pub use outcome::Outcome;
 pub use parameters::auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };

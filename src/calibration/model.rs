@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::budget::source::BudgetSource;
+use super::constants::Disturbance;
 use super::options::Options;
 use super::parameters::error_term::ErrorTerm;
 use super::parameters::{ParameterVector, parameter, to_vector};
@@ -65,6 +66,8 @@ pub struct Model {
     pub reading_sigma: f64,
     /// 1σ of what the table does not read; zero where it is off.
     pub geometry: TableGeometry,
+    /// What happened once, and is estimated.
+    pub(in crate::calibration) disturbances: Vec<Disturbance>,
     /// Axes of the table whose angles are read; zero where they are not.
     table_axes: usize,
     /// The source whose variance is multiplied, and by what: how a budget tells its share.
@@ -94,6 +97,7 @@ impl Model {
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
             geometry: accuracy.geometry,
+            disturbances: Vec::new(),
             table_axes: axes.map_or(0, |axes| axes.iter().flatten().count()),
             varied: None,
         };

@@ -8,6 +8,7 @@ use super::budget::BudgetSource;
 use super::constants::{Posterior, Prior};
 use super::error::CalibrationError;
 use super::estimate::{Estimate, largest_growth};
+use super::gauss_newton::Pass;
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::model::Model;
 use super::noise::NoiseReport;
@@ -15,6 +16,7 @@ use super::parameters::auxiliary::Auxiliary;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::problem::Problem;
 use super::reduction::{Epoch, Own, Reduction, Script};
+use crate::calibration::checks::disturbance::Disturbed;
 use crate::calibration::checks::dwell_scatter::DwellScatter;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
@@ -86,6 +88,10 @@ pub struct Outcome {
     pub model: Model,
     /// How that noise was come by.
     pub noise: NoiseReport,
+    /// Steps of each dwell after a stop that are skipped.
+    pub settling: usize,
+    /// What happened once and is not in it.
+    pub disturbances: Vec<Disturbed>,
     /// What a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
@@ -103,6 +109,9 @@ impl Outcome {
         let Some(prior) = self.prior_attitudes.last() else {
             return false;
         };
+        if prior.earth_rate_sigma > 0.0 {
+            return false;
+        }
         let of_run = information(&self.attitude_sigma) - information(&prior.sigma);
         // Opposite directions of Earth rate differ by twice its level part.
         4.0 * of_run > HEADING_SEEN
@@ -117,8 +126,12 @@ impl Outcome {
         }
     }
 
-    /// The problem with that prior, and noise as it is stated.
+    /// The problem with that prior, without what happened once, and with noise as it is stated.
     pub(in crate::calibration) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        let disturbances = self.disturbances.iter();
+        let problem = disturbances.fold(problem.settled(self.settling), |problem, of| {
+            of.taken_out(&problem)
+        });
         let mut model = problem.model.clone();
         model.prior_sigma = self.model.prior_sigma;
         problem.with_model(model)
@@ -184,17 +197,4 @@ impl Outcome {
         let hidden = |&i: &usize| sigma[i] > OBSERVED_BELOW * self.prior_sigma[i];
         self.estimate.estimated().filter(hidden).collect()
     }
-}
-
-/// One pass over the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pass {
-    /// The largest step of any parameter from the linearisation point, in σ.
-    pub largest_step: f64,
-    /// Whitened innovations squared plus prior, summed.
-    pub cost: f64,
-    /// Number of scalar observations that entered the cost.
-    pub observations: usize,
-    /// Number of observations (of three components) that the gate rejected.
-    pub rejected: usize,
 }

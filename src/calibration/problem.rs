@@ -8,13 +8,13 @@ use super::budget::source::BudgetSource;
 use super::linearisation::{AttitudePrior, Start};
 use super::model::Model;
 use super::options::Options;
-use crate::attitude::to_tilt_and_heading;
+use crate::attitude::{self, to_tilt_and_heading};
 use crate::calibration::checks::innovation::Observation;
-use crate::calibration::record::schedule::{Step, first_reading, steps};
+use crate::calibration::record::schedule::{Step, first_reading, step_length, steps};
 use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
-use crate::run::{Aiding, Dwell, LONG_ENOUGH, Run};
+use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
 use crate::statistics::chi_square_limit;
 
 /// 1σ of the initial velocity of a body at rest, m/s, beside that with which it sways.
@@ -141,13 +141,21 @@ impl<'a> Problem<'a> {
 
     /// The same observed in some of its dwells only, told by number.
     pub(in crate::calibration) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
+        self.with_dwells(|number, _, dwell| used(number).then(|| dwell.clone()))
+    }
+
+    /// The same with what becomes of each of its dwells, told by number.
+    pub(in crate::calibration) fn with_dwells(
+        &self,
+        become_of: impl Fn(usize, &Stretch, &Dwell) -> Option<Dwell>,
+    ) -> Self {
         let mut number = 0;
         let stretches = self.stretches.iter().map(|stretch| {
-            let dwells = stretch.dwells.iter().filter(|_| {
+            let dwells = stretch.dwells.iter().filter_map(|dwell| {
                 number += 1;
-                used(number - 1)
+                become_of(number - 1, stretch, dwell)
             });
-            let dwells: Vec<Dwell> = dwells.cloned().collect();
+            let dwells: Vec<Dwell> = dwells.collect();
             let Stretch {
                 run,
                 table,
@@ -157,10 +165,52 @@ impl<'a> Problem<'a> {
             } = *stretch;
             Stretch::new(run, table, recording, dwells, standstill_sigma)
         });
+        let stretches = stretches.collect();
+        let mut model = self.model.clone();
+        let of_stretches = self.stretches.iter();
+        let all: Vec<(&Stretch, &Dwell)> = of_stretches
+            .flat_map(|stretch| stretch.dwells.iter().map(move |dwell| (stretch, dwell)))
+            .collect();
+        for disturbance in &mut model.disturbances {
+            let kept = |&k: &usize| become_of(k, all[k].0, all[k].1).is_some();
+            disturbance.dwell = (0..disturbance.dwell).filter(kept).count();
+        }
         Self {
-            stretches: stretches.collect(),
+            stretches,
+            model,
             ..self.clone()
         }
+    }
+
+    /// The same without the first steps of each dwell after a move; a dwell keeps half of itself.
+    pub(in crate::calibration) fn settled(&self, steps: usize) -> Self {
+        if steps == 0 {
+            return self.clone();
+        }
+        self.with_dwells(|_, stretch, dwell| {
+            let first = stretch.dwells.first().map(|first| &first.samples);
+            if first == Some(&dwell.samples) {
+                return Some(dwell.clone());
+            }
+            let imu = &stretch.run.recording.imu;
+            let skipped = (steps * step_length(imu.period)).min(dwell.samples.len() / 2);
+            let samples = dwell.samples.start + skipped..dwell.samples.end;
+            let begin = imu.time(samples.start);
+            let position = dwell.position.as_ref().and_then(|position| {
+                let (table, readings) = (stretch.table?, position.readings.clone());
+                let early = table.time[readings.clone()].partition_point(|&time| time < begin);
+                let readings = readings.start + early..readings.end;
+                let attitude = attitude::mean(&table.attitude[readings.clone()])?;
+                Some(Position { readings, attitude })
+            });
+            Some(Dwell { samples, position })
+        })
+    }
+
+    /// Duration of so many steps of a dwell, s.
+    pub(in crate::calibration) fn duration_of_steps(&self, steps: usize) -> f64 {
+        let period = self.run.recording.imu.period;
+        (steps * step_length(period)) as f64 * period
     }
 
     /// The same observed at the end of so many steps of a dwell, with the mean of what a table read
@@ -366,6 +416,14 @@ impl<'a> Stretch<'a> {
             attitude_sigma: prior.sigma,
             velocity_sigma: self.velocity_sigma(),
             position_sigma: self.run.standstill.position_sigma,
+            earth_rate: match prior.earth_rate_sigma {
+                0.0 => ([0.0; 2], 0.0),
+                // It may point anywhere, whatever was taken for it.
+                sigma => {
+                    let taken = self.run.site.earth_rate_n();
+                    ([-taken.x, -taken.y], sigma)
+                }
+            },
         }
     }
 }

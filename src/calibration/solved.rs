@@ -1,10 +1,9 @@
 //! What iterations found, and with what they were made.
 
-use super::gauss_newton::Iterated;
+use super::gauss_newton::{Iterated, Pass};
 use super::linearisation::AttitudePrior;
-use super::outcome::Pass;
-use super::parameters::ParameterMatrix;
 use super::problem::Problem;
+use crate::calibration::checks::disturbance::Disturbed;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
 use crate::calibration::several::separate_estimate::SeparateEstimate;
@@ -17,11 +16,13 @@ pub struct Solved<'a> {
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
     pub iterated: Iterated,
-    /// Mean square by which the parameters differ from those of other headings, where Earth rate does not tell them.
-    pub by_headings: ParameterMatrix,
     pub noise: NoiseReport,
     /// Each recording calibrated alone, where there are several.
     pub alone: Vec<SeparateEstimate>,
+    /// Steps of each dwell after a stop that are skipped.
+    pub settling: usize,
+    /// What happened once and is taken out of the problem.
+    pub disturbances: Vec<Disturbed>,
     pub findings: Vec<Finding>,
 }
 
@@ -39,8 +40,9 @@ impl<'a> Solved<'a> {
             priors,
             passes,
             iterated,
-            by_headings: ParameterMatrix::zeros(),
             alone: Vec::new(),
+            settling: 0,
+            disturbances: Vec::new(),
             findings: Vec::new(),
         }
     }

@@ -207,6 +207,8 @@ fn outcome(
         covariance_by_noise: ParameterMatrix::zeros(),
         covariance_parts: BTreeMap::new(),
         model: Model::new(run, &Options::default().installation(form)),
+        settling: 0,
+        disturbances: Vec::new(),
         noise: NoiseReport {
             policy: Default::default(),
             learnt: false,
@@ -226,6 +228,7 @@ fn outcome(
         prior_attitudes: vec![AttitudePrior {
             mean: Matrix3::identity(),
             sigma: Vector3::repeat(60.0 * ARCSEC),
+            earth_rate_sigma: 0.0,
         }],
         attitude_sigma: Vector3::repeat(ARCSEC),
         observability: observability(),

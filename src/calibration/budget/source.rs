@@ -58,7 +58,7 @@ pub enum BudgetSource {
     Term(Term),
     /// Second order of the installation form in angles that are hardly known.
     Curvature,
-    /// Headings that the data do not tell apart.
+    /// Heading that Earth rate does not tell.
     Headings,
     /// By how much dwells scatter more than all noise says.
     DwellScatter,
@@ -132,7 +132,7 @@ impl BudgetSource {
             Self::Recording => "differences between recordings",
             Self::Term(term) => return format!("prior of {}", term.name()),
             Self::Curvature => "second order of unknown angles",
-            Self::Headings => "headings that cannot be told apart",
+            Self::Headings => "unknown heading",
             Self::DwellScatter => "scatter of dwells",
             Self::Rounding => "rounding of rates",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",

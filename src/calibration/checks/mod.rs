@@ -1,5 +1,6 @@
 //! Checks of model, noise and record by the data: each file a check with its words.
 
+pub mod disturbance;
 pub mod drift;
 pub mod dwell_scatter;
 pub mod error_term_test;
@@ -15,6 +16,7 @@ pub mod recordings;
 pub mod residuals;
 pub mod rest_scatter;
 pub mod rounding;
+pub mod settling;
 pub mod unexplained;
 
 use super::budget::BudgetSource;

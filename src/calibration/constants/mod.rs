@@ -1,5 +1,6 @@
 //! The constants of a record, what is known of them beforehand, and with the data.
 
+mod disturbance;
 mod known;
 mod posterior;
 mod prior;
@@ -10,6 +11,7 @@ use super::parameters::error_term::ErrorTerm;
 use crate::calibration::several::thermal::Coefficient;
 use crate::imu::Term;
 use crate::turntable::{AxisError, TABLE_GEOMETRY};
+pub use disturbance::{Disturbance, DisturbanceKind};
 pub use known::{Known, triangle};
 pub use posterior::{Posterior, of_parameters};
 pub use prior::Prior;
@@ -27,13 +29,15 @@ pub enum Constant {
     Base(usize),
     /// An error of the table's axes, by its index.
     Axis(usize),
+    /// A component of what happened once.
+    Disturbance(Disturbance, usize),
 }
 
 impl Constant {
     /// What is known of it before.
     pub fn source(self) -> BudgetSource {
         match self {
-            Self::Parameter(_) => BudgetSource::Prior,
+            Self::Parameter(_) | Self::Disturbance(..) => BudgetSource::Prior,
             Self::Term(index) => Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term),
             Self::Thermal(_) => BudgetSource::Temperature,
             Self::Gravity => BudgetSource::Gravity,
@@ -53,7 +57,7 @@ impl Constant {
             Self::Base(axis) => Some(axis),
             Self::Axis(index) => Some(OF_AXES + index),
             Self::Term(index) => Some(TABLE_GEOMETRY + index),
-            Self::Parameter(_) | Self::Thermal(_) | Self::Gravity => None,
+            _ => None,
         }
     }
 
@@ -63,7 +67,7 @@ impl Constant {
             Self::Term(index) => Term::of(index).map(ErrorTerm::Instrument),
             Self::Base(_) => Some(ErrorTerm::TableBase),
             Self::Axis(index) => AxisError::of(index).map(ErrorTerm::TableAxes),
-            Self::Parameter(_) | Self::Thermal(_) | Self::Gravity => None,
+            _ => None,
         }
     }
 }

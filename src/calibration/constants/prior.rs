@@ -8,7 +8,8 @@ use super::{Constant, Posterior};
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::model::Model;
-use crate::calibration::parameters::to_vector;
+use crate::calibration::parameters::{parameter, to_vector};
+use crate::imu::PARAMETERS as PER_TRIAD;
 
 /// What is known of constants beforehand, as errors of the point of linearisation.
 #[derive(Debug, Clone)]
@@ -35,6 +36,10 @@ impl Prior {
             Constant::Gravity => (0.0, model.gravity_sigma),
             Constant::Base(axis) => (0.0, model.geometry.base[axis]),
             Constant::Axis(index) => (0.0, model.geometry.axes[index]),
+            Constant::Disturbance(of, component) => {
+                let bias = |sensor| model.prior_sigma[parameter(sensor, PER_TRIAD - 3 + component)];
+                (0.0, of.sigma(bias))
+            }
         };
         let (mean, sigma): (Vec<f64>, Vec<f64>) = constants.iter().map(of).unzip();
         Self {

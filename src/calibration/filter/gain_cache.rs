@@ -72,6 +72,8 @@ pub struct Known<const M: usize, const G: usize> {
     pub information: [[f64; G]; G],
 }
 
+/// Points of a usual course: of a hundred steps with two observations each.
+const POINTS: usize = 300;
 /// So many bytes are kept before a part begins: those of some ten courses.
 const MOST: usize = 1 << 23;
 
@@ -92,15 +94,17 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
             beside: None,
             gain: None,
         };
+        let mut known = Vec::with_capacity(POINTS);
+        known.push(Known {
+            of_given,
+            covariance: [[0.0; M]; M],
+            information: [[0.0; G]; G],
+        });
         Self {
             models: Vec::new(),
             points: vec![begin],
-            gains: Vec::new(),
-            known: vec![Known {
-                of_given,
-                covariance: [[0.0; M]; M],
-                information: [[0.0; G]; G],
-            }],
+            gains: Vec::with_capacity(POINTS),
+            known,
         }
     }
 
@@ -143,7 +147,8 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         let event = Event::Step(model);
         self.reached(from, event).unwrap_or_else(|| {
             let known = self.known[from].propagated(&self.models[model]);
-            self.lead(from, event, None, known)
+            self.known.push(known);
+            self.lead(from, event, None)
         })
     }
 
@@ -152,11 +157,13 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);
         self.reached(from, event).or_else(|| {
-            let mut known = self.known[from].clone();
-            let gain = known.gain(state, variance)?;
-            known.tell(&gain);
+            let gain = self.known[from].gain(state, variance)?;
+            self.known.extend_from_within(from..=from);
+            if let Some(known) = self.known.last_mut() {
+                known.tell(&gain);
+            }
             self.gains.push(gain);
-            Some(self.lead(from, event, Some(self.gains.len() - 1), known))
+            Some(self.lead(from, event, Some(self.gains.len() - 1)))
         })
     }
 
@@ -167,13 +174,7 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         followers.find(|&point| self.points[point].event == event)
     }
 
-    fn lead(
-        &mut self,
-        from: usize,
-        event: Event,
-        gain: Option<usize>,
-        known: Known<M, G>,
-    ) -> usize {
+    fn lead(&mut self, from: usize, event: Event, gain: Option<usize>) -> usize {
         let number = self.points.len();
         let beside = self.points[from].next.replace(number);
         self.points.push(Point {
@@ -182,7 +183,6 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
             beside,
             gain,
         });
-        self.known.push(known);
         number
     }
 }

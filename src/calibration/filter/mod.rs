@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::constants::{Constant, DisturbanceKind};
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
@@ -46,6 +47,8 @@ pub struct Filter {
     turned: Option<Turned>,
     /// What constants do.
     pub columns: Columns,
+    /// Number of dwells that have begun.
+    dwells: usize,
     /// The source whose variance is multiplied, and by what, see [`Model::weight`].
     varied: Option<(BudgetSource, f64)>,
 }
@@ -79,6 +82,7 @@ impl Filter {
             noise: model.process_noise(),
             day_to_day: model.day_to_day,
             turned: None,
+            dwells: 0,
             varied: model.varied,
         }
     }
@@ -106,6 +110,10 @@ impl Filter {
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
         self.redraw_table(table_sigma);
+        if let Some(first) = self.layout.earth_rate() {
+            let (mean, sigma) = start.earth_rate;
+            (0..2).for_each(|axis| self.redraw(first + axis, mean[axis], sigma));
+        }
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
             self.redraw(state, 0.0, sigma);
         }
@@ -151,6 +159,23 @@ impl Filter {
     /// The body has come to rest after a move by hand, from which nothing is learnt of its velocity.
     pub fn redraw_velocity(&mut self, sigma: f64) {
         (VELOCITY..VELOCITY + 3).for_each(|state| self.redraw(state, 0.0, sigma));
+    }
+
+    /// A dwell begins.
+    pub fn begin_dwell(&mut self) {
+        for (k, constant) in self.layout.constants().iter().enumerate() {
+            if let Constant::Disturbance(of, component) = constant
+                && (of.kind, of.dwell) == (DisturbanceKind::Slip, self.dwells)
+            {
+                self.columns.of_states[(k, ATTITUDE + component)] += 1.0;
+            }
+        }
+        self.dwells += 1;
+    }
+
+    /// Whether a dwell is the one that began last.
+    pub fn is_in(&self, dwell: usize) -> bool {
+        self.dwells == dwell + 1
     }
 
     /// The body does not turn from now on: what the computed attitude does is an error.

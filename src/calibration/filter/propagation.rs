@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 use super::Filter;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::constants::Constant;
-use crate::calibration::layout::{ATTITUDE, NAVIGATION};
+use crate::calibration::constants::{Constant, DisturbanceKind};
+use crate::calibration::layout::{ATTITUDE, NAVIGATION, VELOCITY};
 use crate::calibration::parameters::{ParameterVector, parameter, sensor_and_parameter};
 use crate::calibration::several::day_to_day::OwnState;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
@@ -106,6 +106,8 @@ impl Filter {
         let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
         let gravity = layout.gravity().map(|_| Constant::Gravity);
         let gravity = gravity.map(|gravity| self.effect(block, gravity));
+        let earth_rate = layout.earth_rate().into_iter().flat_map(|_| 0..2);
+        let earth_rate = earth_rate.map(|axis| of_earth_rate(block, axis));
         // A bias does the same whether it varies or stays.
         let varying = layout.varying_biases().map(|(_, sensor, constant)| {
             let columns = block.parameters.get(sensor);
@@ -121,6 +123,7 @@ impl Filter {
         });
         navigation
             .chain(gravity)
+            .chain(earth_rate)
             .chain(varying)
             .chain(own)
             .collect()
@@ -161,6 +164,15 @@ impl Filter {
                 std::array::from_fn(|row| columns[(row, coefficient.parameter)] * weight)
             }
             Constant::Gravity => std::array::from_fn(|row| block.gravity[row]),
+            Constant::Disturbance(of, component) => match of.kind {
+                DisturbanceKind::BiasStep(sensor) => {
+                    let bias = parameter(sensor, PER_TRIAD - 3 + component);
+                    let side = if self.dwells > of.dwell { 0.5 } else { -0.5 };
+                    self.effect(block, Constant::Parameter(bias))
+                        .map(|by| side * by)
+                }
+                _ => [0.0; NAVIGATION],
+            },
             Constant::Base(_) | Constant::Axis(_) => [0.0; NAVIGATION],
         }
     }
@@ -178,6 +190,17 @@ impl Filter {
             self.p[(state, state)] += driven * (1.0 - keep * keep);
         }
     }
+}
+
+/// What a change of Earth rate along East or North makes of the navigation errors.
+fn of_earth_rate(block: &Block, axis: usize) -> [f64; NAVIGATION] {
+    let mut column = [0.0; NAVIGATION];
+    column[ATTITUDE + axis] = -block.duration;
+    for row in VELOCITY..VELOCITY + 3 {
+        // The tilt grows evenly.
+        column[row] = -0.5 * block.duration * block.navigation[(row, ATTITUDE + axis)];
+    }
+    column
 }
 
 /// What a change of the parameters of both triads makes of the navigation errors.

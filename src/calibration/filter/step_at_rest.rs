@@ -6,7 +6,7 @@ use super::Filter;
 use super::gain_cache::StepModel;
 use super::input_prior::InputPrior;
 use super::linear::Linear;
-use crate::calibration::constants::{Constant, Known};
+use crate::calibration::constants::{Constant, DisturbanceKind, Known};
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::segment::Segment;
 use crate::navigation::Block;
@@ -88,6 +88,10 @@ impl Filter {
                 table.columns[(axis, k)] = match constant {
                     Constant::Base(of) => f64::from(*of == axis),
                     Constant::Axis(of) => response.map_or(0.0, |response| response[(axis, *of)]),
+                    Constant::Disturbance(of, component) => {
+                        let is_position = of.kind == DisturbanceKind::Position;
+                        f64::from(is_position && self.is_in(of.dwell) && *component == axis)
+                    }
                     _ => 0.0,
                 };
             }

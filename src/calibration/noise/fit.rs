@@ -70,7 +70,16 @@ impl Likelihood<'_> {
 
     /// Score and information by these sources, from one replay more than there are.
     pub fn slope(&self, factors: &Factors, sources: &[usize]) -> Result<Slope, CalibrationError> {
-        let here = self.replay(factors)?;
+        self.slope_from(self.replay(factors)?, factors, sources)
+    }
+
+    /// The same where the replay at the point is known.
+    fn slope_from(
+        &self,
+        here: Replay,
+        factors: &Factors,
+        sources: &[usize],
+    ) -> Result<Slope, CalibrationError> {
         let differences = sources.par_iter().map(|&k| {
             let mut moved = *factors;
             moved.0[k] = match factors.0[k] {
@@ -210,10 +219,11 @@ impl Likelihood<'_> {
         let mut at = *start;
         let mut resting: Vec<usize> = Vec::new();
         let mut looked_again = false;
+        let mut here = self.replay(start)?;
         for _ in 0..STEPS {
             let moving = sources.iter().filter(|k| !resting.contains(k));
             let moving: Vec<usize> = moving.copied().collect();
-            let slope = self.slope(&at, &moving)?;
+            let slope = self.slope_from(here, &at, &moving)?;
             let cost = slope.here.deviance() + self.penalty(&at);
             let (gradient, information) = self.posterior(&slope, &at, &moving);
             let (free, rests): (Vec<usize>, Vec<usize>) =
@@ -232,13 +242,14 @@ impl Likelihood<'_> {
                 }
                 looked_again = true;
                 resting.clear();
+                here = slope.here;
                 continue;
             }
             let free: Vec<usize> = free.iter().map(|&i| moving[i]).collect();
             let Some(there) = self.shortened(&at, &free, &step, cost) else {
                 break;
             };
-            at = there;
+            (at, here) = there;
         }
         Ok(at)
     }
@@ -267,7 +278,7 @@ impl Likelihood<'_> {
         free: &[usize],
         step: &DVector<f64>,
         cost: f64,
-    ) -> Option<Factors> {
+    ) -> Option<(Factors, Replay)> {
         let mut fraction = 1.0;
         while fraction > SHORTEST {
             let mut there = *at;
@@ -283,9 +294,10 @@ impl Likelihood<'_> {
                 }
             }
             // Noise that the filter cannot run with is too far.
-            let found = self.replay(&there).map(|replay| replay.deviance());
-            if found.is_ok_and(|found| found + self.penalty(&there) < cost) {
-                return Some(there);
+            if let Ok(replay) = self.replay(&there)
+                && replay.deviance() + self.penalty(&there) < cost
+            {
+                return Some((there, replay));
             }
             fraction *= 0.5;
         }

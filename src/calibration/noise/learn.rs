@@ -18,12 +18,11 @@ use crate::statistics::FALSE_ALARM;
 
 /// Points of linearisation at most.
 const ROUNDS: usize = 6;
-/// A change of −2 ln of the likelihood from one point of linearisation to the next that is nothing: a
-/// third of a σ of one factor.
+/// A change of −2 ln of the likelihood by other factors that is nothing: a third of a σ of one of them.
 const SETTLED: f64 = 0.1;
-/// Observations of three components that noise is first learnt from: 3,000 numbers, half of which tell σ of
-/// a white noise to 2 %.
-const ENOUGH: usize = 1000;
+/// Observations of three components that noise is first learnt from: 900 numbers, half of which tell σ of
+/// a white noise to 3 %.
+const ENOUGH: usize = 300;
 /// Steps of a dwell between these observations at most: longer ones would not tell white noise of velocity
 /// and attitude from random walk at all.
 const LONGEST: usize = 10;
@@ -102,8 +101,9 @@ fn with_noise<'a>(
         solved.iterated = iterate(problem, priors, at.clone(), gate, passes, progress)?;
         let script = Script::new(&whole.problem, priors, &solved.iterated.estimate)?;
         let likelihood = whole.likelihood(&script, scale, &accepted);
+        let before = likelihood.replay(&fit.factors)?.deviance();
         let now = likelihood.fit(Some(&fit))?;
-        let settled = now.sources == fit.sources && (now.deviance - fit.deviance).abs() < SETTLED;
+        let settled = (now.deviance - before).abs() < SETTLED;
         if settled || round == ROUNDS {
             solved.noise = likelihood.report(as_stated.options.noise, test, &fit.factors)?;
             break;

@@ -30,11 +30,6 @@ pub struct PassResult {
 }
 
 impl PassResult {
-    /// −2 ln of the likelihood, but for a constant.
-    pub fn deviance(&self) -> f64 {
-        self.cost + self.log_determinant
-    }
-
     /// Which observations were let in.
     pub fn accepted(&self) -> Vec<bool> {
         self.innovations.iter().map(|of| of.accepted).collect()

@@ -50,6 +50,7 @@ impl Rest {
         }
         filter.refer(&self.from, &self.segment.begin);
         if self.first {
+            filter.begin_dwell();
             filter.begin_to_hold();
         }
         if self.first && self.new_position && model.aiding == Aiding::Velocity {

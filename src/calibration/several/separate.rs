@@ -11,7 +11,7 @@ use crate::calibration::gauss_newton::{Iterated, UNWATCHED, iterate};
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::noise::learn;
-use crate::calibration::parameters::{ParameterMatrix, from_vector, parameter, to_vector};
+use crate::calibration::parameters::{from_vector, parameter, to_vector};
 use crate::calibration::pass::Gate;
 use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
@@ -111,12 +111,11 @@ fn of(
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.range.state(at, &PerSensor::default()));
-    let alone = |(start, by_headings), priors, initial_attitudes, estimate| SeparateEstimate {
+    let alone = |start, priors, initial_attitudes, estimate| SeparateEstimate {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
         estimate,
-        by_headings,
         state,
         start,
         priors,
@@ -136,17 +135,17 @@ fn of(
             let (contradicted, iterated) = (solved.noise.learnt, solved.iterated);
             let at = &iterated.estimate;
             let alone = alone(
-                (to_vector(&at.triads), solved.by_headings),
+                to_vector(&at.triads),
                 solved.priors,
                 at.initial_attitudes.clone(),
-                estimate(iterated, solved.by_headings),
+                estimate(iterated),
             );
             (alone, contradicted)
         }
         _ => {
             let start = coarse_start(plain)?;
             let alone = alone(
-                (to_vector(&start.at.triads), ParameterMatrix::zeros()),
+                to_vector(&start.at.triads),
                 start.attitudes,
                 start.at.initial_attitudes,
                 None,
@@ -180,13 +179,13 @@ fn with_noise(alone: &SeparateEstimate, recording: &Problem) -> Option<Estimate>
     );
     let (gate, passes) = (Gate::Innovations, &mut Vec::new());
     let iterated = iterate(recording, &alone.priors, at, gate, passes, UNWATCHED).ok()?;
-    estimate(iterated, alone.by_headings)
+    estimate(iterated)
 }
 
-fn estimate(iterated: Iterated, by_headings: ParameterMatrix) -> Option<Estimate> {
+fn estimate(iterated: Iterated) -> Option<Estimate> {
     iterated.converged.then_some(Estimate {
         triads: iterated.estimate.triads,
-        covariance: iterated.held.posterior.parameter_covariance + by_headings,
+        covariance: iterated.held.posterior.parameter_covariance,
     })
 }
 

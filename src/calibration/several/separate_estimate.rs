@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 
 use crate::calibration::estimate::Estimate;
 use crate::calibration::linearisation::AttitudePrior;
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
+use crate::calibration::parameters::ParameterVector;
 use crate::imu::{PerSensor, ThermalState};
 
 /// What a recording alone says.
@@ -19,8 +19,6 @@ pub struct SeparateEstimate {
     /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
     /// that of its own; none where it gave none.
     pub estimate: Option<Estimate>,
-    /// What headings that it does not tell apart add to that.
-    pub(in crate::calibration) by_headings: ParameterMatrix,
     /// Where its temperature stands for all of it: the functions of temperature then.
     pub(in crate::calibration) state: Option<ThermalState>,
     pub(in crate::calibration) start: ParameterVector,

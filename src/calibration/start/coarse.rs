@@ -1,15 +1,13 @@
 //! The coarse start: where the filter begins, not what it knows. The filter's prior stays its own.
 
-use std::f64::consts::FRAC_PI_2;
-
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::earth_rate::{add_rates, gyro_bias_at_rest, gyrocompass};
 use super::equations::{Equations, gauss_newton};
 use super::gravity::{AtRest, Chain, add_magnitude, events, up};
 use super::judged::Judged;
 use super::table;
-use crate::attitude::{exp, level};
+use crate::attitude::level;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
@@ -17,6 +15,7 @@ use crate::calibration::linearisation::{AttitudePrior, Linearisation, singular};
 use crate::calibration::noise::{ByHand, NoisePolicy};
 use crate::calibration::parameters::{ParameterMatrix, ParameterVector, from_vector, to_vector};
 use crate::calibration::problem::Problem;
+use crate::earth::Site;
 use crate::imu::{ParameterKind, Sensor, TermVector};
 
 /// More equations, of a hundred dwells, leave no noise to parameters; their covariance is factorised whole, which takes
@@ -39,27 +38,8 @@ pub struct CoarseStart {
     pub at: Linearisation,
     /// What is known of the initial attitude of each stretch.
     pub attitudes: Vec<AttitudePrior>,
-    /// Whether the noise of the gyros hides Earth rate, so that the heading may be any.
-    pub heading_unobserved: bool,
     /// What a hand adds to the noise that is stated, where that was called for.
     pub(in crate::calibration) by_hand: Option<ByHand>,
-}
-
-impl CoarseStart {
-    /// The same with the headings in the other three quadrants.
-    pub(in crate::calibration) fn other_headings(&self) -> [Self; 3] {
-        [1, 2, 3].map(|quadrant| {
-            let turn = exp(Vector3::z() * (FRAC_PI_2 * f64::from(quadrant)));
-            let mut turned = self.clone();
-            for attitude in &mut turned.at.initial_attitudes {
-                *attitude = turn * *attitude;
-            }
-            for attitude in &mut turned.attitudes {
-                attitude.mean = turn * attitude.mean;
-            }
-            turned
-        })
-    }
 }
 
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
@@ -81,7 +61,6 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
         return Ok(CoarseStart {
             at: Linearisation::new(triads, TermVector::zeros(), means),
             attitudes,
-            heading_unobserved: false,
             by_hand: None,
         });
     }
@@ -91,15 +70,14 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
         },
         by_hand,
     ) = calibrated_as_held(problem, &dwells)?;
-    let gravity = problem.stretches().iter().map(|s| s.run.site.gravity);
-    let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(gravity);
-    let of_alignment = |((attitude, &sigma), gravity): ((&Matrix3<f64>, &f64), f64)| {
-        AttitudePrior::of_alignment(*attitude, sigma, &problem.model, gravity)
+    let sites = problem.stretches().iter().map(|s| &s.run.site);
+    let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(sites);
+    let of_alignment = |((attitude, &sigma), site): ((&Matrix3<f64>, &f64), &Site)| {
+        AttitudePrior::of_alignment(*attitude, sigma, &problem.model, site)
     };
     Ok(CoarseStart {
         attitudes: attitudes.map(of_alignment).collect(),
         at,
-        heading_unobserved: heading_sigma.into_iter().any(AttitudePrior::hides),
         by_hand,
     })
 }

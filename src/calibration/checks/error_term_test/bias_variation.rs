@@ -18,10 +18,8 @@ use crate::run::Aiding;
 
 /// A growth that rounds to once as large is not a finding.
 const SAID: f64 = 1.05;
-/// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one …
+/// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one.
 const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
-/// … and its correlation time.
-const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 /// What the covariance of an estimate lacks for biases of a triad that may vary though its record does not
 /// call for it; absent if the noise is the stated one, where biases of both triads vary in it, or where a table is
@@ -29,8 +27,8 @@ const TIMES: [f64; 3] = [-1.0, 0.0, 1.0];
 ///
 /// A short record hardly shows a bias that varies slowly, and the likelihood that chose the noise takes the simpler
 /// model. Where the data contradict the stated noise, nobody stated that biases are constant: that those of a triad
-/// vary then has the same probability before the data as that they do not, with σ and correlation time lognormal
-/// about the usual ones, as any stated figure is about its own. The mean square error of the estimate averages these
+/// vary then has the same probability before the data as that they do not, with σ lognormal about the usual one, as any
+/// stated figure is about its own. The mean square error of the estimate averages these
 /// models by their probabilities after the data (Hoeting, Madigan, Raftery, Volinsky 1999; see
 /// [`super::test_error_terms`]). The sizes count: with the usual one alone σ of an accelerometer bias of a record
 /// held by hand is half as large.
@@ -85,21 +83,17 @@ fn of_one(
 ) -> Result<ParameterMatrix, CalibrationError> {
     let usual = usual_variation(stated);
     let density = |z: &f64| (-0.5 * z * z).exp();
-    let sum_of = |nodes: &[f64]| -> f64 { nodes.iter().map(density).sum() };
-    let all = sum_of(&SIGMAS) * sum_of(&TIMES);
+    let all: f64 = SIGMAS.iter().map(density).sum();
     let (mut weights, mut sum) = (1.0, ParameterMatrix::zeros());
     let mut varying = problem.model.clone();
     varying.noise.get_mut(sensor).gauss_markov = Some(usual);
     let varying = problem.with_model(varying);
     let (script, accepted) = (outcome.script(&varying)?, outcome.accepted());
-    for (sigma, time) in SIGMAS
-        .iter()
-        .flat_map(|s| TIMES.iter().map(move |t| (s, t)))
-    {
+    for sigma in &SIGMAS {
         let mut model = varying.model.clone();
         model.noise.get_mut(sensor).gauss_markov = Some(GaussMarkov {
             sigma: usual.sigma * (sigma * LOG_SIGMA).exp(),
-            correlation_time: usual.correlation_time * (time * LOG_SIGMA).exp(),
+            correlation_time: usual.correlation_time,
         });
         // What the filter cannot run with is not likely.
         let problem = problem.with_model(model);
@@ -108,7 +102,7 @@ fn of_one(
         };
         let with = outcome.posterior(&problem, &reduction);
         let ratio = (0.5 * (own.deviance - with.deviance)).exp();
-        let weight = ratio * density(sigma) * density(time) / all;
+        let weight = ratio * density(sigma) / all;
         if weight.is_finite() {
             weights += weight;
             sum += with.added_to(own) * weight;

@@ -1,0 +1,297 @@
+//! What happened once in a record: a wrong position of the table, a turn that the gyros did not sense, a step of biases.
+//!
+//! It is looked for before noise is estimated, which would become large to explain it. What each one that may have
+//! happened would do to the estimate follows from its score and information beside the constants, without another pass
+//! (Rao 1948, "Large sample tests of statistical hypotheses", Mathematical Proceedings of the Cambridge Philosophical
+//! Society 44(1)).
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use serde_json::json;
+
+use super::finding::Finding;
+use super::innovation::{Innovation, Observation};
+use crate::calibration::constants::{Constant, Disturbance, DisturbanceKind, Prior};
+use crate::calibration::error::CalibrationError;
+use crate::calibration::gauss_newton::Iterated;
+use crate::calibration::linearisation::AttitudePrior;
+use crate::calibration::problem::Problem;
+use crate::calibration::reduction::{Reduction, Script};
+use crate::imu::Sensor;
+use crate::run::{Aiding, Dwell};
+use crate::statistics::{FALSE_ALARM, ln_survival, median};
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
+
+/// Components of a disturbance.
+const COMPONENTS: usize = 3;
+
+/// A disturbance that is beyond chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disturbed {
+    /// Which.
+    pub disturbance: Disturbance,
+    /// When it began, s.
+    time: f64,
+    /// Its components.
+    value: Vector3<f64>,
+    /// −2 ln of the probability that as much is chance …
+    significance: f64,
+    /// … and what that stays below.
+    limit: f64,
+}
+
+/// Something that may have happened, with what shows it.
+#[derive(Clone, Copy)]
+struct Candidate {
+    disturbance: Disturbance,
+    time: f64,
+    value: Vector3<f64>,
+    /// χ² if it did not happen, of so many degrees of freedom.
+    square: f64,
+    degrees: f64,
+}
+
+/// The disturbance that is furthest beyond chance in what was solved; none where none is.
+///
+/// Chance is as wide as half of all candidates show, or as the noise says if that is wider.
+///
+/// # Errors
+/// As of a pass.
+pub fn disturbed(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    iterated: &Iterated,
+) -> Result<Option<Disturbed>, CalibrationError> {
+    let of_readings = of_readings(&iterated.held.innovations);
+    let by_score = by_score(problem, priors, iterated)?;
+    let count = of_readings.len() + by_score.len();
+    let limit = -2.0 * (FALSE_ALARM / count.max(1) as f64).ln();
+    let each = [of_readings, by_score].into_iter().flat_map(|of_kind| {
+        let ratio = |of: &Candidate| of.square / of.degrees;
+        let mut ratios: Vec<f64> = of_kind.iter().map(ratio).collect();
+        let chance = median(&mut ratios).unwrap_or(1.0).max(1.0);
+        of_kind.into_iter().map(move |of| Disturbed {
+            disturbance: of.disturbance,
+            time: of.time,
+            value: of.value,
+            significance: -2.0 * ln_survival(of.degrees, of.square / chance),
+            limit,
+        })
+    });
+    let largest = each.max_by(|a, b| a.significance.total_cmp(&b.significance));
+    Ok(largest.filter(|found| found.significance > limit))
+}
+
+/// Positions of the table, by the innovations of its readings.
+fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
+    let dwells = innovations.chunk_by(|one, other| one.dwell == other.dwell);
+    let of_dwell = |dwell: &[Innovation]| {
+        let read = dwell
+            .iter()
+            .filter(|of| of.observation == Observation::Table);
+        let read: Vec<&Innovation> = read.collect();
+        let largest = read
+            .iter()
+            .max_by(|a, b| a.distance().total_cmp(&b.distance()))?;
+        Some(Candidate {
+            disturbance: Disturbance {
+                kind: DisturbanceKind::Position,
+                dwell: largest.dwell,
+            },
+            time: largest.time,
+            value: Vector3::zeros(),
+            square: read.iter().map(|of| of.distance()).sum(),
+            degrees: (COMPONENTS * read.len()) as f64,
+        })
+    };
+    dwells.filter_map(of_dwell).collect()
+}
+
+/// All that may have happened, by its score.
+fn by_score(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    iterated: &Iterated,
+) -> Result<Vec<Candidate>, CalibrationError> {
+    let candidates = candidates(problem);
+    let mut model = problem.model.clone();
+    model.disturbances.extend(&candidates);
+    let with = problem.with_model(model);
+    let script = Script::new(&with, priors, &iterated.estimate)?;
+    let reduction = script.reduce(&with, &iterated.held.accepted())?;
+    let prior = Prior::new(&reduction.constants, &with.model, &iterated.estimate);
+    let Some(scores) = Scores::new(&reduction, &prior, &problem.model.disturbances) else {
+        return Ok(Vec::new());
+    };
+    let of = |disturbance: Disturbance| {
+        let (square, value) = scores.of(disturbance)?;
+        Some(Candidate {
+            disturbance,
+            time: time_of(problem, disturbance),
+            value,
+            square,
+            degrees: COMPONENTS as f64,
+        })
+    };
+    Ok(candidates.into_iter().filter_map(of).collect())
+}
+
+/// All that may have happened and that is not estimated already.
+fn candidates(problem: &Problem) -> Vec<Disturbance> {
+    let table = problem.model.aiding == Aiding::Table;
+    let all = problem.dwells().enumerate().flat_map(|(dwell, of)| {
+        let position = (table && of.position.is_some()).then_some(DisturbanceKind::Position);
+        let slip = (dwell > 0).then_some(DisturbanceKind::Slip);
+        let steps = Sensor::ALL.map(DisturbanceKind::BiasStep);
+        let steps = steps.into_iter().filter(move |_| table && dwell > 0);
+        let kinds = position.into_iter().chain(slip).chain(steps);
+        kinds.map(move |kind| Disturbance { kind, dwell })
+    });
+    all.filter(|of| !problem.model.disturbances.contains(of))
+        .collect()
+}
+
+/// When a disturbance happened, s: in the middle of the move before its dwell or, of a position, as the dwell begins.
+fn time_of(problem: &Problem, disturbance: Disturbance) -> f64 {
+    let stretches = problem.stretches().iter();
+    let times = stretches.flat_map(|stretch| {
+        let imu = &stretch.run.recording.imu;
+        let dwells = stretch.dwells.iter();
+        dwells.map(|dwell| (imu.time(dwell.samples.start), imu.time(dwell.samples.end)))
+    });
+    let times: Vec<(f64, f64)> = times.collect();
+    let begin = times[disturbance.dwell].0;
+    match (disturbance.kind, disturbance.dwell.checked_sub(1)) {
+        (DisturbanceKind::Slip | DisturbanceKind::BiasStep(_), Some(before)) => {
+            0.5 * (times[before].1 + begin)
+        }
+        _ => begin,
+    }
+}
+
+/// Scores of the constants that are not estimated, beside those that are.
+struct Scores {
+    constants: Vec<Constant>,
+    score: DVector<f64>,
+    information: DMatrix<f64>,
+}
+
+impl Scores {
+    /// Of all disturbances but those that are estimated; none where rounding has the last word.
+    fn new(reduction: &Reduction, prior: &Prior, estimated: &[Disturbance]) -> Option<Self> {
+        let constants = &reduction.constants;
+        let n = constants.len();
+        let is_off = |k: &usize| match constants[*k] {
+            Constant::Disturbance(of, _) => !estimated.contains(&of),
+            _ => false,
+        };
+        let (off, on): (Vec<usize>, Vec<usize>) = (0..n).partition(is_off);
+        let mut squares = DMatrix::zeros(n + 1, n + 1);
+        for part in &reduction.parts {
+            squares.gemm_tr(1.0, &part.rows, &part.rows, 1.0);
+        }
+        let within =
+            |rows: &[usize], columns: &[usize]| squares.select_rows(rows).select_columns(columns);
+        let mut among = within(&on, &on);
+        let mut right = within(&on, &[n]);
+        for (i, &k) in on.iter().enumerate() {
+            among[(i, i)] += prior.sigma[k].powi(-2);
+            right[i] += prior.mean[k] / prior.sigma[k].powi(2);
+        }
+        // Each over its own σ, lest different units spoil the digits.
+        let scale = DMatrix::from_diagonal(&among.map_diagonal(|own| own.powf(-0.5)));
+        let root = (&scale * among * &scale).cholesky()?;
+        let across = &scale * within(&on, &off);
+        let explained = root.solve(&across);
+        Some(Self {
+            constants: off.iter().map(|&k| constants[k]).collect(),
+            score: (within(&off, &[n]) - explained.tr_mul(&(&scale * right)))
+                .column(0)
+                .into_owned(),
+            information: within(&off, &off) - explained.tr_mul(&across),
+        })
+    }
+
+    /// By how much the cost falls with a disturbance, and its components; none where the data do not show all of them.
+    fn of(&self, disturbance: Disturbance) -> Option<(f64, Vector3<f64>)> {
+        let mut constants = self.constants.iter();
+        let first = constants.position(|of| *of == Constant::Disturbance(disturbance, 0))?;
+        let score = self.score.fixed_rows::<3>(first);
+        let value = self.information.fixed_view::<3, 3>(first, first);
+        let value = value.into_owned().cholesky()?.solve(&score);
+        Some((score.dot(&value), value))
+    }
+}
+
+impl Disturbed {
+    /// The problem without it: readings of a wrong position are left out, all else is estimated.
+    pub fn taken_out<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        let Disturbance { kind, dwell } = self.disturbance;
+        if kind == DisturbanceKind::Position {
+            return problem.with_dwells(|number, _, of| {
+                let position = of.position.clone().filter(|_| number != dwell);
+                let samples = of.samples.clone();
+                Some(Dwell { samples, position })
+            });
+        }
+        let mut model = problem.model.clone();
+        model.disturbances.push(self.disturbance);
+        problem.with_model(model)
+    }
+
+    /// What it is, when, and what became of it.
+    pub fn finding(&self) -> Finding {
+        let Self {
+            time,
+            significance,
+            limit,
+            ..
+        } = self;
+        let number = self.disturbance.dwell + 1;
+        let seconds = self.value.norm() / ARCSEC;
+        let angle = match seconds {
+            ..1000.0 => format!("{seconds:.0}″"),
+            _ => format!("{:.3}°", seconds / 3600.0),
+        };
+        let (kind, text) = match self.disturbance.kind {
+            DisturbanceKind::Position => {
+                let by = if seconds > 0.0 {
+                    format!(" by {angle}")
+                } else {
+                    String::new()
+                };
+                let text = format!(
+                    "The table's readings in dwell {number} are wrong{by} (at {time:.1} s). turncal left them out. Look \
+                     there for a bump or a wrong reading"
+                );
+                ("position-wrong", text)
+            }
+            DisturbanceKind::Slip => {
+                let text = format!(
+                    "In the move before dwell {number} (at {time:.1} s) the sensor turned by {angle} that the gyros did \
+                     not measure. turncal estimated that angle. Look there for lost samples, an exceeded \
+                     range or a loose mount"
+                );
+                ("move-wrong", text)
+            }
+            DisturbanceKind::BiasStep(sensor) => {
+                let (unit, name) = match sensor {
+                    Sensor::Gyro => (DEG_PER_H, "°/h"),
+                    Sensor::Accel => (MICRO_G, "µg"),
+                };
+                let text = format!(
+                    "The {} bias stepped by {:.3} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
+                     step; the calibration has the mean of both biases. Look there for a shock, or a change of supply \
+                     or temperature",
+                    sensor.name(),
+                    self.value.norm() / unit,
+                );
+                ("bias-step", text)
+            }
+        };
+        let text = format!("{text} (−2 ln p {significance:.0}; limit {limit:.0}).");
+        let figures = json!({
+            "dwell": number, "time_s": time, "significance": significance, "limit": limit
+        });
+        Finding::new(kind, text, figures)
+    }
+}
