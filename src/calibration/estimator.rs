@@ -17,7 +17,7 @@ use super::problem::Problem;
 use super::several;
 use super::solved::Solved;
 use crate::calibration::checks;
-use crate::calibration::checks::disturbance::{Disturbed, disturbed};
+use crate::calibration::checks::cause::{FoundCause, likeliest};
 use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
 use crate::calibration::checks::form::{FormTest, form_test};
 use crate::calibration::checks::innovation::consistency;
@@ -28,8 +28,9 @@ use crate::calibration::checks::settling;
 use crate::calibration::noise::learn;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::imu::Sensor;
+use crate::run::Aiding;
 
-/// More than one disturbance in so many dwells is no disturbance.
+/// More than one cause in so many dwells explains noise.
 const DWELLS_OF_ONE: usize = 6;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
@@ -41,26 +42,39 @@ const DWELLS_OF_ONE: usize = 6;
 /// # Errors
 /// [`CalibrationError`] where the runs cannot give a calibration. Runs that give one without
 /// convergence are an [`Outcome`] with `converged = false` and a finding.
-pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
+pub fn estimate<'a>(
+    problem: &Problem<'a>,
+    progress: Progress,
+) -> Result<Outcome, CalibrationError> {
     let solved = match problem.varies() || problem.runs().nth(1).is_some() {
         true => several::solve(problem, progress)?,
         false => from_coarse_start(problem, progress)?,
     };
-    let solved = without_disturbances(solved, progress)?;
-    let solved = settled(solved, progress)?;
+    // By hand only the record itself tells how much a move leaves.
+    let by_hand = problem.model.aiding == Aiding::Velocity;
+    let solved = match by_hand {
+        true => solved,
+        false => settled(with_causes(solved, progress)?, progress)?,
+    };
     // Recordings differ as they show.
-    let mut model = solved.problem.model.with_noise_of(&problem.model);
-    model.prior_sigma = problem.model.prior_sigma;
-    let as_stated = solved.problem.with_model(model);
+    let as_stated = |solved: &Solved<'a>| {
+        let mut model = solved.problem.model.with_noise_of(&problem.model);
+        model.prior_sigma = problem.model.prior_sigma;
+        solved.problem.with_model(model)
+    };
     let solved = with_wide_prior(solved, progress)?;
     let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated)?;
     // Noise that makes up for angles that are missing is no noise.
     let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
     let solved = match is_no_noise {
         true => solved,
-        false => learn_noise(&as_stated, solved, progress)?,
+        false => learn_noise(&as_stated(&solved), solved, progress)?,
     };
-    outcome(&as_stated, solved, form_test)
+    let solved = match by_hand {
+        true => with_causes(solved, progress)?,
+        false => solved,
+    };
+    outcome(&as_stated(&solved), solved, form_test)
 }
 
 /// Without the time after each stop in which the attitude settles, as long as more of it shows.
@@ -79,22 +93,22 @@ fn settled<'a>(mut solved: Solved<'a>, progress: Progress) -> Result<Solved<'a>,
     }
 }
 
-/// Without what happened once: the largest is taken out first, as long as one is beyond chance.
-fn without_disturbances<'a>(
+/// With the causes that the record shows: the likeliest first, as long as one is beyond chance.
+fn with_causes<'a>(
     mut solved: Solved<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let most = solved.problem.dwells().count() / DWELLS_OF_ONE;
-    while solved.disturbances.len() < most {
-        let Some(found) = disturbed(&solved.problem, &solved.priors, &solved.iterated)? else {
+    while solved.causes.len() < most {
+        let Some(found) = likeliest(&solved.problem, &solved.priors, &solved.iterated)? else {
             break;
         };
-        let problem = found.taken_out(&solved.problem);
+        let problem = found.taken_into(&solved.problem);
         let (from, gate) = (solved.iterated.estimate.clone(), Gate::Innovations);
         let (priors, passes) = (&solved.priors, &mut solved.passes);
         solved.iterated = iterate(&problem, priors, from, gate, passes, progress)?;
         solved.problem = problem;
-        solved.disturbances.push(found);
+        solved.causes.push(found);
     }
     Ok(solved)
 }
@@ -197,7 +211,7 @@ fn outcome(
         velocity_sigma: problem.standstill_sigma(Sensor::Accel),
         model: model.clone(),
         settling: solved.settling,
-        disturbances: solved.disturbances,
+        causes: solved.causes,
         noise: solved.noise,
         passes: solved.passes,
         findings: Vec::new(),
@@ -211,8 +225,8 @@ fn outcome(
     outcome
         .findings
         .extend(settling::finding(as_stated, outcome.settling));
-    let disturbed = outcome.disturbances.iter().map(Disturbed::finding);
-    outcome.findings.extend(disturbed.collect::<Vec<_>>());
+    let causes = outcome.causes.iter().map(FoundCause::finding);
+    outcome.findings.extend(causes.collect::<Vec<_>>());
     outcome.findings.extend(solved.findings);
     if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
         outcome.findings.push(scatter.finding(growth));

@@ -33,7 +33,7 @@ mod solved;
 
 pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
-pub use checks::disturbance::Disturbed;
+pub use checks::cause::{Cause, FoundCause};
 pub use checks::dwell_scatter::DwellScatter;
 pub use checks::error_term_test::{ErrorTermTest, Role, UnmodelledEffect, test_error_terms};
 pub use checks::finding::Finding;

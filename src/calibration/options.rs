@@ -26,6 +26,8 @@ pub struct Options {
     pub aiding: Option<Aiding>,
     /// Error terms to be estimated beside those that the instrument and the table state a σ for.
     pub terms: Vec<ErrorTerm>,
+    /// Whether error terms that the data call for are estimated, too.
+    pub auto_terms: bool,
     /// Which noise is used.
     pub noise: NoisePolicy,
     /// Chance that the gate rejects any observation of a record without outliers.
@@ -42,6 +44,7 @@ impl Default for Options {
             form: InstallationForm::General,
             aiding: None,
             terms: Vec::new(),
+            auto_terms: true,
             noise: NoisePolicy::default(),
             false_rejection: FALSE_ALARM,
             converged_sigma: 0.02,
@@ -67,6 +70,14 @@ impl Options {
     /// With this noise.
     pub fn noise(self, noise: NoisePolicy) -> Self {
         Self { noise, ..self }
+    }
+
+    /// With the error terms that are asked for and no others.
+    pub fn no_auto_terms(self) -> Self {
+        Self {
+            auto_terms: false,
+            ..self
+        }
     }
 
     /// With this error term, its σ being the usual one unless instrument or table state another.

@@ -16,7 +16,7 @@ use super::parameters::auxiliary::Auxiliary;
 use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
 use super::problem::Problem;
 use super::reduction::{Epoch, Own, Reduction, Script};
-use crate::calibration::checks::disturbance::Disturbed;
+use crate::calibration::checks::cause::FoundCause;
 use crate::calibration::checks::dwell_scatter::DwellScatter;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
@@ -90,8 +90,8 @@ pub struct Outcome {
     pub noise: NoiseReport,
     /// Steps of each dwell after a stop that are skipped.
     pub settling: usize,
-    /// What happened once and is not in it.
-    pub disturbances: Vec<Disturbed>,
+    /// Causes that the record shows and that its problem did not have.
+    pub causes: Vec<FoundCause>,
     /// What a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
@@ -126,11 +126,11 @@ impl Outcome {
         }
     }
 
-    /// The problem with that prior, without what happened once, and with noise as it is stated.
+    /// The problem with that prior and all causes that were found, and noise as it is stated.
     pub(in crate::calibration) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
-        let disturbances = self.disturbances.iter();
-        let problem = disturbances.fold(problem.settled(self.settling), |problem, of| {
-            of.taken_out(&problem)
+        let causes = self.causes.iter();
+        let problem = causes.fold(problem.settled(self.settling), |problem, of| {
+            of.taken_into(&problem)
         });
         let mut model = problem.model.clone();
         model.prior_sigma = self.model.prior_sigma;

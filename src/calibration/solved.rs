@@ -3,7 +3,7 @@
 use super::gauss_newton::{Iterated, Pass};
 use super::linearisation::AttitudePrior;
 use super::problem::Problem;
-use crate::calibration::checks::disturbance::Disturbed;
+use crate::calibration::checks::cause::FoundCause;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
 use crate::calibration::several::separate_estimate::SeparateEstimate;
@@ -21,8 +21,8 @@ pub struct Solved<'a> {
     pub alone: Vec<SeparateEstimate>,
     /// Steps of each dwell after a stop that are skipped.
     pub settling: usize,
-    /// What happened once and is taken out of the problem.
-    pub disturbances: Vec<Disturbed>,
+    /// Causes that were found and taken into the problem.
+    pub causes: Vec<FoundCause>,
     pub findings: Vec<Finding>,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Solved<'a> {
             iterated,
             alone: Vec::new(),
             settling: 0,
-            disturbances: Vec::new(),
+            causes: Vec::new(),
             findings: Vec::new(),
         }
     }

@@ -22,7 +22,7 @@ pub struct Estimation {
     /// What is observed [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Error terms to estimate, beside those that the run switches on
+    /// Error terms to estimate, beside those that the run switches on [default: those that the data call for]
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     with: Vec<TermArgument>,
     /// Which noise the filter uses
@@ -169,6 +169,7 @@ impl Estimation {
         let mut options = Options::default()
             .installation(self.installation.into())
             .noise(self.noise.into());
+        options.auto_terms = self.with.is_empty();
         options.aiding = self.aiding.map(turncal::run::Aiding::from);
         options
     }

@@ -208,7 +208,7 @@ fn outcome(
         covariance_parts: BTreeMap::new(),
         model: Model::new(run, &Options::default().installation(form)),
         settling: 0,
-        disturbances: Vec::new(),
+        causes: Vec::new(),
         noise: NoiseReport {
             policy: Default::default(),
             learnt: false,

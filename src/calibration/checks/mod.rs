@@ -1,9 +1,10 @@
 //! Checks of model, noise and record by the data: each file a check with its words.
 
-pub mod disturbance;
+pub mod cause;
 pub mod drift;
 pub mod dwell_scatter;
 pub mod error_term_test;
+pub mod evidence;
 pub mod finding;
 pub mod form;
 pub mod innovation;

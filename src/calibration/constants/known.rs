@@ -22,7 +22,7 @@ impl Known {
         let all = 0..prior.sigma.len();
         let (open, fixed): (Vec<usize>, Vec<usize>) = all.partition(|&k| prior.sigma[k] > 0.0);
         let n = open.len();
-        let mut root = DMatrix::zeros(n, n + 1);
+        let mut root = DMatrix::zeros(n + 1, n + 1);
         for (row, &k) in open.iter().enumerate() {
             root[(row, row)] = prior.sigma[k].recip();
             root[(row, n)] = prior.mean[k] / prior.sigma[k];
@@ -36,23 +36,35 @@ impl Known {
     }
 
     /// Takes in rows of all constants.
-    pub fn learn<'a>(&mut self, rows: impl Iterator<Item = &'a DMatrix<f64>> + Clone) {
+    ///
+    /// Householder's reflections of the triangle with the rows below it, of which those of the triangle stay as they
+    /// are (Bierman 1977, *Factorization Methods for Discrete Sequential Estimation*, §IV.2).
+    pub fn learn(&mut self, rows: &DMatrix<f64>) {
         let (n, all) = (self.open.len(), self.prior.sigma.len());
-        let known = self.prior.mean.select_rows(&self.fixed);
-        let mut first = self.root.nrows();
-        let count: usize = rows.clone().map(DMatrix::nrows).sum();
-        let mut stacked = self.root.clone().resize_vertically(first + count, 0.0);
-        for rows in rows {
-            let mut of_these = stacked.rows_mut(first, rows.nrows());
-            of_these
-                .columns_mut(0, n)
-                .copy_from(&rows.select_columns(&self.open));
-            let observed = rows.column(all) - rows.select_columns(&self.fixed) * &known;
-            of_these.set_column(n, &observed);
-            first += rows.nrows();
+        let mut below = DMatrix::zeros(rows.nrows(), n + 1);
+        for (column, &k) in self.open.iter().enumerate() {
+            below.set_column(column, &rows.column(k));
         }
-        if count > 0 {
-            self.root = triangle(&stacked);
+        let mut observed = rows.column(all).into_owned();
+        for &k in self.fixed.iter().filter(|&&k| self.prior.mean[k] != 0.0) {
+            observed.axpy(-self.prior.mean[k], &rows.column(k), 1.0);
+        }
+        below.set_column(n, &observed);
+        for k in 0..=n {
+            let (mut reflector, mut right) = below.columns_range_pair_mut(k, k + 1..);
+            let (own, length) = (self.root[(k, k)], reflector.norm());
+            if length == 0.0 {
+                continue;
+            }
+            let reflected = -own.hypot(length).copysign(own);
+            reflector /= own - reflected;
+            let weight = (reflected - own) / reflected;
+            for (j, mut column) in (k + 1..).zip(right.column_iter_mut()) {
+                let along = weight * (self.root[(k, j)] + reflector.dot(&column));
+                self.root[(k, j)] -= along;
+                column.axpy(-along, &reflector, 1.0);
+            }
+            self.root[(k, k)] = reflected;
         }
     }
 
@@ -76,7 +88,7 @@ impl Known {
     pub fn posterior(&self) -> Posterior {
         let (n, all) = (self.open.len(), self.prior.sigma.len());
         let (mean, root) = self.through(&DMatrix::identity(all, all));
-        let last = self.root.get((n, n)).copied().unwrap_or(0.0);
+        let last = self.root[(n, n)];
         let logarithms: f64 = (0..n).map(|k| self.root[(k, k)].abs().ln()).sum();
         let of_prior: f64 = self.open.iter().map(|&k| self.prior.sigma[k].ln()).sum();
         Posterior::new(

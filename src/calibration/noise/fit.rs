@@ -25,8 +25,8 @@ const NEEDLESS: f64 = 0.05;
 const DIFFERENCE: f64 = 1e-3;
 /// A variance that is not stated and below this of its reference is none.
 const NOTHING: f64 = 1e-3;
-/// A fall of −2 ln of the likelihood that is nothing: a tenth of a σ of one factor.
-const SETTLED: f64 = 0.01;
+/// A fall of −2 ln of the likelihood that is nothing: a third of a σ of one factor.
+pub const SETTLED: f64 = 0.1;
 /// Longest step of ln σ.
 const LONGEST: f64 = 1.5;
 /// A step that lowers nothing at this fraction of itself is given up.

@@ -1,7 +1,7 @@
 //! From a calibration with stated noise to one with the noise that its data show.
 
 use super::factors::{Factors, Scale};
-use super::fit::{Fit, Likelihood};
+use super::fit::{Fit, Likelihood, SETTLED};
 use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
@@ -18,8 +18,6 @@ use crate::statistics::FALSE_ALARM;
 
 /// Points of linearisation at most.
 const ROUNDS: usize = 6;
-/// A change of −2 ln of the likelihood by other factors that is nothing: a third of a σ of one of them.
-const SETTLED: f64 = 0.1;
 /// Observations of three components that noise is first learnt from: 900 numbers, half of which tell σ of
 /// a white noise to 3 %.
 const ENOUGH: usize = 300;

@@ -88,7 +88,7 @@ impl Reduction {
     /// With what is known beforehand.
     pub fn posterior(&self, prior: &Prior) -> Posterior {
         let mut known = Known::new(prior.clone());
-        known.learn(self.parts.iter().map(|part| &part.rows));
+        self.parts.iter().for_each(|part| known.learn(&part.rows));
         self.posterior_of(&known)
     }
 
@@ -106,7 +106,7 @@ impl Reduction {
     pub fn history(&self, prior: &Prior, at: &Linearisation) -> Vec<Epoch> {
         let mut known = Known::new(prior.clone());
         let parts = self.parts.iter().map(|part| {
-            known.learn(std::iter::once(&part.rows));
+            known.learn(&part.rows);
             let posterior = known.posterior();
             let variance = posterior.parameter_covariance.diagonal();
             Epoch {

@@ -249,7 +249,7 @@ impl Follower<'_> {
 
     fn learn(&mut self) {
         if let Some(known) = &mut self.known {
-            known.learn(std::iter::once(&self.filter.columns.new_rows()));
+            known.learn(&self.filter.columns.new_rows());
         }
     }
 

@@ -4,7 +4,6 @@
 //! biases are not constant; they take a reduction of their own.
 
 mod bias_variation;
-mod evidence;
 mod explanation;
 mod terms_on;
 

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::evidence::Evidence;
 use super::explanation::{Explanation, UnmodelledEffect};
+use crate::calibration::checks::evidence::Evidence;
 use crate::calibration::constants::{Posterior, Prior};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::model::Model;

@@ -69,7 +69,7 @@ fn begun(model: &Model) -> (Filter, Known) {
 /// A filter that learns of a measurement.
 fn update(filter: &mut Filter, known: &mut Known, measurement: &Measurement) {
     filter.update(measurement);
-    known.learn(std::iter::once(&filter.columns.take_rows()));
+    known.learn(&filter.columns.take_rows());
 }
 
 fn of_velocity(z: Vector3<f64>, variance: f64) -> Measurement {
@@ -330,7 +330,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         let mut dwells = DwellFilters::of(&filter);
         let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
         assert_eq!(taken, Taken::Whole);
-        known.learn(std::iter::once(&filter.columns.take_rows()));
+        known.learn(&filter.columns.take_rows());
         let scalars = textbook.through(&filter, &segment, of);
         assert_eq!(scalars.len(), judge.scalars.len());
         for (one, other) in judge.scalars.iter().zip(&scalars) {

@@ -36,13 +36,15 @@ impl Evidence {
         }
     }
 
+    /// The χ² that it is by chance, and its degrees of freedom; none where the data show nothing of it.
+    pub fn chi_square(&self) -> Option<(f64, f64)> {
+        (self.states > 0.0).then(|| (self.gain / self.share, self.states))
+    }
+
     /// −2 ln of the chance of so much by chance alone; zero where the data show nothing of it.
     pub fn significance(&self) -> f64 {
-        if self.states > 0.0 {
-            -2.0 * ln_survival(self.states, self.gain / self.share)
-        } else {
-            0.0
-        }
+        let square = self.chi_square();
+        square.map_or(0.0, |(square, states)| -2.0 * ln_survival(states, square))
     }
 
     /// Limit of the gain that chance exceeds with this probability; infinite where the data show nothing of it.

@@ -1,19 +1,21 @@
-//! What happened once in a record: a wrong position of the table, a turn that the gyros did not sense, a step of biases.
+//! Causes of what a record shows beyond its model: what happened once (a wrong position of the table, a turn that the gyros
+//! did not sense, a step of biases), and error terms.
 //!
-//! It is looked for before noise is estimated, which would become large to explain it. What each one that may have
-//! happened would do to the estimate follows from its score and information beside the constants, without another pass
-//! (Rao 1948, "Large sample tests of statistical hypotheses", Mathematical Proceedings of the Cambridge Philosophical
-//! Society 44(1)).
+//! They are looked for before noise is estimated, which would become large to explain them. What each one would do to the
+//! estimate follows from its score and information beside the constants, without another pass (Rao 1948, "Large sample
+//! tests of statistical hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::json;
 
+use super::evidence::Evidence;
 use super::finding::Finding;
 use super::innovation::{Innovation, Observation};
 use crate::calibration::constants::{Constant, Disturbance, DisturbanceKind, Prior};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::linearisation::AttitudePrior;
+use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::problem::Problem;
 use crate::calibration::reduction::{Reduction, Script};
 use crate::imu::Sensor;
@@ -24,14 +26,23 @@ use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
 
-/// A disturbance that is beyond chance.
+/// What explains a record better than its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Disturbed {
+pub enum Cause {
+    /// Something happened once.
+    Disturbance(Disturbance),
+    /// An error term is there.
+    Term(ErrorTerm),
+}
+
+/// A cause that is beyond chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FoundCause {
     /// Which.
-    pub disturbance: Disturbance,
-    /// When it began, s.
+    pub cause: Cause,
+    /// When it began, s; of an error term zero.
     time: f64,
-    /// Its components.
+    /// Its components; of an error term zero.
     value: Vector3<f64>,
     /// −2 ln of the probability that as much is chance …
     significance: f64,
@@ -39,46 +50,54 @@ pub struct Disturbed {
     limit: f64,
 }
 
-/// Something that may have happened, with what shows it.
+/// Something that may be a cause, with what shows it.
 #[derive(Clone, Copy)]
 struct Candidate {
-    disturbance: Disturbance,
+    cause: Cause,
     time: f64,
     value: Vector3<f64>,
-    /// χ² if it did not happen, of so many degrees of freedom.
+    /// χ² if it is none, of so many degrees of freedom.
     square: f64,
     degrees: f64,
 }
 
-/// The disturbance that is furthest beyond chance in what was solved; none where none is.
+/// The cause in what was solved that explains most; none where none is beyond chance.
 ///
-/// Chance is as wide as half of all candidates show, or as the noise says if that is wider.
+/// Chance is as wide as half of all that may have happened once show, or as the noise says if that is wider.
 ///
 /// # Errors
 /// As of a pass.
-pub fn disturbed(
+pub fn likeliest(
     problem: &Problem,
     priors: &[AttitudePrior],
     iterated: &Iterated,
-) -> Result<Option<Disturbed>, CalibrationError> {
+) -> Result<Option<FoundCause>, CalibrationError> {
     let of_readings = of_readings(&iterated.held.innovations);
-    let by_score = by_score(problem, priors, iterated)?;
-    let count = of_readings.len() + by_score.len();
+    let [once, terms] = by_score(problem, priors, iterated)?;
+    let count = of_readings.len() + once.len() + terms.len();
     let limit = -2.0 * (FALSE_ALARM / count.max(1) as f64).ln();
-    let each = [of_readings, by_score].into_iter().flat_map(|of_kind| {
-        let ratio = |of: &Candidate| of.square / of.degrees;
-        let mut ratios: Vec<f64> = of_kind.iter().map(ratio).collect();
-        let chance = median(&mut ratios).unwrap_or(1.0).max(1.0);
-        of_kind.into_iter().map(move |of| Disturbed {
-            disturbance: of.disturbance,
+    let chance = |of_kind: &[Candidate]| {
+        let ratios = of_kind.iter().map(|of| of.square / of.degrees);
+        let median = median(&mut ratios.collect::<Vec<_>>());
+        median.unwrap_or(1.0).max(1.0)
+    };
+    let (of_read, of_all) = (chance(&of_readings), chance(&once));
+    let read = of_readings.into_iter().map(|of| (of, of_read));
+    let others = once.into_iter().chain(terms).map(|of| (of, of_all));
+    let each = read.chain(others).map(|(of, chance)| {
+        let square = of.square / chance;
+        let found = FoundCause {
+            cause: of.cause,
             time: of.time,
             value: of.value,
-            significance: -2.0 * ln_survival(of.degrees, of.square / chance),
+            significance: -2.0 * ln_survival(of.degrees, square),
             limit,
-        })
+        };
+        (square - of.degrees, found)
     });
-    let largest = each.max_by(|a, b| a.significance.total_cmp(&b.significance));
-    Ok(largest.filter(|found| found.significance > limit))
+    let beyond = each.filter(|(_, found)| found.significance > limit);
+    let most = beyond.max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(most.map(|(_, found)| found))
 }
 
 /// Positions of the table, by the innovations of its readings.
@@ -93,10 +112,10 @@ fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
             .iter()
             .max_by(|a, b| a.distance().total_cmp(&b.distance()))?;
         Some(Candidate {
-            disturbance: Disturbance {
+            cause: Cause::Disturbance(Disturbance {
                 kind: DisturbanceKind::Position,
                 dwell: largest.dwell,
-            },
+            }),
             time: largest.time,
             value: Vector3::zeros(),
             square: read.iter().map(|of| of.distance()).sum(),
@@ -106,37 +125,65 @@ fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
     dwells.filter_map(of_dwell).collect()
 }
 
-/// All that may have happened, by its score.
+/// All that may have happened once, and all error terms that are off, by their scores.
 fn by_score(
     problem: &Problem,
     priors: &[AttitudePrior],
     iterated: &Iterated,
-) -> Result<Vec<Candidate>, CalibrationError> {
-    let candidates = candidates(problem);
+) -> Result<[Vec<Candidate>; 2], CalibrationError> {
+    let disturbances = disturbances(problem);
+    let terms: Vec<ErrorTerm> = match problem.options.auto_terms {
+        true => terms(problem),
+        false => Vec::new(),
+    };
     let mut model = problem.model.clone();
-    model.disturbances.extend(&candidates);
+    model.disturbances.extend(&disturbances);
+    terms.iter().for_each(|&term| model.switch_on(term));
     let with = problem.with_model(model);
     let script = Script::new(&with, priors, &iterated.estimate)?;
     let reduction = script.reduce(&with, &iterated.held.accepted())?;
     let prior = Prior::new(&reduction.constants, &with.model, &iterated.estimate);
-    let Some(scores) = Scores::new(&reduction, &prior, &problem.model.disturbances) else {
-        return Ok(Vec::new());
+    let is_off = |constant: &Constant| match *constant {
+        Constant::Disturbance(of, _) => disturbances.contains(&of),
+        constant => constant
+            .error_term()
+            .is_some_and(|term| terms.contains(&term)),
     };
-    let of = |disturbance: Disturbance| {
-        let (square, value) = scores.of(disturbance)?;
+    let Some(scores) = Scores::new(&reduction, &prior, is_off) else {
+        return Ok([Vec::new(), Vec::new()]);
+    };
+    let once = disturbances.into_iter().filter_map(|of| {
+        let (square, value) = scores.of_disturbance(of)?;
         Some(Candidate {
-            disturbance,
-            time: time_of(problem, disturbance),
+            cause: Cause::Disturbance(of),
+            time: time_of(problem, of),
             value,
             square,
             degrees: COMPONENTS as f64,
         })
-    };
-    Ok(candidates.into_iter().filter_map(of).collect())
+    });
+    let of_terms = terms.into_iter().filter_map(|term| {
+        let (square, degrees) = scores.of_term(term)?;
+        Some(Candidate {
+            cause: Cause::Term(term),
+            time: 0.0,
+            value: Vector3::zeros(),
+            square,
+            degrees,
+        })
+    });
+    Ok([once.collect(), of_terms.collect()])
 }
 
-/// All that may have happened and that is not estimated already.
-fn candidates(problem: &Problem) -> Vec<Disturbance> {
+/// The constant error terms that are off and that the record can hold.
+fn terms(problem: &Problem) -> Vec<ErrorTerm> {
+    let model = &problem.model;
+    let off = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
+    off.collect()
+}
+
+/// All that may have happened once and is not estimated already.
+fn disturbances(problem: &Problem) -> Vec<Disturbance> {
     let table = problem.model.aiding == Aiding::Table;
     let all = problem.dwells().enumerate().flat_map(|(dwell, of)| {
         let position = (table && of.position.is_some()).then_some(DisturbanceKind::Position);
@@ -171,20 +218,22 @@ fn time_of(problem: &Problem, disturbance: Disturbance) -> f64 {
 /// Scores of the constants that are not estimated, beside those that are.
 struct Scores {
     constants: Vec<Constant>,
+    /// 1σ of each before the data.
+    sigma: DVector<f64>,
     score: DVector<f64>,
     information: DMatrix<f64>,
 }
 
 impl Scores {
-    /// Of all disturbances but those that are estimated; none where rounding has the last word.
-    fn new(reduction: &Reduction, prior: &Prior, estimated: &[Disturbance]) -> Option<Self> {
+    /// Of those that are off; none where rounding has the last word.
+    fn new(
+        reduction: &Reduction,
+        prior: &Prior,
+        is_off: impl Fn(&Constant) -> bool,
+    ) -> Option<Self> {
         let constants = &reduction.constants;
         let n = constants.len();
-        let is_off = |k: &usize| match constants[*k] {
-            Constant::Disturbance(of, _) => !estimated.contains(&of),
-            _ => false,
-        };
-        let (off, on): (Vec<usize>, Vec<usize>) = (0..n).partition(is_off);
+        let (off, on): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_off(&constants[k]));
         let mut squares = DMatrix::zeros(n + 1, n + 1);
         for part in &reduction.parts {
             squares.gemm_tr(1.0, &part.rows, &part.rows, 1.0);
@@ -202,17 +251,17 @@ impl Scores {
         let root = (&scale * among * &scale).cholesky()?;
         let across = &scale * within(&on, &off);
         let explained = root.solve(&across);
+        let score = within(&off, &[n]) - explained.tr_mul(&(&scale * right));
         Some(Self {
             constants: off.iter().map(|&k| constants[k]).collect(),
-            score: (within(&off, &[n]) - explained.tr_mul(&(&scale * right)))
-                .column(0)
-                .into_owned(),
+            sigma: prior.sigma.select_rows(&off),
+            score: score.column(0).into_owned(),
             information: within(&off, &off) - explained.tr_mul(&across),
         })
     }
 
     /// By how much the cost falls with a disturbance, and its components; none where the data do not show all of them.
-    fn of(&self, disturbance: Disturbance) -> Option<(f64, Vector3<f64>)> {
+    fn of_disturbance(&self, disturbance: Disturbance) -> Option<(f64, Vector3<f64>)> {
         let mut constants = self.constants.iter();
         let first = constants.position(|of| *of == Constant::Disturbance(disturbance, 0))?;
         let score = self.score.fixed_rows::<3>(first);
@@ -220,12 +269,34 @@ impl Scores {
         let value = value.into_owned().cholesky()?.solve(&score);
         Some((score.dot(&value), value))
     }
+
+    /// χ² and degrees of freedom of what an error term of its usual size explains.
+    fn of_term(&self, term: ErrorTerm) -> Option<(f64, f64)> {
+        let constants = self.constants.iter().enumerate();
+        let of = constants.filter(|(_, constant)| constant.error_term() == Some(term));
+        let of: Vec<usize> = of.map(|(place, _)| place).collect();
+        let sigma = DMatrix::from_diagonal(&self.sigma.select_rows(&of));
+        let information = self.information.select_rows(&of).select_columns(&of);
+        let information = &sigma * information * &sigma + DMatrix::identity(of.len(), of.len());
+        let covariance = information.cholesky()?.inverse();
+        let score = &sigma * self.score.select_rows(&of);
+        let gain = score.dot(&(&covariance * &score));
+        Evidence::new(gain, &covariance).chi_square()
+    }
 }
 
-impl Disturbed {
-    /// The problem without it: readings of a wrong position are left out, all else is estimated.
-    pub fn taken_out<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
-        let Disturbance { kind, dwell } = self.disturbance;
+impl FoundCause {
+    /// The problem with it: readings of a wrong position are left out, all else is estimated.
+    pub fn taken_into<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        let mut model = problem.model.clone();
+        let disturbance = match self.cause {
+            Cause::Term(term) => {
+                model.switch_on(term);
+                return problem.with_model(model);
+            }
+            Cause::Disturbance(disturbance) => disturbance,
+        };
+        let Disturbance { kind, dwell } = disturbance;
         if kind == DisturbanceKind::Position {
             return problem.with_dwells(|number, _, of| {
                 let position = of.position.clone().filter(|_| number != dwell);
@@ -233,8 +304,7 @@ impl Disturbed {
                 Some(Dwell { samples, position })
             });
         }
-        let mut model = problem.model.clone();
-        model.disturbances.push(self.disturbance);
+        model.disturbances.push(disturbance);
         problem.with_model(model)
     }
 
@@ -246,13 +316,27 @@ impl Disturbed {
             limit,
             ..
         } = self;
-        let number = self.disturbance.dwell + 1;
+        let disturbance = match self.cause {
+            Cause::Disturbance(disturbance) => disturbance,
+            Cause::Term(term) => {
+                let name = term.name();
+                let text = format!(
+                    "The data show {name}: turncal estimates it, as with --with {name} (−2 ln p {significance:.0}; \
+                     limit {limit:.0}). The values are those beside it; apply it with them."
+                );
+                let figures = json!({
+                    "term": name, "significance": significance, "limit": limit
+                });
+                return Finding::new("error-term-estimated", text, figures);
+            }
+        };
+        let number = disturbance.dwell + 1;
         let seconds = self.value.norm() / ARCSEC;
         let angle = match seconds {
             ..1000.0 => format!("{seconds:.0}″"),
             _ => format!("{:.3}°", seconds / 3600.0),
         };
-        let (kind, text) = match self.disturbance.kind {
+        let (kind, text) = match disturbance.kind {
             DisturbanceKind::Position => {
                 let by = if seconds > 0.0 {
                     format!(" by {angle}")
