@@ -85,15 +85,14 @@ pub fn likeliest(
     let read = of_readings.into_iter().map(|of| (of, of_read));
     let others = once.into_iter().chain(terms).map(|of| (of, of_all));
     let each = read.chain(others).map(|(of, chance)| {
-        let square = of.square / chance;
         let found = FoundCause {
             cause: of.cause,
             time: of.time,
             value: of.value,
-            significance: -2.0 * ln_survival(of.degrees, square),
+            significance: -2.0 * ln_survival(of.degrees, of.square / chance),
             limit,
         };
-        (square - of.degrees, found)
+        (of.square - chance * of.degrees, found)
     });
     let beyond = each.filter(|(_, found)| found.significance > limit);
     let most = beyond.max_by(|a, b| a.0.total_cmp(&b.0));
