@@ -206,12 +206,22 @@ fn site(top: &Fields) -> Result<Site, FileError> {
         .within(-500.0, 9000.0)?;
     let mut site = Site::with_normal_gravity(latitude, longitude, height);
     if let Some(field) = fields.get("gravity_m_s2") {
-        site = site.with_gravity(field.within(9.7, 9.9)?, 0.0);
+        let gravity = field.within(9.7, 9.9)?;
+        site = site.with_gravity(gravity, stated_gravity_sigma(&field.as_written()?));
     }
     if let Some(field) = fields.get("gravity_sigma_mgal") {
         site.gravity_sigma = field.within(0.0, 1e5)? * MILLIGAL;
     }
     Ok(site)
+}
+
+/// 1σ of a gravity that is stated without one, m/s²: of its last digit, and no less than a milligal.
+fn stated_gravity_sigma(written: &str) -> f64 {
+    let digits = written
+        .split_once('.')
+        .map_or(0, |(_, digits)| digits.len());
+    let last = 10f64.powi(-i32::try_from(digits).unwrap_or(i32::MAX));
+    MILLIGAL.max(last / 12f64.sqrt())
 }
 
 fn meta(top: &Fields) -> Result<BTreeMap<String, String>, FileError> {

@@ -26,6 +26,9 @@ use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
 
+/// Readings of a dwell that show the move before it: until the gate opens.
+const OF_THE_MOVE: usize = 6;
+
 /// What explains a record better than its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
@@ -33,6 +36,12 @@ pub enum Cause {
     Disturbance(Disturbance),
     /// An error term is there.
     Term(ErrorTerm),
+}
+
+impl Cause {
+    fn is(self, kind: DisturbanceKind) -> bool {
+        matches!(self, Self::Disturbance(disturbance) if disturbance.kind == kind)
+    }
 }
 
 /// A cause that is beyond chance.
@@ -63,7 +72,7 @@ struct Candidate {
 
 /// The cause in what was solved that explains most; none where none is beyond chance.
 ///
-/// Chance is as wide as half of all that may have happened once show, or as the noise says if that is wider.
+/// Chance is as wide as half of all positions and half of all slips show, or as the noise says if that is wider.
 ///
 /// # Errors
 /// As of a pass.
@@ -81,9 +90,20 @@ pub fn likeliest(
         let median = median(&mut ratios.collect::<Vec<_>>());
         median.unwrap_or(1.0).max(1.0)
     };
-    let (of_read, of_all) = (chance(&of_readings), chance(&once));
+    let of_kind = |kind: DisturbanceKind| {
+        let of_kind = once.iter().copied().filter(|of| of.cause.is(kind));
+        chance(&of_kind.collect::<Vec<_>>())
+    };
+    let of_read = chance(&of_readings);
+    let of_positions = of_kind(DisturbanceKind::Position);
+    let of_slips = of_kind(DisturbanceKind::Slip);
+    let of_all = of_positions.max(of_slips);
     let read = of_readings.into_iter().map(|of| (of, of_read));
-    let others = once.into_iter().chain(terms).map(|of| (of, of_all));
+    let others = once.iter().copied().chain(terms).map(|of| match of.cause {
+        cause if cause.is(DisturbanceKind::Position) => (of, of_positions),
+        cause if cause.is(DisturbanceKind::Slip) => (of, of_slips),
+        _ => (of, of_all),
+    });
     let each = read.chain(others).map(|(of, chance)| {
         let found = FoundCause {
             cause: of.cause,
@@ -106,7 +126,7 @@ fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
         let read = dwell
             .iter()
             .filter(|of| of.observation == Observation::Table);
-        let read: Vec<&Innovation> = read.collect();
+        let read: Vec<&Innovation> = read.skip(OF_THE_MOVE).collect();
         let largest = read
             .iter()
             .max_by(|a, b| a.distance().total_cmp(&b.distance()))?;
@@ -189,7 +209,12 @@ fn disturbances(problem: &Problem) -> Vec<Disturbance> {
         let slip = (dwell > 0).then_some(DisturbanceKind::Slip);
         let steps = Sensor::ALL.map(DisturbanceKind::BiasStep);
         let steps = steps.into_iter().filter(move |_| table && dwell > 0);
-        let kinds = position.into_iter().chain(slip).chain(steps);
+        let earth_rate = (table && dwell == 0).then_some(DisturbanceKind::EarthRate);
+        let kinds = position
+            .into_iter()
+            .chain(slip)
+            .chain(steps)
+            .chain(earth_rate);
         kinds.map(move |kind| Disturbance { kind, dwell })
     });
     all.filter(|of| !problem.model.disturbances.contains(of))
@@ -355,6 +380,15 @@ impl FoundCause {
                      range or a loose mount"
                 );
                 ("move-wrong", text)
+            }
+            DisturbanceKind::EarthRate => {
+                let value = self.value / DEG_PER_H;
+                let text = format!(
+                    "Earth rate is {:+.4}, {:+.4}, {:+.4} °/h (East, North, Up) off that at latitude_deg. turncal \
+                     estimated it. Check latitude_deg, and north and level of the table",
+                    value.x, value.y, value.z
+                );
+                ("earth-rate-wrong", text)
             }
             DisturbanceKind::BiasStep(sensor) => {
                 let (unit, name) = match sensor {

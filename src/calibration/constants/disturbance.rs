@@ -1,5 +1,6 @@
 //! What happened once in a record.
 
+use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 
 /// What happened once: with the begin of a dwell, told by its number among all, something is other than before.
@@ -18,6 +19,8 @@ pub enum DisturbanceKind {
     Position,
     /// The body turned in the move before that dwell as the gyros did not sense, East, North and Up, rad.
     Slip,
+    /// Earth rate is other than at the stated latitude, throughout: East, North and Up, rad/s.
+    EarthRate,
     /// The biases of a triad step, from half a step below their mean to half a step above it, rad/s or m/s².
     BiasStep(Sensor),
 }
@@ -27,6 +30,7 @@ impl Disturbance {
     pub fn sigma(self, bias: impl Fn(Sensor) -> f64) -> f64 {
         match self.kind {
             DisturbanceKind::Position | DisturbanceKind::Slip => LINEAR,
+            DisturbanceKind::EarthRate => LINEAR * ROTATION_RATE,
             DisturbanceKind::BiasStep(sensor) => bias(sensor),
         }
     }

@@ -171,7 +171,8 @@ impl Filter {
                     self.effect(block, Constant::Parameter(bias))
                         .map(|by| side * by)
                 }
-                _ => [0.0; NAVIGATION],
+                DisturbanceKind::EarthRate => of_earth_rate(block, component),
+                DisturbanceKind::Position | DisturbanceKind::Slip => [0.0; NAVIGATION],
             },
             Constant::Base(_) | Constant::Axis(_) => [0.0; NAVIGATION],
         }
@@ -192,7 +193,7 @@ impl Filter {
     }
 }
 
-/// What a change of Earth rate along East or North makes of the navigation errors.
+/// What a change of Earth rate along East, North or Up makes of the navigation errors.
 fn of_earth_rate(block: &Block, axis: usize) -> [f64; NAVIGATION] {
     let mut column = [0.0; NAVIGATION];
     column[ATTITUDE + axis] = -block.duration;

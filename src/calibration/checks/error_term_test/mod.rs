@@ -164,7 +164,12 @@ pub fn test_error_terms(
             return Ok((stated.tests, left_off));
         }
     }
-    let left_off = of_record.left_off(&of_record);
+    // What no term is significant for leaves σ as they are.
+    let shown = of_record
+        .tests
+        .iter()
+        .any(|test| test.role == Role::Likeliest);
+    let left_off = shown.then(|| of_record.left_off(&of_record)).flatten();
     Ok((of_record.tests, left_off))
 }
 
