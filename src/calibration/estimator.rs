@@ -7,17 +7,16 @@ use nalgebra::Vector3;
 use super::budget::BudgetSource;
 use super::constants::Prior;
 use super::error::CalibrationError;
-use super::gauss_newton::{Iterated, Progress, iterate};
+use super::gauss_newton::{Iterated, Progress};
 use super::linearisation::{UNKNOWN_HEADING, not_invertible};
 use super::model::Model;
 use super::outcome::Outcome;
 use super::parameters::ParameterMatrix;
-use super::pass::Gate;
 use super::problem::Problem;
 use super::several;
 use super::solved::Solved;
 use crate::calibration::checks;
-use crate::calibration::checks::cause::{FoundCause, likeliest};
+use crate::calibration::checks::cause::{Cause, FoundCause, likeliest};
 use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
 use crate::calibration::checks::form::{FormTest, form_test};
 use crate::calibration::checks::innovation::consistency;
@@ -42,58 +41,57 @@ const DWELLS_OF_ONE: usize = 6;
 /// # Errors
 /// [`CalibrationError`] where the runs cannot give a calibration. Runs that give one without
 /// convergence are an [`Outcome`] with `converged = false` and a finding.
-pub fn estimate<'a>(
-    problem: &Problem<'a>,
-    progress: Progress,
-) -> Result<Outcome, CalibrationError> {
+pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
     let solved = match problem.varies() || problem.runs().nth(1).is_some() {
         true => several::solve(problem, progress)?,
         false => from_coarse_start(problem, progress)?,
     };
-    // By hand only the record itself tells how much a move leaves.
-    let by_hand = problem.model.aiding == Aiding::Velocity;
-    let solved = match by_hand {
-        true => solved,
-        false => settled(with_causes(solved, progress)?, progress)?,
-    };
-    // Recordings differ as they show.
-    let as_stated = |solved: &Solved<'a>| {
-        let mut model = solved.problem.model.with_noise_of(&problem.model);
-        model.prior_sigma = problem.model.prior_sigma;
-        solved.problem.with_model(model)
-    };
     let solved = with_wide_prior(solved, progress)?;
     let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated)?;
-    // Noise that makes up for angles that are missing is no noise.
-    let is_no_noise = form_test.as_ref().is_some_and(FormTest::rejects);
-    let solved = match is_no_noise {
-        true => solved,
-        false => learn_noise(&as_stated(&solved), solved, progress)?,
+    // Angles that are missing are neither a cause nor noise.
+    if form_test.as_ref().is_some_and(FormTest::rejects) {
+        return outcome(&as_stated(problem, &solved), solved, form_test);
+    }
+    let solved = match problem.model.aiding {
+        Aiding::Table => {
+            let solved = settled(with_causes(solved, progress)?, progress)?;
+            with_noise(&as_stated(problem, &solved), solved, progress)?
+        }
+        // By hand only the record itself tells how much a move leaves.
+        Aiding::Velocity => {
+            let solved = with_noise(&as_stated(problem, &solved), solved, progress)?;
+            with_causes(solved, progress)?
+        }
     };
-    let solved = match by_hand {
-        true => with_causes(solved, progress)?,
-        false => solved,
-    };
-    outcome(&as_stated(&solved), solved, form_test)
+    outcome(&as_stated(problem, &solved), solved, form_test)
 }
 
-/// Without the time after each stop in which the attitude settles, as long as more of it shows.
-fn settled<'a>(mut solved: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
+/// The problem that was solved with noise and prior as they are stated; recordings differ as they show.
+fn as_stated<'a>(stated: &Problem<'a>, solved: &Solved<'a>) -> Problem<'a> {
+    let mut model = solved.problem.model.with_noise_of(&stated.model);
+    model.prior_sigma = stated.model.prior_sigma;
+    solved.problem.with_model(model)
+}
+
+/// Without the time after each stop in which the attitude settles, as long as more of it shows; as it is where that lasts
+/// longer than a table settles.
+fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
+    let mut solved = before.clone();
     loop {
         let steps = settling::settling(&solved.problem, &solved.iterated.held.innovations);
         if steps == 0 {
             return Ok(solved);
         }
+        if settling::is_longer(&solved.problem, solved.settling + steps) {
+            return Ok(before);
+        }
         let problem = solved.problem.settled(steps);
-        let (from, gate) = (solved.iterated.estimate.clone(), Gate::Innovations);
-        let (priors, passes) = (&solved.priors, &mut solved.passes);
-        solved.iterated = iterate(&problem, priors, from, gate, passes, progress)?;
-        solved.problem = problem;
+        solved = solved.again(problem, progress)?;
         solved.settling += steps;
     }
 }
 
-/// With the causes that the record shows: the likeliest first, as long as one is beyond chance.
+/// With the causes that the record shows: the one that explains most first, as long as one is beyond chance.
 fn with_causes<'a>(
     mut solved: Solved<'a>,
     progress: Progress,
@@ -103,18 +101,19 @@ fn with_causes<'a>(
         let Some(found) = likeliest(&solved.problem, &solved.priors, &solved.iterated)? else {
             break;
         };
+        // Nothing else is to explain a term that is not asked for.
+        if matches!(found.cause, Cause::Term(_)) && !solved.problem.options.auto_terms {
+            break;
+        }
         let problem = found.taken_into(&solved.problem);
-        let (from, gate) = (solved.iterated.estimate.clone(), Gate::Innovations);
-        let (priors, passes) = (&solved.priors, &mut solved.passes);
-        solved.iterated = iterate(&problem, priors, from, gate, passes, progress)?;
-        solved.problem = problem;
+        solved = solved.again(problem, progress)?;
         solved.causes.push(found);
     }
     Ok(solved)
 }
 
 /// With the noise that the data show, where they contradict what is stated.
-fn learn_noise<'a>(
+fn with_noise<'a>(
     as_stated: &Problem<'a>,
     solved: Solved<'a>,
     progress: Progress,
@@ -130,29 +129,19 @@ fn learn_noise<'a>(
 /// Iterations with a prior that its estimate does not contradict: a wrong one would make outliers of correct
 /// observations, and noise of itself.
 fn with_wide_prior<'a>(
-    mut solved: Solved<'a>,
+    solved: Solved<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
-    let iterated = &solved.iterated;
-    let Some(model) = widened(&solved.problem.model, &iterated.both_triads()) else {
+    let estimate = solved.iterated.both_triads();
+    let Some(model) = widened(&solved.problem.model, &estimate) else {
         return Ok(solved);
     };
-    let (problem, from) = (solved.problem.with_model(model), iterated.estimate.clone());
-    let gate = Gate::Innovations;
-    match iterate(
-        &problem,
-        &solved.priors,
-        from,
-        gate,
-        &mut solved.passes,
-        progress,
-    ) {
-        Ok(iterated) => (solved.iterated, solved.problem) = (iterated, problem),
-        Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
+    let problem = solved.problem.with_model(model);
+    match solved.clone().again(problem, progress) {
+        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
         // A prior that is too tight is better than none.
-        Err(_) => {}
+        again => Ok(again.unwrap_or(solved)),
     }
-    Ok(solved)
 }
 
 /// What was found with its covariance, to which errors that no pass knows of are added.
@@ -260,7 +249,7 @@ mod tests {
     use super::super::Options;
     use super::super::linearisation::Linearisation;
     use super::super::parameters::{from_vector, to_vector};
-    use super::super::pass::pass;
+    use super::super::pass::{Gate, pass};
     use super::super::reduction::Script;
     use super::*;
     use crate::attitude::exp;

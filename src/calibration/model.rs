@@ -52,6 +52,8 @@ pub struct Model {
     /// How the body turns where it should not, in dwells without a table: 1σ density of a random walk,
     /// rad/√s. Gyros sense it, so it is none of their noise.
     pub turning_at_rest: f64,
+    /// Whether moves by hand leave nothing to be learnt of velocity, which begins anew after each.
+    pub velocity_anew: bool,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
     /// How the instrument changes with temperature, where it does.
@@ -90,6 +92,7 @@ impl Model {
             motion_noise: run.instrument.motion_noise,
             standstill_sigma: PerSensor::default(),
             turning_at_rest: run.standstill.turning,
+            velocity_anew: false,
             term_sigma: run.instrument.term_sigma,
             thermal: None,
             day_to_day: DayToDay::default(),
@@ -148,6 +151,7 @@ impl Model {
             motion_noise: other.motion_noise,
             standstill_sigma: other.standstill_sigma,
             turning_at_rest: other.turning_at_rest,
+            velocity_anew: other.velocity_anew,
             position_sigma: other.position_sigma,
             reading_sigma: other.reading_sigma,
             ..self.clone()

@@ -1,7 +1,9 @@
 //! What iterations found, and with what they were made.
 
-use super::gauss_newton::{Iterated, Pass};
+use super::error::CalibrationError;
+use super::gauss_newton::{Iterated, Pass, Progress, iterate};
 use super::linearisation::AttitudePrior;
+use super::pass::Gate;
 use super::problem::Problem;
 use crate::calibration::checks::cause::FoundCause;
 use crate::calibration::checks::finding::Finding;
@@ -45,5 +47,18 @@ impl<'a> Solved<'a> {
             causes: Vec::new(),
             findings: Vec::new(),
         }
+    }
+
+    /// Iterates another problem from here.
+    pub fn again(
+        mut self,
+        problem: Problem<'a>,
+        progress: Progress,
+    ) -> Result<Self, CalibrationError> {
+        let (from, gate) = (self.iterated.estimate, Gate::Innovations);
+        let passes = &mut self.passes;
+        self.iterated = iterate(&problem, &self.priors, from, gate, passes, progress)?;
+        self.problem = problem;
+        Ok(self)
     }
 }

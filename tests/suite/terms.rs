@@ -148,7 +148,7 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
     run.instrument.term_sigma = TermVector::zeros();
-    let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
+    let outcome = estimate(&Problem::new(&run, &stated().no_auto_terms()), UNWATCHED).unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
     let sigma = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
     let normalised = error.component_div(&sigma);

@@ -20,14 +20,11 @@ use crate::calibration::problem::Problem;
 use crate::calibration::reduction::{Reduction, Script};
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
-use crate::statistics::{FALSE_ALARM, ln_survival, median};
+use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
-
-/// Readings of a dwell that show the move before it: until the gate opens.
-const OF_THE_MOVE: usize = 6;
 
 /// What explains a record better than its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,14 +116,17 @@ pub fn likeliest(
     Ok(most.map(|(_, found)| found))
 }
 
-/// Positions of the table, by the innovations of its readings.
+/// Positions of the table, by the innovations of those of its readings that are no outliers.
 fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
     let dwells = innovations.chunk_by(|one, other| one.dwell == other.dwell);
+    let sound = chi_square_limit(COMPONENTS as f64, FALSE_ALARM);
     let of_dwell = |dwell: &[Innovation]| {
         let read = dwell
             .iter()
-            .filter(|of| of.observation == Observation::Table);
-        let read: Vec<&Innovation> = read.skip(OF_THE_MOVE).collect();
+            .filter(|of| of.observation == Observation::Table && of.accepted);
+        // The first ones may show the move.
+        let read = read.skip_while(|of| of.distance() > sound);
+        let read: Vec<&Innovation> = read.collect();
         let largest = read
             .iter()
             .max_by(|a, b| a.distance().total_cmp(&b.distance()))?;
@@ -151,10 +151,7 @@ fn by_score(
     iterated: &Iterated,
 ) -> Result<[Vec<Candidate>; 2], CalibrationError> {
     let disturbances = disturbances(problem);
-    let terms: Vec<ErrorTerm> = match problem.options.auto_terms {
-        true => terms(problem),
-        false => Vec::new(),
-    };
+    let terms = terms(problem);
     let mut model = problem.model.clone();
     model.disturbances.extend(&disturbances);
     terms.iter().for_each(|&term| model.switch_on(term));

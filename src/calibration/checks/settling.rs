@@ -8,8 +8,8 @@ use crate::calibration::problem::Problem;
 use crate::run::Aiding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 
-/// A dwell lasts so many times as long as its attitude settles, at least.
-const LEAST_DWELL: usize = 4;
+/// A table settles within this time, s: what lasts longer is something else.
+const LONGEST: f64 = 3.0;
 
 /// Innovations of a table's readings after stops: squares and number of all by their place in the dwell.
 struct AfterStops(Vec<(f64, usize)>);
@@ -32,13 +32,6 @@ impl AfterStops {
         Self(squares)
     }
 
-    /// How many observations half of all dwells have.
-    fn usual(&self) -> usize {
-        let dwells = self.0.first().map_or(0, |first| first.1);
-        let usual = self.0.iter().take_while(|of| 2 * of.1 >= dwells);
-        usual.count()
-    }
-
     /// How many observations after a stop are beyond chance, one after the other; as wide as half of all show. The
     /// first shows the move before it, too, and does not count alone.
     fn settling(&self) -> usize {
@@ -50,8 +43,6 @@ impl AfterStops {
         let beyond = |&&(square, count): &&(f64, usize)| square > chance * limit(count);
         match self.0.iter().skip(1).take_while(beyond).count() {
             0 => 0,
-            // What lasts as long is no settling.
-            long if long > self.usual() / LEAST_DWELL => 0,
             beyond => beyond + 1,
         }
     }
@@ -66,11 +57,16 @@ pub fn settling(problem: &Problem, innovations: &[Innovation]) -> usize {
     }
 }
 
+/// Whether so many steps are longer than a table settles.
+pub fn is_longer(problem: &Problem, steps: usize) -> bool {
+    problem.duration_of_steps(steps) > LONGEST
+}
+
 /// The finding that says so.
 pub fn finding(problem: &Problem, steps: usize) -> Option<Finding> {
     let seconds = problem.duration_of_steps(steps);
     let text = format!(
-        "The attitude settles for {seconds:.1} s after each stop. turncal skips that time in every dwell. Wait longer \
+        "The attitude settles for {seconds:.1} s after each stop. turncal skips that time after each move. Wait longer \
          after each stop, or stiffen the mount."
     );
     (steps > 0).then(|| Finding::new("settling", text, json!({ "skipped_s": seconds })))

@@ -57,8 +57,7 @@ impl Scale {
             match source {
                 // Beside a table's readings it says nothing.
                 Source::Attitude | Source::RotationAtRest if table => 0.0,
-                // By hand velocity begins anew after each move.
-                Source::AccelMotion | Source::AccelMoving if !table => 0.0,
+                Source::AccelMotion | Source::AccelMoving if problem.model.velocity_anew => 0.0,
                 _ if source.stated(problem) => sigma.powi(2),
                 Source::GyroMotion => of_moves(Sensor::Gyro, moves.motion.gyro),
                 Source::AccelMotion => of_moves(Sensor::Accel, moves.motion.accel),

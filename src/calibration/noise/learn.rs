@@ -38,7 +38,8 @@ pub fn learn<'a>(
     if policy == NoisePolicy::Stated {
         return Ok(solved);
     }
-    let model = solved.problem.model.with_noise_of(&as_stated.model);
+    let mut model = solved.problem.model.with_noise_of(&as_stated.model);
+    model.velocity_anew = solved.problem.model.velocity_anew;
     let as_stated = solved.problem.with_model(model);
     let accepted = solved.iterated.held.accepted();
     let thinned = Thinned::new(&as_stated, (accepted.len() / ENOUGH).clamp(1, LONGEST));
@@ -54,23 +55,8 @@ pub fn learn<'a>(
     if solved.problem.model == as_stated.model {
         return Ok(Solved { noise, ..solved });
     }
-    let mut passes = solved.passes;
-    let (from, gate) = (solved.iterated.estimate, Gate::Innovations);
-    let iterated = iterate(
-        &as_stated,
-        &solved.priors,
-        from,
-        gate,
-        &mut passes,
-        progress,
-    )?;
-    Ok(Solved {
-        noise,
-        problem: as_stated,
-        iterated,
-        passes,
-        ..solved
-    })
+    let solved = solved.again(as_stated, progress)?;
+    Ok(Solved { noise, ..solved })
 }
 
 /// Iterates with noise that was estimated at one point of linearisation, and estimates it there again, until neither

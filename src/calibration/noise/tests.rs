@@ -9,7 +9,6 @@ use super::*;
 use crate::calibration::{Options, Outcome, Problem, estimate};
 use crate::run::Run;
 use crate::simulation::Scenario;
-use crate::units::ARCSEC;
 
 fn run() -> Run {
     Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run
@@ -58,7 +57,7 @@ fn an_angle_random_walk_stated_at_a_third_is_found() {
 fn attitude_noise_of_moves_is_found() {
     let mut run = run();
     // As much in every move of ten seconds as ten times the σ of a table position.
-    let density = 10.0 * 5.0 * ARCSEC / 10f64.sqrt();
+    let density = 10.0 * run.table.position_sigma / 10f64.sqrt();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let dwells = run.dwells(run.aiding());
     let period = run.recording.imu.period;

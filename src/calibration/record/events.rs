@@ -11,7 +11,6 @@ use crate::calibration::linearisation::{Linearisation, singular};
 use crate::calibration::model::Model;
 use crate::calibration::problem::{Problem, Stretch};
 use crate::navigation::{Block, Navigator, State};
-use crate::run::Aiding;
 
 /// A move, or a piece of one, or a part of a dwell.
 pub enum Event {
@@ -53,7 +52,7 @@ impl Rest {
             filter.begin_dwell();
             filter.begin_to_hold();
         }
-        if self.first && self.new_position && model.aiding == Aiding::Velocity {
+        if self.first && self.new_position && model.velocity_anew {
             filter.redraw_velocity(stretch.velocity_sigma());
         }
         if self.first && self.new_position {

@@ -91,10 +91,12 @@ impl AccuracyStudy {
             BodyFrame::Table => Aiding::Table,
             BodyFrame::Accelerometer => Aiding::Velocity,
         };
-        let options = Options::default()
+        let mut options = Options::default()
             .installation(self.form)
             .aiding(aiding)
             .noise(self.noise);
+        // What stays unmodelled is to show what it does.
+        options.auto_terms = self.unmodelled.is_empty();
         let mut problem = Problem::new(&record, &options);
         let duration = record.recording.imu.duration();
         let form = self.bound_form(&truth);
