@@ -197,9 +197,9 @@ impl Filter {
 fn of_earth_rate(block: &Block, axis: usize) -> [f64; NAVIGATION] {
     let mut column = [0.0; NAVIGATION];
     column[ATTITUDE + axis] = -block.duration;
-    for row in VELOCITY..VELOCITY + 3 {
+    for (row, velocity) in column.iter_mut().enumerate().skip(VELOCITY).take(3) {
         // The tilt grows evenly.
-        column[row] = -0.5 * block.duration * block.navigation[(row, ATTITUDE + axis)];
+        *velocity = -0.5 * block.duration * block.navigation[(row, ATTITUDE + axis)];
     }
     column
 }
