@@ -13,7 +13,7 @@ use crate::calibration::record::standstill::FLOOR;
 use crate::calibration::several::day_to_day::DayToDay;
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
-    TermVector, ThermalModel,
+    Term, TermVector, ThermalModel,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
@@ -52,7 +52,8 @@ pub struct Model {
     /// How the body turns where it should not, in dwells without a table: 1σ density of a random walk,
     /// rad/√s. Gyros sense it, so it is none of their noise.
     pub turning_at_rest: f64,
-    /// Whether moves by hand leave nothing to be learnt of velocity, which begins anew after each.
+    /// Whether velocity begins anew after each move: without a table's log a move leaves more noise in it than it tells,
+    /// except of terms that show in nothing else.
     pub velocity_anew: bool,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
@@ -108,6 +109,9 @@ impl Model {
         for &term in &options.terms {
             model.switch_on(term);
         }
+        let shows_in_velocity = [Term::SizeEffect, Term::TimeOffset].map(ErrorTerm::Instrument);
+        let needed = shows_in_velocity.into_iter().any(|term| model.has(term));
+        model.velocity_anew = aiding == Aiding::Velocity && !needed;
         model
     }
 
@@ -151,7 +155,6 @@ impl Model {
             motion_noise: other.motion_noise,
             standstill_sigma: other.standstill_sigma,
             turning_at_rest: other.turning_at_rest,
-            velocity_anew: other.velocity_anew,
             position_sigma: other.position_sigma,
             reading_sigma: other.reading_sigma,
             ..self.clone()

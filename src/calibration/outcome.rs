@@ -134,7 +134,6 @@ impl Outcome {
         });
         let mut model = problem.model.clone();
         model.prior_sigma = self.model.prior_sigma;
-        model.velocity_anew = self.model.velocity_anew;
         problem.with_model(model)
     }
 

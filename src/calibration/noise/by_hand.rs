@@ -116,7 +116,6 @@ impl ByHand {
     /// The model of a problem with it.
     pub fn model(&self, problem: &Problem) -> Model {
         let mut model = problem.model.clone();
-        model.velocity_anew = !self.is_none();
         for one in &self.found {
             let source = BY_HAND[one.place];
             let sigma = source.sigma(problem).hypot(one.variance.sqrt());

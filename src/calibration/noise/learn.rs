@@ -38,8 +38,7 @@ pub fn learn<'a>(
     if policy == NoisePolicy::Stated {
         return Ok(solved);
     }
-    let mut model = solved.problem.model.with_noise_of(&as_stated.model);
-    model.velocity_anew = solved.problem.model.velocity_anew;
+    let model = solved.problem.model.with_noise_of(&as_stated.model);
     let as_stated = solved.problem.with_model(model);
     let accepted = solved.iterated.held.accepted();
     let thinned = Thinned::new(&as_stated, (accepted.len() / ENOUGH).clamp(1, LONGEST));
