@@ -106,7 +106,12 @@ fn with_causes<'a>(
             break;
         }
         let problem = found.taken_into(&solved.problem);
-        solved = solved.again(problem, progress)?;
+        match solved.clone().again(problem, progress) {
+            Ok(again) if again.iterated.converged || !solved.iterated.converged => solved = again,
+            Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
+            // A cause with which nothing converges is none.
+            _ => break,
+        }
         solved.causes.push(found);
     }
     Ok(solved)

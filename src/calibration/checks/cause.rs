@@ -96,7 +96,10 @@ pub fn likeliest(
     let of_slips = of_kind(DisturbanceKind::Slip);
     let of_all = of_positions.max(of_slips);
     let read = of_readings.into_iter().map(|of| (of, of_read));
-    let others = once.iter().copied().chain(terms).map(|of| match of.cause {
+    // By hand every move is another; that one is worst only tells how wide chance is.
+    let table = problem.model.aiding == Aiding::Table;
+    let taken = once.iter().copied().filter(|_| table);
+    let others = taken.chain(terms).map(|of| match of.cause {
         cause if cause.is(DisturbanceKind::Position) => (of, of_positions),
         cause if cause.is(DisturbanceKind::Slip) => (of, of_slips),
         _ => (of, of_all),
@@ -337,27 +340,37 @@ impl FoundCause {
             limit,
             ..
         } = self;
-        let disturbance = match self.cause {
-            Cause::Disturbance(disturbance) => disturbance,
+        let tested = format!("(significance {significance:.0}; limit {limit:.0})");
+        let mut figures = json!({ "significance": significance, "limit": limit });
+        let (kind, text) = match self.cause {
             Cause::Term(term) => {
                 let name = term.name();
+                figures["term"] = json!(name);
                 let text = format!(
-                    "The data show {name}: turncal estimates it, as with --with {name} (−2 ln p {significance:.0}; \
-                     limit {limit:.0}). The values are those beside it; apply it with them."
+                    "The data show an error that scale factors, misalignments and biases cannot explain: {name}. turncal \
+                     estimated it with them, as --with {name} does. Apply the values together with this term"
                 );
-                let figures = json!({
-                    "term": name, "significance": significance, "limit": limit
-                });
-                return Finding::new("error-term-estimated", text, figures);
+                ("error-term-estimated", text)
+            }
+            Cause::Disturbance(disturbance) => {
+                figures["dwell"] = json!(disturbance.dwell + 1);
+                figures["time_s"] = json!(time);
+                self.of_disturbance(disturbance)
             }
         };
+        Finding::new(kind, format!("{text} {tested}."), figures)
+    }
+
+    /// Kind and words of the finding of a disturbance.
+    fn of_disturbance(&self, disturbance: Disturbance) -> (&'static str, String) {
+        let time = self.time;
         let number = disturbance.dwell + 1;
         let seconds = self.value.norm() / ARCSEC;
         let angle = match seconds {
             ..1000.0 => format!("{seconds:.0}″"),
             _ => format!("{:.3}°", seconds / 3600.0),
         };
-        let (kind, text) = match disturbance.kind {
+        match disturbance.kind {
             DisturbanceKind::Position => {
                 let by = if seconds > 0.0 {
                     format!(" by {angle}")
@@ -372,17 +385,16 @@ impl FoundCause {
             }
             DisturbanceKind::Slip => {
                 let text = format!(
-                    "In the move before dwell {number} (at {time:.1} s) the sensor turned by {angle} that the gyros did \
-                     not measure. turncal estimated that angle. Look there for lost samples, an exceeded \
-                     range or a loose mount"
+                    "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
+                     estimated it. Look there for lost samples, an exceeded range or a loose mount"
                 );
                 ("move-wrong", text)
             }
             DisturbanceKind::EarthRate => {
                 let value = self.value / DEG_PER_H;
                 let text = format!(
-                    "Earth rate is {:+.4}, {:+.4}, {:+.4} °/h (East, North, Up) off that at latitude_deg. turncal \
-                     estimated it. Check latitude_deg, and north and level of the table",
+                    "The gyros sense an Earth rate that differs from the one at latitude_deg by {:+.4}, {:+.4}, {:+.4} °/h \
+                     (East, North, Up). turncal estimated it. Check latitude_deg, and the table's north and level",
                     value.x, value.y, value.z
                 );
                 ("earth-rate-wrong", text)
@@ -401,11 +413,6 @@ impl FoundCause {
                 );
                 ("bias-step", text)
             }
-        };
-        let text = format!("{text} (−2 ln p {significance:.0}; limit {limit:.0}).");
-        let figures = json!({
-            "dwell": number, "time_s": time, "significance": significance, "limit": limit
-        });
-        Finding::new(kind, text, figures)
+        }
     }
 }

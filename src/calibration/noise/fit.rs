@@ -148,24 +148,24 @@ impl Likelihood<'_> {
         };
         let of_before = |k: &usize| before.is_none_or(|before| before.sources.contains(k));
         let mut sources: Vec<usize> = present.into_iter().filter(of_before).collect();
-        let mut factors = self.settled(&start, &sources)?;
+        let (mut factors, mut deviance) = self.settled(&start, &sources)?;
         if before.is_none() {
             sources = self.called_for(&mut factors, &sources)?;
-            factors = self.settled(&factors, &sources)?;
+            (factors, deviance) = self.settled(&factors, &sources)?;
         }
         Ok(Fit {
             factors,
-            deviance: self.replay(&factors)?.deviance(),
+            deviance,
             sources,
         })
     }
 
     /// Those of these sources that the data call for, at the factors of largest posterior density; the others become
-    /// nothing.
+    /// what is stated, else nothing.
     ///
     /// A variance cannot be below zero, so fitting every source gives a small one to about half of those that are not
-    /// there, and their sum makes σ of the parameters too large. The least of those that nobody states goes first, then
-    /// the least of what the others make of it, in the quadratic model of the likelihood.
+    /// there, and their sum makes σ of the parameters too large. The least goes first, then the least of what the others
+    /// make of it, in the quadratic model of the likelihood.
     fn called_for(
         &self,
         factors: &mut Factors,
@@ -179,15 +179,27 @@ impl Likelihood<'_> {
         let Some(inverse) = information.cholesky().map(|root| root.inverse()) else {
             return Ok(left);
         };
-        // Variances, each in itself; 1σ of one is twice that of ln σ.
-        let mut values = DVector::<f64>::from_element(left.len(), 1.0);
+        // How far each variance is from what is stated, in itself; 1σ of one is twice that of ln σ.
+        let stated = |k: usize| self.scale.is_stated(k);
+        let mut values = DVector::from_fn(left.len(), |i, _| match stated(left[i]) {
+            true => at.0[left[i]].ln(),
+            false => 1.0,
+        });
         let mut covariance = inverse * 4.0;
-        let limit = limit(0, 1, NEEDLESS);
+        let limits = [limit(0, 1, NEEDLESS), limit(1, 0, NEEDLESS)];
         loop {
-            let ratio = |i: &usize| values[*i].max(0.0).powi(2) / covariance[(*i, *i)];
-            let unstated = (0..left.len()).filter(|&i| !self.scale.is_stated(left[i]));
-            let least = unstated.min_by(|i, j| ratio(i).total_cmp(&ratio(j)));
-            let Some(least) = least.filter(|least| ratio(least) < limit) else {
+            // Over its limit.
+            let part = |i: &usize| {
+                let stated = stated(left[*i]);
+                let value = if stated {
+                    values[*i]
+                } else {
+                    values[*i].max(0.0)
+                };
+                value.powi(2) / covariance[(*i, *i)] / limits[usize::from(stated)]
+            };
+            let least = (0..left.len()).min_by(|i, j| part(i).total_cmp(&part(j)));
+            let Some(least) = least.filter(|least| part(least) < 1.0) else {
                 return Ok(left);
             };
             let variance = covariance[(least, least)];
@@ -197,7 +209,8 @@ impl Likelihood<'_> {
             covariance -= &column * column.transpose() * variance;
             values = values.remove_row(least);
             covariance = covariance.remove_row(least).remove_column(least);
-            factors.0[left.remove(least)] = 0.0;
+            let source = left.remove(least);
+            factors.0[source] = if stated(source) { 1.0 } else { 0.0 };
         }
     }
 
@@ -211,20 +224,25 @@ impl Likelihood<'_> {
         beyond.count() > 0
     }
 
-    /// The factors of largest posterior density of these sources, the others held.
+    /// The factors of largest posterior density of these sources, the others held, and −2 ln of the likelihood there.
     ///
     /// A variance that is zero and would go below rests until the others have settled; then each is
     /// looked at once more.
-    fn settled(&self, start: &Factors, sources: &[usize]) -> Result<Factors, CalibrationError> {
+    fn settled(
+        &self,
+        start: &Factors,
+        sources: &[usize],
+    ) -> Result<(Factors, f64), CalibrationError> {
         let mut at = *start;
         let mut resting: Vec<usize> = Vec::new();
         let mut looked_again = false;
         let mut here = self.replay(start)?;
+        let mut deviance = here.deviance();
         for _ in 0..STEPS {
             let moving = sources.iter().filter(|k| !resting.contains(k));
             let moving: Vec<usize> = moving.copied().collect();
             let slope = self.slope_from(here, &at, &moving)?;
-            let cost = slope.here.deviance() + self.penalty(&at);
+            let cost = deviance + self.penalty(&at);
             let (gradient, information) = self.posterior(&slope, &at, &moving);
             let (free, rests): (Vec<usize>, Vec<usize>) =
                 (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || gradient[i] > 0.0);
@@ -250,8 +268,9 @@ impl Likelihood<'_> {
                 break;
             };
             (at, here) = there;
+            deviance = here.deviance();
         }
-        Ok(at)
+        Ok((at, deviance))
     }
 
     /// Score and information with those of the prior.

@@ -19,16 +19,19 @@ pub fn from_coarse_start<'a>(
     let may_be_learnt = problem.options.noise != NoisePolicy::Stated;
     let by_hand = start.by_hand.as_ref().filter(|_| may_be_learnt);
     let with_hand = by_hand.map(|by_hand| problem.with_model(by_hand.model(problem)));
+    let noise = by_hand.map(|by_hand| by_hand.report(problem));
     let problem = with_hand.as_ref().unwrap_or(problem);
     // What a hand leaves is not all that is unknown: noise that is estimated decides on outliers.
     let gate = by_hand.map_or(Gate::Innovations, |_| Gate::Open);
-    match solved(problem, &start, gate, progress) {
-        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
-        Ok(solved) if solved.iterated.converged => Ok(solved),
+    let mut solved = match solved(problem, &start, gate, progress) {
+        Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
+        Ok(solved) if solved.iterated.converged => solved,
         // Noise that is stated far too small leads a step out of all that is linear; the start shows how large it is.
-        _ if may_be_learnt => at_start(problem, &start),
-        astray => astray,
-    }
+        _ if may_be_learnt => at_start(problem, &start)?,
+        astray => astray?,
+    };
+    solved.noise = noise.unwrap_or(solved.noise);
+    Ok(solved)
 }
 
 fn solved<'a>(
