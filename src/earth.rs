@@ -3,6 +3,8 @@
 //! WGS-84 (NIMA TR8350.2, 3rd ed., tables 3.1 and 3.4): ellipsoid, rotation rate and normal gravity
 //! (Somigliana's closed form, continued in height by TR8350.2 Eq. 4-3).
 
+use std::f64::consts::FRAC_PI_4;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -105,13 +107,38 @@ pub struct Site {
     pub gravity: f64,
     /// Its 1σ in m/s². The scale factors of all three accelerometers share what it is wrong by.
     pub gravity_sigma: f64,
+    /// Whether the place is known; else Earth rotation is taken as zero with the σ of [`Site::earth_rate_sigma`].
+    #[serde(default = "known")]
+    pub is_known: bool,
+}
+
+fn known() -> bool {
+    true
 }
 
 /// 1σ by which gravity at a place departs from normal gravity, m/s²: 30 mGal. Free-air anomalies have an
 /// RMS of 30 to 40 mGal over the Earth (Torge, *Gravimetry*, §2.1).
 pub const ANOMALY_SIGMA: f64 = 30.0 * MILLIGAL;
 
+/// Mean gravity at the surface and its 1σ from place to place, m/s²: normal gravity is 9.780 at the equator and 9.832
+/// at the poles.
+const ANYWHERE: (f64, f64) = (9.806, 0.015);
+
 impl Site {
+    /// A site of which nothing is known but that it is on the Earth. What needs a latitude nevertheless has that of its
+    /// gravity.
+    pub fn unknown() -> Self {
+        let (gravity, gravity_sigma) = ANYWHERE;
+        Self {
+            latitude: FRAC_PI_4,
+            longitude: 0.0,
+            height: 0.0,
+            gravity,
+            gravity_sigma,
+            is_known: false,
+        }
+    }
+
     /// A site with normal gravity, known to within the usual anomaly.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
@@ -120,6 +147,7 @@ impl Site {
             height,
             gravity: normal_gravity(latitude, height),
             gravity_sigma: ANOMALY_SIGMA,
+            is_known: true,
         }
     }
 
@@ -137,9 +165,20 @@ impl Site {
         Vector3::new(0.0, 0.0, -self.gravity)
     }
 
-    /// Earth rotation `ω_ie` in East-North-Up, rad/s.
+    /// Earth rotation `ω_ie` in East-North-Up, rad/s; zero where the place is unknown.
     pub fn earth_rate_n(&self) -> Vector3<f64> {
-        earth_rate_n(self.latitude)
+        match self.is_known {
+            true => earth_rate_n(self.latitude),
+            false => Vector3::zeros(),
+        }
+    }
+
+    /// 1σ of each component of Earth rotation, rad/s: where the place is unknown, it may point anywhere.
+    pub fn earth_rate_sigma(&self) -> f64 {
+        match self.is_known {
+            true => 0.0,
+            false => ROTATION_RATE / 3f64.sqrt(),
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Both triads with the covariance of their parameters.
 
-use super::parameters::{ParameterMatrix, ParameterVector, to_vector};
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use super::parameters::{ParameterMatrix, ParameterVector, parameter, to_vector};
+use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
+use crate::run::Run;
 
 /// Both triads with the covariance of their parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,16 @@ impl Estimate {
     /// The installation form, one for both triads.
     pub fn form(&self) -> InstallationForm {
         self.triads.gyro.form
+    }
+
+    /// What the covariance gains where the length of the rows is not known: the same part of all gyro scale factors.
+    pub(in crate::calibration) fn by_period(&self, run: &Run) -> ParameterMatrix {
+        let scale = self.triads.gyro.scale * run.recording.imu.period_sigma;
+        let mut gained = ParameterMatrix::zeros();
+        let first = parameter(Sensor::Gyro, 0);
+        let mut of_scale = gained.fixed_view_mut::<3, 3>(first, first);
+        of_scale.copy_from(&(scale * scale.transpose()));
+        gained
     }
 
     /// Indices of the estimated parameters.

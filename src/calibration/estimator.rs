@@ -183,7 +183,7 @@ fn outcome(
         prior_sigma: as_stated.model.prior_sigma,
         prior_mean: model.prior_mean,
         attitude_sigma: match solved.priors.last() {
-            Some(prior) if prior.earth_rate_sigma > 0.0 => {
+            Some(prior) if prior.heading_is_unknown() => {
                 Vector3::new(attitude_sigma.x, attitude_sigma.y, UNKNOWN_HEADING)
             }
             _ => attitude_sigma,
@@ -215,6 +215,10 @@ fn outcome(
     }
     let growth = outcome.growth_by(BudgetSource::DwellScatter);
     outcome.set_part(BudgetSource::Rounding, rounding);
+    if problem.run().recording.imu.period_sigma > 0.0 {
+        let by_period = outcome.estimate.by_period(problem.run());
+        outcome.set_part(BudgetSource::Period, by_period);
+    }
     outcome.findings = checks::findings(as_stated, &outcome);
     outcome
         .findings

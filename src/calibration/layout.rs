@@ -48,7 +48,7 @@ pub const NAVIGATION: usize = 9;
 pub struct Layout {
     /// Whether gravity's error is a state.
     gravity: bool,
-    /// Whether level Earth rate is.
+    /// Whether Earth rate is.
     earth_rate: bool,
     /// Triad and axis of each bias that varies.
     varying: Vec<(Sensor, usize)>,
@@ -72,7 +72,7 @@ impl Layout {
         let gravity = model.gravity_sigma > 0.0;
         Self {
             gravity: gravity && !one_gravity,
-            earth_rate: model.aiding == Aiding::Velocity,
+            earth_rate: model.earth_rate,
             varying: triads
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
                 .collect(),
@@ -111,7 +111,7 @@ impl Layout {
         self.gravity.then_some(NAVIGATION)
     }
 
-    /// Level Earth rate, if it is a state.
+    /// Earth rate, if it is a state.
     pub fn earth_rate(&self) -> Option<usize> {
         self.earth_rate.then(|| self.earth_rate_begin())
     }
@@ -145,10 +145,9 @@ impl Layout {
         if let Some((_, sensor, _)) = varying.find(|&(varying, ..)| varying == state) {
             return BudgetSource::wander(sensor);
         }
-        let of_earth_rate = |first: usize| (first..first + 2).contains(&state);
         match state {
             VELOCITY..NAVIGATION => BudgetSource::Place,
-            _ if self.earth_rate().is_some_and(of_earth_rate) => BudgetSource::Headings,
+            _ if within(self.earth_rate()) => BudgetSource::Headings,
             _ if within(self.table_position()) => BudgetSource::TablePosition,
             _ if within(self.turn_at_rest()) => BudgetSource::RotationAtRest,
             _ if self.gravity() == Some(state) => BudgetSource::Gravity,
@@ -162,7 +161,7 @@ impl Layout {
     }
 
     fn varying_begin(&self) -> usize {
-        self.earth_rate_begin() + 2 * usize::from(self.earth_rate)
+        self.earth_rate_begin() + 3 * usize::from(self.earth_rate)
     }
 
     fn own_begin(&self) -> usize {
@@ -227,6 +226,6 @@ mod tests {
         assert_eq!(sizes(&level, Options::default()), (15, 26));
         // Three parameters fix the body frame.
         let velocity = Options::default().aiding(Aiding::Velocity);
-        assert_eq!(sizes(&run, velocity), (9 + 2 + 3 + 3, 21));
+        assert_eq!(sizes(&run, velocity), (9 + 3 + 3 + 3, 21));
     }
 }

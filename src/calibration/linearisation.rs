@@ -130,9 +130,9 @@ pub struct AttitudePrior {
     pub mean: Matrix3<f64>,
     /// 1σ about East, North and Up, rad; the last is that of the heading.
     pub sigma: Vector3<f64>,
-    /// 1σ of Earth rate along East and along North of this attitude, rad/s: where its heading is not known, the heading
-    /// is fixed and Earth rate may point anywhere. Zero where the heading is known.
-    pub earth_rate_sigma: f64,
+    /// 1σ of Earth rate along East, North and Up of this attitude, rad/s. Where its heading is not known, the heading is
+    /// fixed and Earth rate has any level direction; where the place is not known, any direction. Else zero.
+    pub earth_rate_sigma: Vector3<f64>,
 }
 
 /// 1σ of the initial attitude before anything is known of it but one reading, rad: that may be a wrong one.
@@ -152,15 +152,24 @@ const FIXED: f64 = 1e-6;
 pub const UNKNOWN_HEADING: f64 = PI / 1.732_050_807_568_877_2;
 
 impl AttitudePrior {
+    /// Whether the heading is fixed because nothing tells it.
+    pub fn heading_is_unknown(&self) -> bool {
+        self.sigma.z == FIXED
+    }
+
     /// From a reading of a table.
-    pub(in crate::calibration) fn of_reading(table: &TableAccuracy, mean: Matrix3<f64>) -> Self {
+    pub(in crate::calibration) fn of_reading(
+        table: &TableAccuracy,
+        mean: Matrix3<f64>,
+        site: &Site,
+    ) -> Self {
         // The one reading that gave it has all errors.
         let known = table.position_sigma.hypot(table.reading_sigma);
         let known = known.hypot(table.geometry.base.max());
         Self {
             mean,
             sigma: Vector3::repeat(READ_ATTITUDE.max(10.0 * known)),
-            earth_rate_sigma: 0.0,
+            earth_rate_sigma: Vector3::repeat(site.earth_rate_sigma()),
         }
     }
 
@@ -172,15 +181,17 @@ impl AttitudePrior {
         model: &Model,
         site: &Site,
     ) -> Self {
-        let level = LEVEL_SIGMAS * known_level(model, site.gravity);
+        let tilt = LEVEL_SIGMAS * known_level(model, site.gravity);
         let heading = (HEADING_SIGMAS * heading_sigma).max(HEADING);
+        let level = site.earth_rate_n().xy().norm() / SQRT_2;
         let (heading, earth_rate_sigma) = match heading > HIDDEN {
-            true => (FIXED, site.earth_rate_n().xy().norm() / SQRT_2),
-            false => (heading, 0.0),
+            _ if !site.is_known => (FIXED, Vector3::repeat(site.earth_rate_sigma())),
+            true => (FIXED, Vector3::new(level, level, 0.0)),
+            false => (heading, Vector3::zeros()),
         };
         Self {
             mean,
-            sigma: Vector3::new(level, level, heading),
+            sigma: Vector3::new(tilt, tilt, heading),
             earth_rate_sigma,
         }
     }
@@ -214,6 +225,8 @@ pub struct Start {
     pub velocity_sigma: f64,
     /// m
     pub position_sigma: f64,
-    /// Mean of the error of Earth rate along East and North, and 1σ of each, rad/s.
-    pub earth_rate: ([f64; 2], f64),
+    /// Mean of the error of Earth rate along East, North and Up, rad/s …
+    pub earth_rate: Vector3<f64>,
+    /// … and 1σ of each.
+    pub earth_rate_sigma: Vector3<f64>,
 }

@@ -109,7 +109,7 @@ impl Outcome {
         let Some(prior) = self.prior_attitudes.last() else {
             return false;
         };
-        if prior.earth_rate_sigma > 0.0 {
+        if prior.heading_is_unknown() {
             return false;
         }
         let of_run = information(&self.attitude_sigma) - information(&prior.sigma);

@@ -83,6 +83,7 @@ impl<'a> Problem<'a> {
         others.push(run);
         let mut model = self.model.clone();
         model.gravity_sigma = model.gravity_sigma.max(run.site.gravity_sigma);
+        model.earth_rate |= !run.site.is_known;
         all.extend(stretches(run, others.len(), &self.model));
         Self {
             others,
@@ -392,7 +393,11 @@ impl<'a> Stretch<'a> {
     /// What the table says of the attitude at its first sample, where it says anything.
     pub fn attitude_of_table(&self) -> Option<AttitudePrior> {
         let reading = first_reading(self.table, &self.dwells)?;
-        Some(AttitudePrior::of_reading(&self.run.table, reading))
+        Some(AttitudePrior::of_reading(
+            &self.run.table,
+            reading,
+            &self.run.site,
+        ))
     }
 
     /// From where this one ends to where another of the same recording begins, s.
@@ -416,14 +421,15 @@ impl<'a> Stretch<'a> {
             attitude_sigma: prior.sigma,
             velocity_sigma: self.velocity_sigma(),
             position_sigma: self.run.standstill.position_sigma,
-            earth_rate: match prior.earth_rate_sigma {
-                0.0 => ([0.0; 2], 0.0),
-                // It may point anywhere, whatever was taken for it.
-                sigma => {
-                    let taken = self.run.site.earth_rate_n();
-                    ([-taken.x, -taken.y], sigma)
-                }
-            },
+            // Where it may point anywhere its mean is zero, whatever was taken for it.
+            earth_rate: -self.run.site.earth_rate_n().zip_map(
+                &prior.earth_rate_sigma,
+                |taken, sigma| match sigma > 0.0 {
+                    true => taken,
+                    false => 0.0,
+                },
+            ),
+            earth_rate_sigma: prior.earth_rate_sigma,
         }
     }
 }

@@ -247,6 +247,12 @@ impl<'a> Field<'a> {
             .unwrap_or("a value")
     }
 
+    /// Whether it is a table with this field.
+    pub fn has(&self, name: &str) -> bool {
+        let table = self.value.get_ref().as_table();
+        table.is_some_and(|table| table.get(name).is_some())
+    }
+
     /// Whether it is a table with fields of its own.
     pub fn is_table(&self) -> bool {
         self.value.get_ref().is_table()

@@ -325,6 +325,7 @@ impl ImuLog<'_> {
             of_axes.get_mut(sensor(k))[layout.body_axes[k]] = facts;
         }
         ImuSamples {
+            period_sigma: 0.0,
             stretches: stretches_between(
                 samples,
                 clock.first + (ahead - lag) * period,

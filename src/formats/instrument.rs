@@ -17,8 +17,18 @@ use crate::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
     TermVector,
 };
-use crate::units::{ARCSEC, PPM};
+use crate::units::{ARCSEC, DEGREE, PPM};
 
+/// 1σ of the scale factors, misalignments and biases of a sensor of which nothing is stated: usual of consumer MEMS.
+pub(super) const USUAL_SCALE: f64 = 50_000.0 * PPM;
+pub(super) const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
+/// rad/s and m/s².
+pub(super) const USUAL_BIAS: PerSensor<f64> = PerSensor {
+    gyro: 2.0 * DEGREE,
+    accel: 1.0,
+};
+/// The period of rows of which none is known, until their motion shows it, s.
+pub(super) const USUAL_PERIOD: f64 = 0.01;
 /// 1σ of a scale factor of which nothing is known, of the scale factor.
 const WIDEST_SCALE: f64 = 10.0;
 /// 1σ of a bias beyond the range of any instrument, rad/s or m/s².
@@ -54,6 +64,8 @@ const KEYS: [&str; 20] = [
 pub(super) struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
+    /// Whether neither run.toml nor a time column tells how long a row lasts.
+    pub without_period: bool,
 }
 
 impl<'a> InstrumentFields<'a> {
@@ -78,7 +90,11 @@ impl<'a> InstrumentFields<'a> {
         let accel_from = accel_from(&fields, directory, &source, clock)?;
         check_instance(&fields, accel_from.is_some(), instance)?;
         clock.breaks = allowed_breaks(top, accel_from.is_some());
-        check_time(top, &columns, clock)?;
+        let without_period = clock.column.is_none() && clock.period.is_none();
+        if without_period {
+            check_without_period(top, &columns, output)?;
+            clock.period = Some(USUAL_PERIOD);
+        }
         let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
 
         let mut known = knowledge(&fields, output, axes, notes)?;
@@ -113,7 +129,11 @@ impl<'a> InstrumentFields<'a> {
             },
         };
         known.term_sigma = term_sigma(&fields)?;
-        Ok(Self { log, known })
+        Ok(Self {
+            log,
+            known,
+            without_period,
+        })
     }
 }
 
@@ -124,14 +144,17 @@ fn knowledge(
     axes: BodyAxes,
     notes: &mut Vec<String>,
 ) -> Result<Instrument, FileError> {
-    let priors = imu.need_table(
-        "prior",
-        &["gyro", "accel"],
-        "what is known of the instrument before calibration",
-    )?;
-    let gyro = triad(imu, &priors, Sensor::Gyro, output, axes)?;
-    let accel = triad(imu, &priors, Sensor::Accel, output, axes)?;
+    let priors = imu.table("prior", &["gyro", "accel"])?;
+    let priors = priors.as_ref();
+    let gyro = triad(imu, priors, Sensor::Gyro, (output, axes), notes)?;
+    let accel = triad(imu, priors, Sensor::Accel, (output, axes), notes)?;
     let (noise, motion_noise) = noise(imu, notes)?;
+    let noise_is_stated = |sensor| {
+        let noise = imu
+            .get("noise")
+            .map(|noise| noise.has(NoiseKeys::of(sensor).random_walk.0));
+        noise.unwrap_or(false)
+    };
     Ok(Instrument {
         nominal: PerSensor {
             gyro: gyro.nominal,
@@ -146,6 +169,7 @@ fn knowledge(
             accel: accel.prior,
         },
         noise,
+        noise_is_stated: PerSensor::from_fn(noise_is_stated),
         motion_noise,
         term_sigma: TermVector::zeros(),
     })
@@ -201,17 +225,16 @@ fn allowed_breaks(top: &Fields, has_accel_from: bool) -> Breaks {
     }
 }
 
-/// Rows may lack a time only where a period is given and no table must be put beside them.
-fn check_time(top: &Fields, columns: &Fields, clock: Clock) -> Result<(), FileError> {
-    let follow = clock.period.is_some() && top.get("turntable").is_none();
-    if clock.column.is_none() && !follow {
-        return Err(columns.missing(
+/// How long a row lasts can only be found of rates that stand alone.
+fn check_without_period(top: &Fields, columns: &Fields, output: Output) -> Result<(), FileError> {
+    match output == Output::Rate && top.get("turntable").is_none() {
+        true => Ok(()),
+        false => Err(columns.missing(
             "time",
-            "the name of a column; rows may follow one another without it if sample_period_s is \
-             given and there is no [turntable]",
-        ));
+            "the name of a column; rows of pulses or increments, or rows beside a [turntable], need it, or else \
+             sample_period_s",
+        )),
     }
-    Ok(())
 }
 
 /// 1σ of the parameters of the terms that `[imu.terms]` switches on.
@@ -234,13 +257,16 @@ fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
     Ok(sigma)
 }
 
+/// Noise of both triads at rest and in moves; zero where it is not stated.
 fn noise(
     imu: &Fields,
     notes: &mut Vec<String>,
 ) -> Result<(PerSensor<Noise>, PerSensor<MotionNoise>), FileError> {
     let keys = Sensor::ALL.map(NoiseKeys::of);
     let known = keys.map(NoiseKeys::names);
-    let fields = imu.need_table("noise", known.as_flattened(), "the noise of the instrument")?;
+    let Some(fields) = imu.table("noise", known.as_flattened())? else {
+        return Ok((PerSensor::default(), PerSensor::default()));
+    };
     let mut triad = |keys: NoiseKeys| {
         let ((walk, walk_unit), (sigma, sigma_unit)) = (keys.random_walk, keys.gauss_markov);
         let former = fields
@@ -265,19 +291,19 @@ fn noise(
                 return Err(fields.missing(sigma, "the 1σ of the Gauss–Markov bias"));
             }
         };
-        let of_moves = |name: &str| match fields.get(name) {
+        let or_zero = |name: &str| match fields.get(name) {
             Some(field) => field.not_negative(),
             None => Ok(0.0),
         };
         let (by_duration, unit) = keys.by_duration;
         Ok((
             Noise {
-                random_walk: fields.need(walk, "a random walk")?.not_negative()? * walk_unit,
+                random_walk: or_zero(walk)? * walk_unit,
                 gauss_markov,
             },
             MotionNoise {
-                by_motion: of_moves(keys.by_motion)?,
-                by_duration: of_moves(by_duration)? * unit,
+                by_motion: or_zero(keys.by_motion)?,
+                by_duration: or_zero(by_duration)? * unit,
             },
         ))
     };
@@ -300,25 +326,24 @@ struct TriadKnowledge {
 
 fn triad(
     imu: &Fields,
-    priors: &Fields,
+    priors: Option<&Fields>,
     sensor: Sensor,
-    output: Output,
-    axes: BodyAxes,
+    (output, axes): (Output, BodyAxes),
+    notes: &mut Vec<String>,
 ) -> Result<TriadKnowledge, FileError> {
     let unit = imu.need(&format!("{}_unit", sensor.name()), "the unit of a row")?;
     let unit_scale = unit.choice(units(sensor, output))?;
-    let fields = priors.need_table(
-        sensor.name(),
-        &[
-            "scale",
-            "scale_sigma_ppm",
-            "installation_sigma_arcsec",
-            "bias",
-            "bias_sigma",
-        ],
-        "what is known of this triad before calibration; no σ is invented",
-    )?;
-    let nominal = match (fields.get("scale"), unit_scale) {
+    let names = [
+        "scale",
+        "scale_sigma_ppm",
+        "installation_sigma_arcsec",
+        "bias",
+        "bias_sigma",
+    ];
+    let fields = priors.map(|priors| priors.table(sensor.name(), &names));
+    let fields = fields.transpose()?.flatten();
+    let get = |name| fields.as_ref().and_then(|fields| fields.get(name));
+    let nominal = match (get("scale"), unit_scale) {
         (Some(field), unit_scale) => {
             let scale = field.triple()?;
             check_scale(&field, scale, unit_scale)?;
@@ -326,30 +351,65 @@ fn triad(
         }
         (None, Some(unit_scale)) => Vector3::repeat(unit_scale),
         (None, None) => {
-            return Err(fields.missing(
-                "scale",
-                "counts per second for one rad/s or m/s², for a count has no size of its own",
-            ));
+            let meaning =
+                "counts per second for one rad/s or m/s², for a count has no size of its own";
+            let name = format!("prior.{}.scale", sensor.name());
+            return Err(match &fields {
+                Some(fields) => fields.missing("scale", meaning),
+                None => imu.missing(&name, meaning),
+            });
         }
     };
-    let sigma = |name, most: f64| -> Result<Vector3<f64>, FileError> {
-        let field = fields.need(name, "the 1σ before calibration; none is invented")?;
-        field.positive_triple_to(most)
-    };
-    let bias = match fields.get("bias") {
+    let mut assumed = Vec::new();
+    let mut sigma =
+        |name, most: f64, (usual, unit): (Vector3<f64>, f64), words: &str| match get(name) {
+            Some(field) => field.positive_triple_to(most),
+            None => {
+                assumed.push(words.to_owned());
+                Ok(usual / unit)
+            }
+        };
+    let bias = match get("bias") {
         Some(field) => field.triple()?,
         None => Vector3::zeros(),
     };
+    let usual_bias = *USUAL_BIAS.get(sensor);
+    let scale_sigma = sigma(
+        "scale_sigma_ppm",
+        WIDEST_SCALE / PPM,
+        (Vector3::repeat(USUAL_SCALE), PPM),
+        "scale factor ± 5 %",
+    )?;
+    let installation_sigma = sigma(
+        "installation_sigma_arcsec",
+        HALF_TURN,
+        (Vector3::repeat(USUAL_INSTALLATION), ARCSEC),
+        "misalignment ± 2°",
+    )?;
+    let bias_sigma = sigma(
+        "bias_sigma",
+        WIDEST_BIAS * nominal.amax(),
+        (nominal.abs() * usual_bias, 1.0),
+        match sensor {
+            Sensor::Gyro => "bias ± 2 °/s",
+            Sensor::Accel => "bias ± 1 m/s²",
+        },
+    )?;
+    if !assumed.is_empty() {
+        let name = sensor.name();
+        notes.push(format!(
+            "run.toml does not state everything in [imu.prior.{name}]. turncal assumed (1σ): {}.",
+            assumed.join(", ")
+        ));
+    }
     Ok(TriadKnowledge {
         unit: unit.text()?.to_owned(),
         nominal: Nominal(axes.each(nominal)),
         prior: Prior {
-            scale_sigma: axes.each(sigma("scale_sigma_ppm", WIDEST_SCALE / PPM)?) * PPM,
-            installation_sigma: axes.each(sigma("installation_sigma_arcsec", HALF_TURN)?) * ARCSEC,
+            scale_sigma: axes.each(scale_sigma) * PPM,
+            installation_sigma: axes.each(installation_sigma) * ARCSEC,
             bias: axes.vector(bias.component_div(&nominal)),
-            bias_sigma: axes.each(
-                sigma("bias_sigma", WIDEST_BIAS * nominal.amax())?.component_div(&nominal.abs()),
-            ),
+            bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
         },
     })
 }

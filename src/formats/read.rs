@@ -3,14 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::error::FileError;
+use super::draft::motion::Motion;
+use super::error::{FileError, Place};
 use super::fields::{Document, Fields};
 use super::instrument::InstrumentFields;
 use super::segments;
 use super::small_file;
 use super::table_log::TableLogFile;
 use crate::earth::Site;
-use crate::imu::{Output, Sensor};
+use crate::imu::{NoiseKeys, Output, PerSensor, Sensor};
+use crate::noise;
 use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
 use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
@@ -46,7 +48,7 @@ impl Run {
     ///
     /// Everything is checked: every field is known, every number finite and possible, time uniform,
     /// the files overlap. Samples, nominal scales and priors come back along right-front-up
-    /// whatever `body_axes` says. A bias without a prior mean has the mean zero; no σ has a default.
+    /// whatever `body_axes` says. What is not stated of place, noise, period and prior is wide, with a note that says so.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = text_of(path)?;
         let document = Document {
@@ -60,7 +62,7 @@ impl Run {
         let directory = path.parent().unwrap_or(Path::new(""));
         let mut notes = Vec::new();
 
-        let site = site(&top)?;
+        let site = site(&top, &mut notes)?;
         let meta = meta(&top)?;
         let instrument = InstrumentFields::of_fields(&top, directory, &mut notes)?;
         let standstill = standstill(&top)?;
@@ -72,9 +74,19 @@ impl Run {
         files.extend(other_file(&instrument));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
-        let imu = instrument.log.read(&mut notes)?;
+        let mut imu = instrument.log.read(&mut notes)?;
+        if instrument.without_period {
+            imu = with_found_period(imu, &instrument, &mut notes)?;
+        }
         notes.extend(faults::notes(&imu));
         notes.extend(clock_note(&imu, &instrument));
+        let mut known = instrument.known;
+        let without_noise = |sensor: &Sensor| !known.noise_is_stated.get(*sensor);
+        for sensor in Sensor::ALL.into_iter().filter(without_noise) {
+            let random_walk = noise::white_noise(&imu, sensor);
+            known.noise.get_mut(sensor).random_walk = random_walk;
+            notes.push(noise_note(sensor, random_walk));
+        }
         let accuracy = table_log.as_ref().map(|log| log.accuracy);
         let table = table_log
             .map(|log| log.read(&imu, &mut notes))
@@ -96,7 +108,7 @@ impl Run {
                 files,
                 notes,
             },
-            instrument: instrument.known,
+            instrument: known,
             site,
             table: accuracy.unwrap_or_default(),
             standstill,
@@ -135,6 +147,40 @@ fn other_file(instrument: &InstrumentFields) -> Option<PathBuf> {
 fn text_of(path: &Path) -> Result<String, FileError> {
     let advice = "Give the path of a run.toml.";
     small_file::text(path).map_err(|error| FileError::io(path, "read the run", &error, advice))
+}
+
+/// Rates of which nothing tells how long a row lasts, with the period at which they turn the instrument as gravity's
+/// direction turns.
+fn with_found_period(
+    imu: ImuSamples,
+    instrument: &InstrumentFields,
+    notes: &mut Vec<String>,
+) -> Result<ImuSamples, FileError> {
+    let rates = |sensor| {
+        imu.of(sensor)
+            .iter()
+            .map(|sample| sample / imu.period)
+            .collect()
+    };
+    let motion = Motion::find(&PerSensor::from_fn(rates), &[], imu.period);
+    let Some(period) = motion.angle.filter(|&period| period > 0.0) else {
+        return Err(FileError::new(
+            &instrument.log.source.file,
+            Place::File,
+            "rows without a time, whose turns do not show how long a row lasts",
+            "a time column, or sample_period_s in run.toml",
+            "Add sample_period_s to [imu].",
+        ));
+    };
+    // The scale factors of the gyros are taken to be right on average.
+    let sigma = instrument.known.prior.gyro.scale_sigma.norm() / 3.0;
+    notes.push(format!(
+        "run.toml does not state sample_period_s, and the log has no time. turncal found {:.4} s ± {:.1} % from the turns, \
+         which widens the σ of the gyro scale factors as much.",
+        period,
+        100.0 * sigma
+    ));
+    Ok(imu.with_period(period, sigma))
 }
 
 /// What it means that stamps were taken and not `sample_period_s`.
@@ -180,37 +226,68 @@ pub(super) fn name(path: &Path) -> String {
     )
 }
 
-fn site(top: &Fields) -> Result<Site, FileError> {
-    let fields = top.need_table(
-        "site",
-        &[
-            "latitude_deg",
-            "longitude_deg",
-            "height_m",
-            "gravity_m_s2",
-            "gravity_sigma_mgal",
-        ],
-        "the place of the turntable",
-    )?;
-    let latitude = fields
-        .need("latitude_deg", "a latitude, north positive")?
-        .within(-90.0, 90.0)?
-        * DEGREE;
-    let longitude = match fields.get("longitude_deg") {
-        Some(field) => field.within(-180.0, 360.0)? * DEGREE,
-        None => 0.0,
+/// That white noise is not stated, and what is taken for it.
+fn noise_note(sensor: Sensor, random_walk: f64) -> String {
+    let (key, unit) = NoiseKeys::of(sensor).random_walk;
+    format!(
+        "run.toml does not state {key}. turncal starts with {:.3}, which the quieter half of the record shows, and \
+         estimates the noise from there.",
+        random_walk / unit
+    )
+}
+
+/// 1σ of a height that is not stated, m.
+const USUAL_HEIGHT: f64 = 500.0;
+/// How much gravity falls with height, (m/s²)/m.
+const FREE_AIR: f64 = 0.3086 * MILLIGAL;
+
+fn site(top: &Fields, notes: &mut Vec<String>) -> Result<Site, FileError> {
+    let known = [
+        "latitude_deg",
+        "longitude_deg",
+        "height_m",
+        "gravity_m_s2",
+        "gravity_sigma_mgal",
+    ];
+    let fields = top.table("site", &known)?;
+    let get = |name| fields.as_ref().and_then(|fields| fields.get(name));
+    let degrees = |name, low, high| -> Result<Option<f64>, FileError> {
+        let field = get(name).map(|field| field.within(low, high));
+        Ok(field.transpose()?.map(|degrees| degrees * DEGREE))
     };
+    let latitude = degrees("latitude_deg", -90.0, 90.0)?;
+    let longitude = degrees("longitude_deg", -180.0, 360.0)?.unwrap_or(0.0);
     // From the shore of the Dead Sea to above any laboratory.
-    let height = fields
-        .need("height_m", "a height above the ellipsoid")?
-        .within(-500.0, 9000.0)?;
-    let mut site = Site::with_normal_gravity(latitude, longitude, height);
-    if let Some(field) = fields.get("gravity_m_s2") {
+    let height = get("height_m").map(|field| field.within(-500.0, 9000.0));
+    let height = height.transpose()?;
+    let mut site = match latitude {
+        Some(latitude) => Site::with_normal_gravity(latitude, longitude, height.unwrap_or(0.0)),
+        None => Site::unknown(),
+    };
+    if height.is_none() {
+        site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
+    }
+    let gravity = get("gravity_m_s2");
+    if let Some(field) = &gravity {
         let gravity = field.within(9.7, 9.9)?;
         site = site.with_gravity(gravity, stated_gravity_sigma(&field.as_written()?));
     }
-    if let Some(field) = fields.get("gravity_sigma_mgal") {
+    if let Some(field) = get("gravity_sigma_mgal") {
         site.gravity_sigma = field.within(0.0, 1e5)? * MILLIGAL;
+    }
+    if latitude.is_none() {
+        notes.push(
+            "run.toml does not state latitude_deg in [site]. turncal estimates Earth rate as an unknown vector, which \
+             widens the σ of the gyro biases."
+                .to_owned(),
+        );
+    }
+    if gravity.is_none() && (latitude.is_none() || height.is_none()) {
+        notes.push(format!(
+            "run.toml does not state the place in [site]. turncal assumed a gravity of {:.4} ± {:.4} m/s², which widens \
+             the σ of the accelerometer scale factors by as much. State latitude_deg and height_m, or gravity_m_s2.",
+            site.gravity, site.gravity_sigma
+        ));
     }
     Ok(site)
 }

@@ -258,20 +258,23 @@ position_sigma_deg = {:?}
 /// The format of the file and `[site]`.
 fn site_text(run: &Run) -> String {
     let site = &run.site;
+    let place = match site.is_known {
+        true => format!(
+            "latitude_deg = {:?}\nlongitude_deg = {:?}\nheight_m = {:?}\n",
+            short(site.latitude / DEGREE),
+            short(site.longitude / DEGREE),
+            site.height,
+        ),
+        false => String::new(),
+    };
     format!(
         r#"format = "{FORMAT}"
 
 # the place of the turntable
 [site]
-latitude_deg = {latitude:?}
-longitude_deg = {longitude:?}
-height_m = {height:?}
-gravity_m_s2 = {gravity:?}
+{place}gravity_m_s2 = {gravity:?}
 gravity_sigma_mgal = {gravity_sigma:?}
 "#,
-        latitude = short(site.latitude / DEGREE),
-        longitude = short(site.longitude / DEGREE),
-        height = site.height,
         gravity = site.gravity,
         gravity_sigma = short(site.gravity_sigma / MILLIGAL),
     )

@@ -17,6 +17,8 @@ pub struct Instrument {
     pub prior: PerSensor<Prior>,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
+    /// Whether white noise is stated; else it is what the quieter half of the record shows.
+    pub noise_is_stated: PerSensor<bool>,
     /// What moves add to it.
     pub motion_noise: PerSensor<MotionNoise>,
     /// 1σ of each parameter of the error terms before calibration, around zero; zero where a term is
@@ -35,6 +37,7 @@ impl Instrument {
             },
             prior,
             noise,
+            noise_is_stated: PerSensor::from_fn(|_| true),
             motion_noise: PerSensor::default(),
             term_sigma: TermVector::zeros(),
         }

@@ -13,6 +13,7 @@ pub mod conventions;
 mod fit;
 mod identify;
 mod process;
+mod quiet;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -24,4 +25,5 @@ pub use at_rest::RestNoise;
 pub use clusters::Clusters;
 pub use identify::{Found, Hidden, Identified, of_kind};
 pub use process::Process;
+pub use quiet::white_noise;
 pub use triad::{AxisNoise, NoiseFigures, TriadNoise};

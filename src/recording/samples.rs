@@ -11,8 +11,10 @@ use crate::imu::{PerSensor, Sensor};
 /// The samples of both triads, at one period, in one stretch or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuSamples {
-    /// Length of every sample, s.
+    /// Length of every sample, s …
     pub period: f64,
+    /// … and its 1σ, as a part of it; zero where a clock tells it.
+    pub period_sigma: f64,
     /// Stretches in which each sample begins where the one before ended, in order; at least one. Between
     /// two there is at least one sample, and what lies there is lost.
     pub stretches: Vec<Stretch>,
@@ -123,6 +125,25 @@ impl ImuSamples {
         Ok(Self::made(start, period, gyro, accel))
     }
 
+    /// The same of rates with another period, of which this 1σ is known, as a part of it.
+    pub(crate) fn with_period(mut self, period: f64, sigma: f64) -> Self {
+        let longer = period / self.period;
+        for triad in [&mut self.gyro, &mut self.accel] {
+            triad
+                .to_mut()
+                .iter_mut()
+                .for_each(|sample| *sample *= longer);
+        }
+        for stretch in &mut self.stretches {
+            stretch.start *= longer;
+        }
+        Self {
+            period,
+            period_sigma: sigma,
+            ..self
+        }
+    }
+
     /// The same of samples that are made, and so are what they should be.
     pub(crate) fn made(
         start: f64,
@@ -133,6 +154,7 @@ impl ImuSamples {
         let (gyro, accel) = (gyro.into(), accel.into());
         Self {
             period,
+            period_sigma: 0.0,
             stretches: vec![Stretch {
                 samples: 0..gyro.len(),
                 start,

@@ -228,7 +228,7 @@ fn outcome(
         prior_attitudes: vec![AttitudePrior {
             mean: Matrix3::identity(),
             sigma: Vector3::repeat(60.0 * ARCSEC),
-            earth_rate_sigma: 0.0,
+            earth_rate_sigma: Vector3::zeros(),
         }],
         attitude_sigma: Vector3::repeat(ARCSEC),
         observability: observability(),

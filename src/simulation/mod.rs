@@ -272,6 +272,7 @@ impl Scenario {
             unit: PerSensor::from_fn(|sensor| unit(sensor).to_owned()),
             prior: PerSensor::from_fn(|sensor| self.instrument.prior(sensor, &self.installation)),
             noise: self.instrument.noise,
+            noise_is_stated: PerSensor::from_fn(|_| true),
             motion_noise: PerSensor::default(),
             term_sigma: self.instrument.term_sigma,
         }

@@ -45,4 +45,5 @@ mod table1;
 mod terms;
 mod threads;
 mod two_clocks;
+mod unstated;
 mod velocity;

@@ -64,6 +64,8 @@ pub enum BudgetSource {
     DwellScatter,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
+    /// Length of the rows where nothing tells it.
+    Period,
     /// What error terms do that the data show and that are not estimated.
     ErrorTermsLeftOff,
     /// What biases do that may vary though the noise learnt from the record does not hold that.
@@ -135,6 +137,7 @@ impl BudgetSource {
             Self::Headings => "unknown heading",
             Self::DwellScatter => "scatter of dwells",
             Self::Rounding => "rounding of rates",
+            Self::Period => "sample period",
             Self::ErrorTermsLeftOff => "error terms that show and are left off",
             Self::UnseenVariation => "biases that may vary unseen",
         };

@@ -42,7 +42,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     };
     notes
         .chain(unexplained::not_converged(outcome))
-        .chain(noise_learnt::of_report(&outcome.noise))
+        .chain(noise_learnt::of_report(problem, &outcome.noise))
         .chain(rest_scatter::scatter_at_rest(problem, &estimate.triads))
         .chain(rounding::rounded(problem, &rounding, &estimate.covariance))
         .chain(prior_distance::far_from_prior(&problem.model, estimate))

@@ -4,15 +4,25 @@ use serde_json::json;
 
 use super::finding::Finding;
 use crate::calibration::noise::{NoiseReport, SourceFigures};
+use crate::calibration::problem::Problem;
 
 /// The finding of a report of noise that was learnt because the data contradict what is stated.
-pub fn of_report(noise: &NoiseReport) -> Option<Finding> {
+pub fn of_report(problem: &Problem, noise: &NoiseReport) -> Option<Finding> {
     let test = noise.test.filter(|test| noise.learnt && test.rejected)?;
-    Some(noise_learnt(test.ratio, test.limit, &noise.sources))
+    noise_learnt(problem, (test.ratio, test.limit), &noise.sources)
 }
 
 /// Noise that was learnt: −2 ln of the likelihood ratio of stated to learnt noise, its limit, and the sources.
-pub fn noise_learnt(ratio: f64, limit: f64, sources: &[SourceFigures]) -> Finding {
+/// None where none was stated.
+pub fn noise_learnt(
+    problem: &Problem,
+    (ratio, limit): (f64, f64),
+    sources: &[SourceFigures],
+) -> Option<Finding> {
+    let stated = problem.run().instrument.noise_is_stated;
+    if !(stated.gyro || stated.accel) {
+        return None;
+    }
     let used = sources.iter().filter(|figures| figures.counts());
     let used: Vec<String> = used.map(SourceFigures::to_string).collect();
     let text = format!(
@@ -22,5 +32,5 @@ pub fn noise_learnt(ratio: f64, limit: f64, sources: &[SourceFigures]) -> Findin
         used.join("; ")
     );
     let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources });
-    Finding::new("noise-learnt", text, figures)
+    Some(Finding::new("noise-learnt", text, figures))
 }

@@ -24,7 +24,8 @@ const PULSES: f64 = 2.0;
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));
-    let found = each.filter_map(|(recording, run, sensor)| {
+    let stated = each.filter(|(_, run, sensor)| *run.instrument.noise_is_stated.get(*sensor));
+    let found = stated.filter_map(|(recording, run, sensor)| {
         let stretches = problem.stretches().iter();
         let of_run = stretches.filter(|stretch| stretch.recording == recording);
         let correction = calibrated.get(sensor).correction()?;

@@ -111,8 +111,10 @@ impl Filter {
         }
         self.redraw_table(table_sigma);
         if let Some(first) = self.layout.earth_rate() {
-            let (mean, sigma) = start.earth_rate;
-            (0..2).for_each(|axis| self.redraw(first + axis, mean[axis], sigma));
+            for axis in 0..3 {
+                let (mean, sigma) = (start.earth_rate[axis], start.earth_rate_sigma[axis]);
+                self.redraw(first + axis, mean, sigma);
+            }
         }
         if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
             self.redraw(state, 0.0, sigma);

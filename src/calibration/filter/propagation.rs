@@ -106,7 +106,7 @@ impl Filter {
         let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
         let gravity = layout.gravity().map(|_| Constant::Gravity);
         let gravity = gravity.map(|gravity| self.effect(block, gravity));
-        let earth_rate = layout.earth_rate().into_iter().flat_map(|_| 0..2);
+        let earth_rate = layout.earth_rate().into_iter().flat_map(|_| 0..3);
         let earth_rate = earth_rate.map(|axis| of_earth_rate(block, axis));
         // A bias does the same whether it varies or stays.
         let varying = layout.varying_biases().map(|(_, sensor, constant)| {

@@ -125,8 +125,8 @@ impl ByHand {
     }
 
     /// What it is told with.
-    pub fn finding(&self, report: &NoiseReport) -> Finding {
-        noise_learnt(self.ratio, Self::limit(), &report.sources)
+    pub fn finding(&self, problem: &Problem, report: &NoiseReport) -> Option<Finding> {
+        noise_learnt(problem, (self.ratio, Self::limit()), &report.sources)
     }
 
     /// What became of the noise of a problem with it.

@@ -120,6 +120,7 @@ pub fn six_position_by(
     estimate.covariance += rounding;
     findings.extend(rounded(problem, &rounding, &estimate.covariance));
     share_gravity(estimate, &problem.run().site);
+    estimate.covariance += estimate.by_period(problem.run());
     Ok(closed_form)
 }
 
@@ -236,7 +237,7 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
         .as_ref()
         .map(|by_hand| by_hand.report(problem));
     let learnt = found.by_hand.zip(noise.as_ref());
-    let learnt = learnt.map(|(by_hand, report)| by_hand.finding(report));
+    let learnt = learnt.and_then(|(by_hand, report)| by_hand.finding(problem, report));
     let far = far_by_data(model, &estimate, &found.distance);
     let hidden = hidden(model, &estimate, Reference::Gravity);
     let findings = far.into_iter().chain(hidden).chain(learnt);

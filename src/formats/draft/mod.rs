@@ -6,7 +6,7 @@ mod columns;
 mod data_sheet;
 mod gravity;
 mod least_squares;
-mod motion;
+pub(super) mod motion;
 mod name;
 mod noise;
 mod priors;
@@ -26,6 +26,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use crate::formats::instrument::USUAL_PERIOD;
 use crate::formats::source::Source;
 use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
@@ -39,8 +40,6 @@ use units::Quantities;
 
 /// Fewer rows than a run may have show nothing.
 const FEWEST_ROWS: usize = 100;
-/// The period taken where none is known, only to look for rests and turns, s.
-const USUAL_PERIOD: f64 = 0.01;
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,8 +8,9 @@ use nalgebra::Vector3;
 use super::Draft;
 use super::text::{line, seven, todo};
 use super::units::short;
+use crate::formats::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
 use crate::imu::Sensor;
-use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ};
+use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// Knowledge before calibration that is usual in a class of instruments, 1σ.
 struct Class {
@@ -52,10 +53,10 @@ const CLASSES: [Class; 3] = [
         name: "a MEMS",
         angle_random_walk: f64::INFINITY,
         velocity_random_walk: f64::INFINITY,
-        scale_ppm: 50_000.0,
-        installation: 7_200.0 * ARCSEC,
-        gyro_bias: 2.0 * DEGREE,
-        accel_bias: 1.0,
+        scale_ppm: USUAL_SCALE / PPM,
+        installation: USUAL_INSTALLATION,
+        gyro_bias: USUAL_BIAS.gyro,
+        accel_bias: USUAL_BIAS.accel,
     },
 ];
 

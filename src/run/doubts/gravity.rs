@@ -11,7 +11,7 @@ pub fn anomaly(run: &Run) -> Option<String> {
     let off = site.gravity - normal_gravity(site.latitude, site.height);
     let sigma = ANOMALY_SIGMA.hypot(site.gravity_sigma);
     let limit = chi_square_limit(1.0, FALSE_ALARM).sqrt() * sigma;
-    (off.abs() > limit).then(|| {
+    (site.is_known && off.abs() > limit).then(|| {
         format!(
             "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {:.4}°, height {:.0} m; 999 of 1000 \
              places are within {:.0} mGal of it. Accelerometer scale factors follow gravity. Check gravity_m_s2, latitude and height.",

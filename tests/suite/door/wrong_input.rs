@@ -165,7 +165,6 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "standstil & mean `standstill`",
         ),
         ("serial", "seriel", "[meta] & mean `serial`"),
-        ("latitude_deg = 34.0", "", "[site] & latitude_deg & Add"),
         (
             "34.0",
             "91.0",
@@ -191,11 +190,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "imu.columns.gyro & three",
         ),
         ("= 0.001", "= -0.001", "angle_random_walk & zero or"),
-        (
-            "bias_sigma = 10.0",
-            "",
-            "[imu.prior.gyro] & bias_sigma & Add",
-        ),
+        ("scale = 2000000.0", "", "[imu.prior.gyro] & scale & Add"),
         (
             "bias_sigma = 10.0",
             "bias_sigma = -1.0",
@@ -398,11 +393,7 @@ fn each_wrong_file_has_its_message() {
             "single reading & at least 2",
         ),
         ("run.toml", "", "no `format`"),
-        (
-            "run.toml",
-            "format = \"turncal-run/1\"",
-            "no [site] & latitude_deg",
-        ),
+        ("run.toml", "format = \"turncal-run/1\"", "no [imu] & file"),
     ] {
         let directory = tempfile::tempdir().unwrap();
         good_run(directory.path());

@@ -45,7 +45,8 @@ const START: Start = Start {
     attitude_sigma: Vector3::new(3e-4, 3e-4, 3e-4),
     velocity_sigma: 1e-3,
     position_sigma: 1.0,
-    earth_rate: ([0.0; 2], 0.0),
+    earth_rate: Vector3::new(0.0, 0.0, 0.0),
+    earth_rate_sigma: Vector3::new(0.0, 0.0, 0.0),
 };
 
 const ANEW: Since = Since::Anew(
@@ -311,7 +312,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         let prior = AttitudePrior {
             mean: Matrix3::identity(),
             sigma: Vector3::new(4e-3, 4e-3, 0.3),
-            earth_rate_sigma: 0.0,
+            earth_rate_sigma: Vector3::zeros(),
         };
         let (mut filter, mut known) = begun(model);
         let start = stretch.start(&prior, &Matrix3::identity());

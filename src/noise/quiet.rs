@@ -1,0 +1,51 @@
+//! White noise of a record of which nothing is stated.
+
+use crate::imu::Sensor;
+use crate::recording::ImuSamples;
+use crate::statistics::SIGMA_OF_MEDIAN;
+
+/// Length of the sums that are compared, s: long enough that whole pulses do not show.
+const SUM: f64 = 0.25;
+
+/// Random walk of a triad, rad/√s or (m/s)/√s, as the quieter half of a record shows it: by second differences of sums,
+/// which neither a bias nor its drift changes.
+pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
+    let length = ((SUM / imu.period).round() as usize).max(1);
+    let mut differences = Vec::new();
+    for stretch in &imu.stretches {
+        let sums: Vec<_> = imu
+            .of(sensor)
+            .sums(stretch.samples.clone(), length)
+            .collect();
+        for three in sums.windows(3) {
+            let second = three[0] - three[1] * 2.0 + three[2];
+            differences.extend(second.iter().map(|component| component.abs()));
+        }
+    }
+    let quarter = differences.len() / 4;
+    if quarter == 0 {
+        return 0.0;
+    }
+    // If half of them are at rest, the first quarter of all ends at the median of these.
+    let (_, at_rest, _) = differences.select_nth_unstable_by(quarter, f64::total_cmp);
+    SIGMA_OF_MEDIAN * *at_rest / (6.0 * length as f64 * imu.period).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Scenario;
+
+    #[test]
+    fn the_white_noise_of_a_simulated_record_is_found_within_a_third() {
+        let run = Scenario::load("mems").unwrap().simulate(1, 0).unwrap().run;
+        for sensor in Sensor::ALL {
+            let stated = run.instrument.noise.get(sensor).random_walk;
+            let found = white_noise(&run.recording.imu, sensor);
+            assert!(
+                (found / stated).ln().abs() < 0.3,
+                "{sensor:?}: {found} {stated}"
+            );
+        }
+    }
+}

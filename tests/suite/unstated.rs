@@ -1,0 +1,73 @@
+//! What `run.toml` does not state: place, noise, sample period, prior.
+
+use std::fs;
+use std::path::Path;
+
+use turncal::calibration::{Estimate, Options, Problem, UNWATCHED, estimate};
+use turncal::imu::Sensor;
+use turncal::run::Run;
+
+use crate::shared::{read, shared};
+
+/// A copy of a run without these tables and fields of `run.toml`.
+fn without(directory: &Path, dropped: &[&str]) -> Run {
+    let place = tempfile::tempdir().unwrap();
+    for entry in fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            fs::copy(&path, place.path().join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    let text = fs::read_to_string(directory.join("run.toml")).unwrap();
+    let mut table = "";
+    let mut kept = String::new();
+    for line in text.lines() {
+        if let Some(name) = line.strip_prefix('[') {
+            table = name.trim_end_matches(']');
+        }
+        let field = line.split('=').next().unwrap_or_default().trim();
+        if !dropped.contains(&table) && !dropped.contains(&field) {
+            kept += &format!("{line}\n");
+        }
+    }
+    fs::write(place.path().join("run.toml"), kept).unwrap();
+    read(place.path())
+}
+
+fn calibrated(run: &Run) -> Estimate {
+    let outcome = estimate(&Problem::new(run, &Options::default()), UNWATCHED).unwrap();
+    assert!(outcome.is_usable());
+    outcome.estimate
+}
+
+#[test]
+fn gyros_are_within_one_sigma_of_those_with_place_noise_and_period_stated() {
+    for name in ["real-mems-lot-0", "real-mems-six-position"] {
+        let Some(directory) = shared(name) else {
+            return;
+        };
+        let stated = calibrated(&read(&directory));
+        let dropped = ["site", "imu.noise", "sample_period_s"];
+        let unstated = calibrated(&without(&directory, &dropped));
+        let off = (unstated.vector() - stated.vector()).component_div(&unstated.sigma());
+        for k in unstated.estimated().filter(|&k| k < 12) {
+            assert!(off[k].abs() < 1.0, "{name} {k}: {}", off[k]);
+        }
+    }
+}
+
+#[test]
+fn sigma_say_what_an_unknown_place_costs() {
+    let Some(directory) = shared("three-axis-counts") else {
+        return;
+    };
+    let stated = calibrated(&read(&directory));
+    let unstated = calibrated(&without(&directory, &["site"]));
+    let part = |estimate: &Estimate, k: usize| estimate.sigma()[k] / estimate.vector()[k].abs();
+    let scale = 12;
+    assert_eq!(turncal::calibration::parameter(Sensor::Accel, 0), scale);
+    // Gravity is 9.806 ± 0.015 m/s² all over the Earth.
+    assert!((part(&unstated, scale) / (0.015 / 9.806) - 1.0).abs() < 0.05);
+    let off = (unstated.vector() - stated.vector()).component_div(&unstated.sigma());
+    assert!(off.amax() < 3.0, "{off}");
+}
