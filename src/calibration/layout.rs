@@ -72,7 +72,7 @@ impl Layout {
         let gravity = model.gravity_sigma > 0.0;
         Self {
             gravity: gravity && !one_gravity,
-            earth_rate: model.earth_rate,
+            earth_rate: model.aiding == Aiding::Velocity,
             varying: triads
                 .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
                 .collect(),

@@ -158,18 +158,14 @@ impl AttitudePrior {
     }
 
     /// From a reading of a table.
-    pub(in crate::calibration) fn of_reading(
-        table: &TableAccuracy,
-        mean: Matrix3<f64>,
-        site: &Site,
-    ) -> Self {
+    pub(in crate::calibration) fn of_reading(table: &TableAccuracy, mean: Matrix3<f64>) -> Self {
         // The one reading that gave it has all errors.
         let known = table.position_sigma.hypot(table.reading_sigma);
         let known = known.hypot(table.geometry.base.max());
         Self {
             mean,
             sigma: Vector3::repeat(READ_ATTITUDE.max(10.0 * known)),
-            earth_rate_sigma: Vector3::repeat(site.earth_rate_sigma()),
+            earth_rate_sigma: Vector3::zeros(),
         }
     }
 

@@ -63,8 +63,6 @@ pub struct Model {
     pub day_to_day: DayToDay,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
     pub gravity_sigma: f64,
-    /// Whether Earth rate is a state: no table's log tells the heading, or the place is not known.
-    pub earth_rate: bool,
     /// 1σ per axis of the table's position error, rad; zero without a table.
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
@@ -100,7 +98,6 @@ impl Model {
             thermal: None,
             day_to_day: DayToDay::default(),
             gravity_sigma: run.site.gravity_sigma,
-            earth_rate: aiding == Aiding::Velocity || !run.site.is_known,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
             geometry: accuracy.geometry,

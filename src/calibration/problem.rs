@@ -83,7 +83,6 @@ impl<'a> Problem<'a> {
         others.push(run);
         let mut model = self.model.clone();
         model.gravity_sigma = model.gravity_sigma.max(run.site.gravity_sigma);
-        model.earth_rate |= !run.site.is_known;
         all.extend(stretches(run, others.len(), &self.model));
         Self {
             others,
@@ -393,11 +392,7 @@ impl<'a> Stretch<'a> {
     /// What the table says of the attitude at its first sample, where it says anything.
     pub fn attitude_of_table(&self) -> Option<AttitudePrior> {
         let reading = first_reading(self.table, &self.dwells)?;
-        Some(AttitudePrior::of_reading(
-            &self.run.table,
-            reading,
-            &self.run.site,
-        ))
+        Some(AttitudePrior::of_reading(&self.run.table, reading))
     }
 
     /// From where this one ends to where another of the same recording begins, s.

@@ -5,11 +5,10 @@ use std::path::PathBuf;
 use anyhow::Context;
 use turncal::noise::{NoiseAnalysis, Stretch};
 use turncal::report::allan;
-use turncal::run::Run;
 
-use super::input::run_file;
 use super::output::Delivery;
 use super::progress::Activity;
+use super::source::{OfLog, run_or_log};
 
 /// Allan deviation of a stationary record, and the noise figures that it shows
 ///
@@ -20,13 +19,16 @@ use super::progress::Activity;
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a page and figures")))]
 #[command(after_help = "Examples:
+  turncal allan imu.csv
   turncal allan run.toml
   turncal allan run.toml --segment z_up -o noise
   turncal allan run.toml --json")]
 pub struct Allan {
-    /// The run's run.toml; its [imu.noise] may be rough
-    #[arg(value_name = "RUN.toml", value_parser = run_file)]
+    /// The run's run.toml, or a log, or - for rows of text on standard input
+    #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
+    #[command(flatten)]
+    of_log: OfLog,
     /// Take the segment of this label; the longest, if there are several
     #[arg(long, value_name = "LABEL")]
     segment: Option<String>,
@@ -37,7 +39,7 @@ pub struct Allan {
 impl Allan {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
-        let run = Run::read(&self.run)?;
+        let run = self.of_log.open(&self.run)?.run;
         drop(activity);
         let stretch = Stretch::find(&run, self.segment.as_deref())
             .with_context(|| self.run.display().to_string())?;

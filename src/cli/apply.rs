@@ -12,9 +12,9 @@ use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::units::PPM;
 
-use super::input::run_file;
 use super::output::{keep, stream};
 use super::progress::Activity;
+use super::source::{OfLog, run_or_log};
 
 /// A scale factor this many of the run's σ off is hardly one of its instrument.
 const SUSPECT_SIGMAS: f64 = 10.0;
@@ -33,9 +33,11 @@ pub struct Apply {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
-    /// The run's run.toml
-    #[arg(value_name = "RUN.toml", value_parser = run_file)]
+    /// The run's run.toml, or a log, or - for rows of text on standard input
+    #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
+    #[command(flatten)]
+    of_log: OfLog,
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -58,7 +60,7 @@ impl Apply {
         }
         let record = Calibration::read(&self.calibration)?;
         let activity = Activity::new(format!("reading {}", self.run.display()));
-        let run = Run::read(&self.run)?;
+        let run = self.of_log.open(&self.run)?.run;
         let correction = Correction::for_run(&record, &run)
             .with_context(|| format!("{}, {}", self.calibration.display(), self.run.display()))?;
         activity.next("writing");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
 use turncal::calibration::{self, AtRest, Problem, Solution, Together};
-use turncal::formats::Campaign;
+use turncal::formats::{Campaign, Opened};
 use turncal::report;
 use turncal::report::terminal::printable;
 use turncal::run::Run;
@@ -14,10 +14,11 @@ use turncal::study::Shard;
 
 use super::calibrated::{Calibrated, read_truth, write_report};
 use super::estimation::{Estimation, Method};
-use super::input::{run_file, shard};
+use super::input::shard;
 use super::lot;
 use super::output::{Overwrite, print, show};
 use super::progress::Activity;
+use super::source::{OfLog, run_or_log};
 
 /// Highest order of the polynomials of outputs at rest.
 const HIGHEST_ORDER_AT_REST: usize = 5;
@@ -38,6 +39,7 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
 /// command fails after all is written. Begun again, it goes on with what is missing or has changed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
+  turncal calibrate imu.csv --latitude 48.1 --height 520
   turncal calibrate my-run/run.toml
   turncal calibrate my-run/run.toml -o mine --truth my-run/truth.json
   turncal calibrate my-run/run.toml --method six-position
@@ -49,9 +51,12 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
       --specification specification.toml
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
-    /// The run's run.toml; several are the units of a lot; a campaign.toml names recordings of one instrument
-    #[arg(required = true, value_name = "RUN.toml", value_parser = run_file)]
+    /// The run's run.toml, or a log, or - for rows of text on standard input; several are the units of a lot; a
+    /// campaign.toml names recordings of one instrument
+    #[arg(required = true, value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     runs: Vec<PathBuf>,
+    #[command(flatten)]
+    of_log: OfLog,
     /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method,
     /// lot-calibration for a lot; nothing with --json]
     #[arg(short, long, value_name = "DIR")]
@@ -100,6 +105,7 @@ impl Calibrate {
         let directory = Some(Path::new(lot::DIRECTORY)).filter(|_| !self.json);
         let request = lot::Request {
             runs: &self.runs,
+            of_log: &self.of_log,
             estimation: &self.estimation,
             specification: self.specification.as_deref(),
             shard: self.shard,
@@ -112,27 +118,34 @@ impl Calibrate {
 
     fn one(&self, path: &Path) -> anyhow::Result<()> {
         let activity = Activity::new(format!("reading {}", path.display()));
-        let run = Run::read(path)?;
+        let opened = self.of_log.open(path)?;
+        let run = &opened.run;
         let problem = match self.temperature {
             true => {
                 let together = Together::default();
-                let problem = self.estimation.together(&[&run], &together);
+                let problem = self.estimation.together(&[run], &together);
                 let problem = problem.inspect_err(|_| say(&run.recording.notes))?;
                 // Without a turn, only what is at rest against temperature can be had.
                 if problem.dwells().nth(1).is_none()
-                    && let Some(at_rest) = AtRest::new(&run, HIGHEST_ORDER_AT_REST)
+                    && let Some(at_rest) = AtRest::new(run, HIGHEST_ORDER_AT_REST)
                 {
-                    return self.at_rest(&at_rest, &run, path);
+                    return self.at_rest(&at_rest, &opened, path);
                 }
                 problem
             }
-            false => self.estimation.problem(&run, path)?,
+            false => self.estimation.problem(run, path)?,
         };
-        self.solved(&problem, &run.recording.name, path, activity)
+        self.solved(
+            &problem,
+            &run.recording.name,
+            (path, Some(&opened)),
+            activity,
+        )
     }
 
     /// Outputs of an instrument that stands against its temperature.
-    fn at_rest(&self, at_rest: &AtRest, run: &Run, path: &Path) -> anyhow::Result<()> {
+    fn at_rest(&self, at_rest: &AtRest, opened: &Opened, path: &Path) -> anyhow::Result<()> {
+        let run = &opened.run;
         let calibration = at_rest.record(run);
         let document = report::at_rest::document(at_rest, run, &calibration);
         let target = self.target(|| format!("{}-calibration", run.recording.name));
@@ -140,6 +153,7 @@ impl Calibrate {
             let directory = self.overwrite.directory(target, &[path])?;
             calibration.write(&directory.path().join("calibration.json"), false)?;
             write_report(&document, &directory.path().join("report"))?;
+            opened.write_run(&directory.path())?;
             directory.commit()?;
         }
         match self.json {
@@ -159,7 +173,7 @@ impl Calibrate {
             runs.iter().for_each(|run| say(&run.recording.notes));
         });
         let problem = problem.with_context(|| path.display().to_string())?;
-        self.solved(&problem, &campaign.name, path, activity)
+        self.solved(&problem, &campaign.name, (path, None), activity)
     }
 
     /// The directory to write, if any; by default of this name.
@@ -173,7 +187,7 @@ impl Calibrate {
         &self,
         problem: &Problem,
         name: &str,
-        path: &Path,
+        (path, opened): (&Path, Option<&Opened>),
         activity: Activity,
     ) -> anyhow::Result<()> {
         let run = problem.run();
@@ -209,6 +223,7 @@ impl Calibrate {
         if let (Some(directory), Some(document)) = (directory, &document) {
             calibration.write(&directory.path().join("calibration.json"), false)?;
             write_report(document, &directory.path().join("report"))?;
+            opened.map_or(Ok(()), |opened| opened.write_run(&directory.path()))?;
             directory.commit()?;
         }
         drop(activity);

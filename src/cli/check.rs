@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use turncal::report::check;
-use turncal::run::Run;
 use turncal::survey::Survey;
 
-use super::input::run_file;
 use super::output::Delivery;
 use super::progress::Activity;
+use super::source::{OfLog, run_or_log};
 
 /// Says what a run holds, and what each method could observe of the instrument
 ///
@@ -18,13 +17,16 @@ use super::progress::Activity;
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a page and a figure of the record")))]
 #[command(after_help = "Examples:
+  turncal check imu.csv
   turncal check run.toml
   turncal check run.toml -o check
   turncal check run.toml --json")]
 pub struct Check {
-    /// The run's run.toml
-    #[arg(value_name = "RUN.toml", value_parser = run_file)]
+    /// The run's run.toml, or a log, or - for rows of text on standard input
+    #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
+    #[command(flatten)]
+    of_log: OfLog,
     #[command(flatten)]
     delivery: Delivery,
 }
@@ -32,7 +34,7 @@ pub struct Check {
 impl Check {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
-        let run = Run::read(&self.run)?;
+        let run = self.of_log.open(&self.run)?.run;
         let begun = self.delivery.begin(&[&self.run])?;
         activity.next("looking at the run");
         let survey = Survey::of(&run);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use turncal::formats::draft::Draft;
+use turncal::formats::draft::{Draft, Stated};
 
 use super::output::Overwrite;
 use super::progress::Activity;
@@ -36,7 +36,7 @@ impl Convert {
     pub fn run(&self) -> anyhow::Result<()> {
         let directory = self.overwrite.directory(&self.output, &[&self.log])?;
         let activity = Activity::new("reading");
-        let draft = Draft::of_stream(&self.log, self.stream.as_deref())?;
+        let draft = Draft::of_stream(&self.log, self.stream.as_deref(), &Stated::default())?;
         activity.next("writing");
         draft.convert(&self.log, &directory.path(), self.salvage)?;
         directory.commit()?;

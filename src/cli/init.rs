@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::draft::Draft;
+use turncal::formats::draft::{Draft, Stated};
 use turncal::formats::write_whole;
 
 use super::output::{keep, print};
@@ -43,7 +43,7 @@ impl Init {
         let activity = Activity::new("reading");
         let draft = match &self.accel {
             Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel))?,
-            None => Draft::of_stream(&self.log, self.stream.as_deref())?,
+            None => Draft::of_stream(&self.log, self.stream.as_deref(), &Stated::default())?,
         };
         drop(activity);
         let text = draft.to_toml(&self.name(&self.log));

@@ -19,6 +19,7 @@ use super::calibrated::{Calibrated, write_report};
 use super::estimation::Estimation;
 use super::output::show;
 use super::progress::Runs;
+use super::source::OfLog;
 use super::threads::piece_by_piece;
 
 /// Written where no directory is named.
@@ -27,6 +28,7 @@ pub const DIRECTORY: &str = "lot-calibration";
 /// What is asked of a lot.
 pub struct Request<'a> {
     pub runs: &'a [PathBuf],
+    pub of_log: &'a OfLog,
     pub estimation: &'a Estimation,
     pub specification: Option<&'a Path>,
     pub shard: Option<Shard>,
@@ -39,11 +41,11 @@ impl Request<'_> {
     pub fn run(&self) -> anyhow::Result<()> {
         let names = unit_names(self.runs)?;
         let specification = self.specification.map(Specification::read).transpose()?;
-        let mut job = Job::new(
-            JobKind::Lot,
-            self.estimation.in_words(),
-            self.runs.len() as u64,
-        );
+        let mut words = self.estimation.in_words();
+        if *self.of_log != OfLog::default() {
+            words["of_log"] = format!("{:?}", self.of_log).into();
+        }
+        let mut job = Job::new(JobKind::Lot, words, self.runs.len() as u64);
         job.names.clone_from(&names);
         job.specification.clone_from(&specification);
         let part = Part::new(job, self.shard);
@@ -131,7 +133,7 @@ impl Request<'_> {
     }
 
     fn calibrated(&self, path: &Path) -> anyhow::Result<(Meta, lot::Calibrated, Document)> {
-        let run = Run::read(path)?;
+        let run = self.of_log.open(path)?.run;
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
         let mut solution = problem.solve(method.into(), UNWATCHED)?;

@@ -28,6 +28,7 @@ mod progress;
 mod sharding;
 mod signals;
 mod simulate;
+mod source;
 mod study;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! What tells one input from another: SHA-256 of bytes and of files.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -69,7 +70,11 @@ fn digests_of_run(run: &Path) -> Vec<(String, String)> {
         let digest = digest_of_file(&path).unwrap_or_else(|error| error.kind().to_string());
         (name, digest)
     };
-    let mut all = vec![digest("run.toml".to_owned(), run.to_owned())];
+    let name = match run.extension() == Some(OsStr::new("toml")) {
+        true => "run.toml".into(),
+        false => run.file_name().unwrap_or_default().to_string_lossy(),
+    };
+    let mut all = vec![digest(name.into_owned(), run.to_owned())];
     let text = small_file::text(run).unwrap_or_default();
     let Ok(table) = DeTable::parse(&text) else {
         return all;

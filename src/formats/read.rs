@@ -50,11 +50,16 @@ impl Run {
     /// the files overlap. Samples, nominal scales and priors come back along right-front-up
     /// whatever `body_axes` says. What is not stated of place, noise, period and prior is wide, with a note that says so.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = text_of(path)?;
-        let document = Document {
-            file: path,
-            text: &text,
-        };
+        Self::of_text(path, &text_of(path)?, Some(path))
+    }
+
+    /// The same of the text of a `run.toml` that stands, or would stand, beside this file, and was read from `source`.
+    pub(super) fn of_text(
+        path: &Path,
+        text: &str,
+        source: Option<&Path>,
+    ) -> Result<Self, FileError> {
+        let document = Document { file: path, text };
         let table = document.parse()?;
         let top = Fields::top(document, &table, &TABLES)?;
         top.need("format", "the format of this file")?
@@ -70,7 +75,8 @@ impl Run {
         let (segments_file, segment_sigma) = labels(&top, directory)?.unzip();
 
         // The small files' fields are checked before the large files are read.
-        let mut files = vec![path.to_owned(), instrument.log.source.file.clone()];
+        let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
+        files.push(instrument.log.source.file.clone());
         files.extend(other_file(&instrument));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
@@ -230,7 +236,7 @@ pub(super) fn name(path: &Path) -> String {
 fn noise_note(sensor: Sensor, random_walk: f64) -> String {
     let (key, unit) = NoiseKeys::of(sensor).random_walk;
     format!(
-        "run.toml does not state {key}. turncal starts with {:.3}, which the quieter half of the record shows, and \
+        "run.toml does not state {key}. turncal starts with {:.3}, which the quieter part of the record shows, and \
          estimates the noise from there.",
         random_walk / unit
     )
@@ -256,6 +262,13 @@ fn site(top: &Fields, notes: &mut Vec<String>) -> Result<Site, FileError> {
         Ok(field.transpose()?.map(|degrees| degrees * DEGREE))
     };
     let latitude = degrees("latitude_deg", -90.0, 90.0)?;
+    if latitude.is_none() && top.get("turntable").is_some() {
+        let meaning = "a latitude, north positive: beside a [turntable] Earth rate must be known";
+        return Err(match &fields {
+            Some(fields) => fields.missing("latitude_deg", meaning),
+            None => top.missing("site.latitude_deg", meaning),
+        });
+    }
     let longitude = degrees("longitude_deg", -180.0, 360.0)?.unwrap_or(0.0);
     // From the shore of the Dead Sea to above any laboratory.
     let height = get("height_m").map(|field| field.within(-500.0, 9000.0));

@@ -17,7 +17,7 @@ pub struct Instrument {
     pub prior: PerSensor<Prior>,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
-    /// Whether white noise is stated; else it is what the quieter half of the record shows.
+    /// Whether white noise is stated; else it is what the quieter part of the record shows.
     pub noise_is_stated: PerSensor<bool>,
     /// What moves add to it.
     pub motion_noise: PerSensor<MotionNoise>,

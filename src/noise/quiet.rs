@@ -2,12 +2,14 @@
 
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;
-use crate::statistics::SIGMA_OF_MEDIAN;
 
 /// Length of the sums that are compared, s: long enough that whole pulses do not show.
 const SUM: f64 = 0.25;
+/// A third of normal deviates is below this, σ: if three quarters of a record are at rest, the first quarter of all is the
+/// first third of these. If half of it or all of it is, the noise is 1.6 or 0.74 times what it should be.
+const FIRST_THIRD: f64 = 0.430_727;
 
-/// Random walk of a triad, rad/√s or (m/s)/√s, as the quieter half of a record shows it: by second differences of sums,
+/// Random walk of a triad, rad/√s or (m/s)/√s, as the quieter part of a record shows it: by second differences of sums,
 /// which neither a bias nor its drift changes.
 pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     let length = ((SUM / imu.period).round() as usize).max(1);
@@ -26,9 +28,8 @@ pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     if quarter == 0 {
         return 0.0;
     }
-    // If half of them are at rest, the first quarter of all ends at the median of these.
     let (_, at_rest, _) = differences.select_nth_unstable_by(quarter, f64::total_cmp);
-    SIGMA_OF_MEDIAN * *at_rest / (6.0 * length as f64 * imu.period).sqrt()
+    *at_rest / FIRST_THIRD / (6.0 * length as f64 * imu.period).sqrt()
 }
 
 #[cfg(test)]
@@ -37,13 +38,13 @@ mod tests {
     use crate::simulation::Scenario;
 
     #[test]
-    fn the_white_noise_of_a_simulated_record_is_found_within_a_third() {
+    fn the_white_noise_of_a_simulated_record_is_found_within_a_factor_of_two() {
         let run = Scenario::load("mems").unwrap().simulate(1, 0).unwrap().run;
         for sensor in Sensor::ALL {
             let stated = run.instrument.noise.get(sensor).random_walk;
             let found = white_noise(&run.recording.imu, sensor);
             assert!(
-                (found / stated).ln().abs() < 0.3,
+                (found / stated).ln().abs() < 0.5,
                 "{sensor:?}: {found} {stated}"
             );
         }

@@ -4,6 +4,7 @@
 mod axes;
 mod columns;
 mod data_sheet;
+mod found;
 mod gravity;
 mod least_squares;
 pub(super) mod motion;
@@ -12,6 +13,7 @@ mod noise;
 mod priors;
 mod registers;
 mod rests;
+mod stated;
 mod streams;
 mod text;
 mod time;
@@ -32,8 +34,10 @@ use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::NoiseFigures;
 use columns::Columns;
+pub use found::{Certainty, Found, OpenQuestion};
 use motion::Motion;
 use registers::Registers;
+pub use stated::Stated;
 use streams::{Streams, Written};
 use time::Clock;
 use units::Quantities;
@@ -65,6 +69,8 @@ pub struct Draft {
     cuts: usize,
     /// The rows that were looked at where the log has more.
     only: Option<usize>,
+    /// What its user states.
+    stated: Stated,
 }
 
 impl Draft {
@@ -73,25 +79,32 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if it cannot be read or has hardly any rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
-        Self::of_stream(path, None)
+        Self::of_stream(path, None, &Stated::default())
     }
 
-    /// The same of one stream of a log of several.
+    /// The same of one stream of a log of several, and with what is stated of it.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read or has hardly any rows.
-    pub fn of_stream(path: &Path, stream: Option<&str>) -> Result<Self, FileError> {
-        match Streams::of_file(path, stream)? {
-            Some((streams, sheet)) => Ok(Self::of_sheet(sheet, Some(streams))),
+    pub fn of_stream(
+        path: &Path,
+        stream: Option<&str>,
+        stated: &Stated,
+    ) -> Result<Self, FileError> {
+        let (streams, sheet) = match Streams::of_file(path, stream)? {
+            Some((streams, sheet)) => (Some(streams), sheet),
             None => {
                 let sheet = Sheet::read(path, FEWEST_ROWS)?;
-                if columns::have_rows_of_their_own(&sheet) {
-                    let (streams, sheet) = Streams::of_two_files(path, path, None)?;
-                    return Ok(Self::of_sheet(sheet, Some(streams)));
+                match columns::have_rows_of_their_own(&sheet) {
+                    true => {
+                        let (streams, sheet) = Streams::of_two_files(path, path, None)?;
+                        (Some(streams), sheet)
+                    }
+                    false => (None, sheet),
                 }
-                Ok(Self::of_sheet(sheet, None))
             }
-        }
+        };
+        Ok(Self::of_sheet(sheet, streams, stated))
     }
 
     /// Looks at two files of rows, of gyros and of accelerometers; how the latter is to be called in the draft.
@@ -100,7 +113,7 @@ impl Draft {
     /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
     pub fn of_two_files(gyro: &Path, accel: &Path, accel_name: &str) -> Result<Self, FileError> {
         let (streams, sheet) = Streams::of_two_files(gyro, accel, Some(accel_name))?;
-        Ok(Self::of_sheet(sheet, Some(streams)))
+        Ok(Self::of_sheet(sheet, Some(streams), &Stated::default()))
     }
 
     /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory
@@ -135,7 +148,8 @@ impl Draft {
         std::fs::write(&path, self.to_toml(GYRO_FILE)).map_err(|error| unwritten(&path, &error))
     }
 
-    fn of_sheet(mut sheet: Sheet, streams: Option<Streams>) -> Self {
+    fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {
+        sheet.rate = stated.rate_hz.or(sheet.rate);
         let rows = sheet.columns.first().map_or(0, Vec::len);
         let only = sheet.goes_on.then_some(rows);
         let instance = match streams {
@@ -179,6 +193,7 @@ impl Draft {
                 registers = Some(found);
             }
         }
+        quantities.state(stated);
         let at_rest = triads.as_ref().zip(motion.as_ref());
         let noise = at_rest
             .and_then(|(triads, motion)| noise_at_rest(triads, motion, &quantities, clock.period))
@@ -199,6 +214,7 @@ impl Draft {
             offset,
             noise,
             only,
+            stated: stated.clone(),
         }
     }
 }

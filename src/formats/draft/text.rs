@@ -17,15 +17,10 @@ impl Draft {
             None => "the log alone".to_owned(),
         };
         let mut text = format!(
-            "# A draft made from {of_it}. Complete each TODO and check the rest; `turncal check` then says what the \
-             run holds.\n"
+            "# Made from {of_it}. Check what is guessed and complete what is open; `turncal check` then says what the run \
+             holds.\nformat = \"turncal-run/1\"\n"
         );
-        text += "format = \"turncal-run/1\"\n\n\
-                        # the place of the instrument\n\
-                        [site]\n\
-                        # latitude_deg =  # TODO: north positive; to 0.1° it is good enough\n\
-                        # height_m =      # TODO: above the ellipsoid\n\
-                        # gravity_m_s2 =  # if it was measured; else normal gravity is taken\n";
+        self.stated.site(&mut text);
         // Writing to a string cannot fail.
         let _ = write!(text, "\n[imu]\nfile = {}\n", quoted(file));
         if let Some(streams) = &self.streams {
@@ -134,12 +129,21 @@ impl Draft {
                     seven(period)
                 );
             }
+            None if self.rows_show_period() => {}
             None => todo(
                 text,
                 "sample_period_s",
                 "s from row to row, which a counter does not tell",
             ),
         }
+    }
+
+    /// Whether rows without a time show how long they last: rates, whose sums are angles.
+    fn rows_show_period(&self) -> bool {
+        let gyro = &self.quantities.units.gyro;
+        self.columns.time.is_none()
+            && self.quantities.output == Output::Rate
+            && gyro.word.is_some_and(|word| word != "count")
     }
 
     fn body_axes(&self, text: &mut String) {
@@ -256,6 +260,14 @@ impl Draft {
                 let _ = writeln!(text, "# {}: rows follow one another.", self.clock.why);
                 None
             }
+            (None, _) if self.rows_show_period() => {
+                let why = &self.clock.why;
+                let _ = writeln!(
+                    text,
+                    "# {why}: the period of the rows is found from the turns, unless sample_period_s states it."
+                );
+                None
+            }
             (None, _) => {
                 let why = &self.clock.why;
                 let _ = writeln!(
@@ -294,7 +306,10 @@ impl Draft {
             let keys = NoiseKeys::of(sensor);
             let (key, unit) = keys.random_walk;
             let Some((figures, scale)) = self.figures(sensor) else {
-                todo(text, key, "the data sheet's figure");
+                let _ = writeln!(
+                    text,
+                    "# {key} =  # the data sheet's figure; without it, that of the quieter part of the record"
+                );
                 continue;
             };
             let walk = format!("{:?}", short(figures.noise.random_walk / scale / unit));

@@ -7,8 +7,10 @@ use super::data_sheet::{Scale, likely_for_g};
 use super::motion::Motion;
 use super::name::{self, Name};
 use super::registers::Registers;
+use super::stated::Stated;
 use super::time::{Clock, PERIODS};
 use crate::formats::Sheet;
+use crate::formats::quantity::{OUTPUTS, units};
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 
@@ -24,6 +26,8 @@ pub(super) struct Unit {
     /// The word for `run.toml`, if it is known.
     pub word: Option<&'static str>,
     pub why: String,
+    /// Whether motion shows it, or the user states it.
+    pub is_shown: bool,
     /// For counts, where something shows it …
     pub scale: Option<Scale>,
     /// … and what is likely where nothing does.
@@ -74,6 +78,32 @@ impl Quantities {
         );
         found.gyros(named.gyro, whole.gyro, motion, period);
         found
+    }
+
+    /// Takes the units that the user states.
+    pub fn state(&mut self, stated: &Stated) {
+        let of = |sensor: &Sensor| match sensor {
+            Sensor::Gyro => &stated.gyro_unit,
+            Sensor::Accel => &stated.accel_unit,
+        };
+        for sensor in Sensor::ALL {
+            let Some(word) = of(&sensor) else { continue };
+            let known = OUTPUTS.into_iter().find_map(|(_, output)| {
+                let mut words = units(sensor, output).iter();
+                let (word, _) = words.find(|(known, _)| known == word)?;
+                Some((*word, output))
+            });
+            if let Some((word, output)) = known {
+                if word != "count" {
+                    self.output = output;
+                }
+                let unit = self.units.get_mut(sensor);
+                unit.word = Some(word);
+                unit.is_shown = true;
+                unit.why = "as stated".to_owned();
+                unit.scale = unit.scale.take().filter(|_| word == "count");
+            }
+        }
     }
 
     /// Whether a triad holds counts of no known size.
@@ -160,6 +190,11 @@ impl Quantities {
             .collect();
         let mut unit = Unit::default();
         match (by_name, by_size.first()) {
+            (Some(&(name, _, expected)), Some(&&(word, output, _))) if !fits(expected) => {
+                self.output = output;
+                unit.word = Some(word);
+                unit.why = format!("{size}, although the file says {name}");
+            }
             (Some(&(word, output, expected)), _) => {
                 self.output = output;
                 unit.word = Some(word);
@@ -189,6 +224,8 @@ impl Quantities {
                 unit.likely = per_g.is_finite().then(|| likely_for_g(per_g));
             }
         }
+        let shown = known.iter().find(|(word, ..)| Some(*word) == unit.word);
+        unit.is_shown = shown.is_some_and(|&(.., expected)| fits(expected));
         self.units.accel = unit;
         self.output_why = output_why(self.output, seconds);
     }
@@ -224,6 +261,20 @@ impl Quantities {
             .filter(|scale| scale.is_finite());
         let mut unit = Unit::default();
         match (by_name, by_turn) {
+            (Some(&(name, value)), _) if turns(value).is_some_and(|factor| !turns_fit(factor)) => {
+                let why = why_named(turns(value));
+                match by_turn {
+                    Some(&(word, _)) => {
+                        unit.word = Some(word);
+                        unit.why = format!("gravity turns as far, although the file says {name}");
+                    }
+                    None => {
+                        unit.word = Some("count");
+                        unit.why = format!("{name} {why}");
+                        unit.scale = measured.map(|value| Scale::of_steps(value, self.output));
+                    }
+                }
+            }
             (Some(&(word, value)), _) => {
                 unit.word = Some(word);
                 unit.why = why_named(turns(value));
@@ -253,6 +304,8 @@ impl Quantities {
             }
             _ => unit.why = "gravity does not turn, so nothing shows it".to_owned(),
         }
+        let shown = known.iter().find(|(word, _)| Some(*word) == unit.word);
+        unit.is_shown = shown.is_some_and(|&(_, value)| fits(value)) || unit.scale.is_some();
         self.units.gyro = unit;
     }
 }

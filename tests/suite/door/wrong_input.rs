@@ -165,6 +165,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "standstil & mean `standstill`",
         ),
         ("serial", "seriel", "[meta] & mean `serial`"),
+        ("latitude_deg = 34.0", "", "[site] & latitude_deg & Add"),
         (
             "34.0",
             "91.0",

@@ -1,0 +1,81 @@
+//! A run.toml or a log where a run is asked for.
+
+use std::path::{Path, PathBuf};
+
+use turncal::formats::Opened;
+use turncal::formats::draft::Stated;
+use turncal::report::terminal::printable;
+
+use super::input::{latitude, positive};
+
+/// What is stated of a log that has no run.toml.
+#[derive(Debug, Clone, PartialEq, Default, clap::Args)]
+#[command(next_help_heading = "Of a log without run.toml")]
+pub struct OfLog {
+    /// Rows a second
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    rate: Option<f64>,
+    /// Latitude of the place, degrees, north positive
+    #[arg(long, value_name = "DEG", value_parser = latitude, allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// Height of the place above the ellipsoid, m
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    height: Option<f64>,
+    /// Gravity at the place, m/s²
+    #[arg(long, value_name = "M/S2", value_parser = positive)]
+    gravity: Option<f64>,
+    /// Unit of the gyros: rad/s, deg/s, deg/h, count; of increments rad, deg, arcsec
+    #[arg(long, value_name = "UNIT")]
+    gyro_unit: Option<String>,
+    /// Unit of the accelerometers: m/s^2, g, count; of increments m/s, g*s
+    #[arg(long, value_name = "UNIT")]
+    accel_unit: Option<String>,
+    /// The stream that holds the instrument [default: the one with the most samples]
+    #[arg(long, value_name = "NAME")]
+    stream: Option<String>,
+}
+
+impl OfLog {
+    /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
+    pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
+        let stated = Stated {
+            rate_hz: self.rate,
+            latitude_deg: self.latitude,
+            height_m: self.height,
+            gravity_m_s2: self.gravity,
+            gyro_unit: self.gyro_unit.clone(),
+            accel_unit: self.accel_unit.clone(),
+        };
+        let opened = Opened::new(path, self.stream.as_deref(), &stated)?;
+        show_found(path, &opened);
+        Ok(opened)
+    }
+}
+
+/// Shows on standard error what was found in a log.
+fn show_found(path: &Path, opened: &Opened) {
+    let found = opened.found();
+    if found.is_empty() {
+        return;
+    }
+    eprintln!("Found in {}:", printable(&path.display().to_string()));
+    for of in found {
+        let value = printable(&of.value).to_string();
+        let why = printable(&of.why).to_string();
+        eprintln!(
+            "  {:<7} {value:<34} {}: {why}",
+            of.what,
+            of.certainty.word()
+        );
+    }
+}
+
+/// A path of a run.toml, a log, or `-`; whoever names a run's directory is told the file.
+pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
+    let path = Path::new(text);
+    let inside = path.join("run.toml");
+    match inside.is_file() {
+        true => Err(format!("this is a directory; give {}", inside.display())),
+        false => Ok(path.into()),
+    }
+}

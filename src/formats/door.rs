@@ -1,0 +1,121 @@
+//! One door: a `run.toml`, or a log of which all else is found in it or stated beside it.
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use super::draft::{Draft, Found, Stated};
+use super::error::{FileError, Place};
+use crate::run::Run;
+
+/// The log on standard input.
+const STANDARD_INPUT: &str = "-";
+/// What rows of standard input are called as a file.
+const PIPED: &str = "imu.csv";
+
+/// A run, and where it was a log alone, the draft by which it was read.
+#[derive(Debug)]
+pub struct Opened {
+    /// The run.
+    pub run: Run,
+    log: Option<Log>,
+}
+
+#[derive(Debug)]
+struct Log {
+    path: PathBuf,
+    draft: Draft,
+    /// Rows of standard input, until they are written beside a result.
+    piped: Option<TempDir>,
+}
+
+impl Opened {
+    /// Reads a `run.toml`, told by its ending, a log, or rows of text on standard input (`-`).
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read, or if what must be known of a log is neither found nor stated.
+    pub fn new(path: &Path, stream: Option<&str>, stated: &Stated) -> Result<Self, FileError> {
+        if path.extension() == Some(OsStr::new("toml")) {
+            let run = Run::read(path)?;
+            return Ok(Self { run, log: None });
+        }
+        let piped = match path == Path::new(STANDARD_INPUT) {
+            true => Some(piped(path)?),
+            false => None,
+        };
+        let file = match &piped {
+            Some(directory) => directory.path().join(PIPED),
+            None => path.to_owned(),
+        };
+        let draft = Draft::of_stream(&file, stream, stated)?;
+        if let Some(open) = draft.open_questions().into_iter().next() {
+            return Err(FileError::new(
+                path,
+                Place::File,
+                open.found,
+                open.expected,
+                open.advice,
+            ));
+        }
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let run = Run::of_text(&file, &draft.to_toml(&name), None)?;
+        let log = Log {
+            path: file,
+            draft,
+            piped,
+        };
+        Ok(Self {
+            run,
+            log: Some(log),
+        })
+    }
+
+    /// What was found in a log; nothing of a `run.toml`, which states it.
+    pub fn found(&self) -> Vec<Found> {
+        self.log
+            .as_ref()
+            .map_or_else(Vec::new, |log| log.draft.found())
+    }
+
+    /// Writes the `run.toml` by which a log was read into the directory of a result.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be written.
+    pub fn write_run(&self, directory: &Path) -> Result<(), FileError> {
+        let Some(log) = &self.log else {
+            return Ok(());
+        };
+        let path = directory.join("run.toml");
+        let written = match &log.piped {
+            Some(_) => fs::copy(&log.path, directory.join(PIPED)).map(|_| PIPED.into()),
+            None => log.path.canonicalize(),
+        };
+        let written = written
+            .and_then(|file: PathBuf| fs::write(&path, log.draft.to_toml(&file.to_string_lossy())));
+        written.map_err(|error| {
+            let advice = "Make room or choose another place.";
+            FileError::io(&path, "write the run", &error, advice)
+        })
+    }
+}
+
+/// All rows of standard input as a file.
+fn piped(path: &Path) -> Result<TempDir, FileError> {
+    let spool = || -> io::Result<TempDir> {
+        let directory = tempfile::tempdir()?;
+        let mut file = File::create(directory.path().join(PIPED))?;
+        io::copy(&mut io::stdin().lock(), &mut file)?;
+        Ok(directory)
+    };
+    spool().map_err(|error| {
+        FileError::io(
+            path,
+            "keep standard input",
+            &error,
+            "Give the log as a file.",
+        )
+    })
+}
