@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::calibration::start::mounting::Mounting;
+use crate::calibration::start::mounting::Contradiction;
 use crate::imu::Sensor;
 use crate::run::LONG_ENOUGH;
 use crate::run::motion::LabelCheck;
@@ -79,9 +79,14 @@ pub enum CalibrationError {
     /// Progress said so.
     #[error("stopped before the iterations ended; nothing was written")]
     Stopped,
-    /// Axes that are swapped, reversed or left-handed.
-    #[error("{0}")]
-    Mounting(Box<Mounting>),
+    /// What run.toml states and the record contradicts.
+    #[error("{}{contradiction}", .recording.iter().map(|name| format!("{name}: ")).collect::<String>())]
+    Contradicted {
+        /// The run, if there are several.
+        recording: Option<String>,
+        /// What it contradicts.
+        contradiction: Box<Contradiction>,
+    },
     /// Samples that no error within the prior explains, or absurd noise figures.
     #[error(
         "the filter diverged at {time:.2} s: samples and run.toml do not fit each other; check latitude, \

@@ -84,5 +84,5 @@ pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
-pub use start::mounting::Mounting;
+pub use start::mounting::{Contradiction, Mounting, Sensitivity};
 pub use start::positions::{Position, six_position_triad};

@@ -14,7 +14,7 @@ use crate::calibration::checks::error_term_test::{
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::quality::Quality;
 use crate::calibration::start::closed_form::{ClosedForm, six_position};
-use crate::calibration::start::mounting::Mounting;
+use crate::calibration::start::mounting::Contradiction;
 use crate::imu::PerSensor;
 use crate::room;
 use crate::run::Run;
@@ -69,8 +69,11 @@ impl Problem<'_> {
                 megabytes: (bytes + BYTES_BESIDE) >> 20,
             });
         }
-        if let Some(mounting) = Mounting::contradicted(self) {
-            return Err(CalibrationError::Mounting(Box::new(mounting)));
+        if let Some((run, contradiction)) = Contradiction::of(self) {
+            return Err(CalibrationError::Contradicted {
+                recording: (self.runs().count() > 1).then(|| run.recording.name.clone()),
+                contradiction: Box::new(contradiction),
+            });
         }
         Ok(match method {
             Method::Ekf => Solution::Filter(Box::new(estimate(self, progress)?)),

@@ -2,7 +2,7 @@
 //! is by nominal scales and prior biases.
 
 use crate::calibration::{
-    CalibrationError, Estimate, Group, Mounting, OBSERVED_BELOW, Options, Problem,
+    CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options, Problem,
 };
 use crate::calibration::{bound, coarse_start, parameter_name, sensor_and_parameter, six_position};
 use crate::imu::{BodyFrame, InstallationForm, TermVector};
@@ -26,7 +26,7 @@ pub struct Survey {
     /// What each method could see: what is to be expected, or why nothing is.
     pub methods: Vec<(Path, Result<Expected, String>)>,
     /// A mounting that the record shows in place of the stated one.
-    pub mounting: Option<Mounting>,
+    pub contradiction: Option<Contradiction>,
     /// How long it stands in all, s.
     pub standing: f64,
     /// Length of the longest dwell, s.
@@ -86,7 +86,8 @@ impl Survey {
             turns: motion::turns(run, &rests),
             labels: motion::checks(run, &rests),
             methods: Path::ALL.map(expected).into(),
-            mounting: Mounting::contradicted(&Problem::new(run, &Options::default())),
+            contradiction: Contradiction::of(&Problem::new(run, &Options::default()))
+                .map(|(_, contradiction)| contradiction),
             standing: durations().sum(),
             longest: durations().fold(0.0, f64::max),
             directions: directions(&rests),

@@ -1,7 +1,7 @@
 //! What has to be said of a run before it is calibrated.
 
 use super::super::number::{count, three_digits, value};
-use crate::calibration::Mounting;
+use crate::calibration::Contradiction;
 use crate::imu::{AXES, Sensor};
 use crate::run::motion::{LabelCheck, Turn};
 use crate::run::{LONG_ENOUGH, Run};
@@ -116,7 +116,7 @@ fn warming(run: &Run) -> String {
 /// What to look at and what to change, a sentence or two each.
 pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = run.recording.notes.clone();
-    findings.extend(survey.mounting.iter().map(of_mounting));
+    findings.extend(survey.contradiction.iter().map(of_contradiction));
     findings.extend(of_units(run, survey));
     findings.extend(survey.labels.iter().filter_map(of_label));
     findings.extend(of_motion(survey));
@@ -125,8 +125,8 @@ pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
 }
 
 /// What the methods refuse, in a sentence.
-fn of_mounting(mounting: &Mounting) -> String {
-    let said = mounting.to_string();
+fn of_contradiction(contradiction: &Contradiction) -> String {
+    let said = contradiction.to_string();
     let mut letters = said.chars();
     let first = letters.next().map(|letter| letter.to_ascii_uppercase());
     first.into_iter().chain(letters).collect()

@@ -57,8 +57,8 @@ pub fn order(run: &Run) -> Option<String> {
     let (log_ratio, words) = likelier.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     (log_ratio > limit).then(|| {
         format!(
-            "The table's quaternions {words} (the accelerometers' gravity in {} dwells is 10^{:.0} times more \
-             likely so).",
+            "the table's quaternions {words} (the accelerometers' gravity in {} dwells is 10^{:.0} times more \
+             likely so)",
             rests.len(),
             log_ratio / std::f64::consts::LN_10
         )

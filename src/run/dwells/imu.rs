@@ -22,7 +22,7 @@ const FEWEST: usize = 4;
 pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
 /// Output at rest is within this many σ of its noise …
 pub const STILL_SIGMAS: f64 = 6.0;
-/// … and angular rate within the drift of the worst bias, rad/s …
+/// … and angular rate within the drift of the worst bias in seconds, rad/s …
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 /// … and specific force within this, m/s²: a turn of 0.02°.
 const STILL_FORCE: f64 = 3e-3;
@@ -31,6 +31,8 @@ const STILL_FORCE: f64 = 3e-3;
 const SETTLED: f64 = 0.01;
 /// Windows beside it.
 const BESIDE: usize = 2 * FEWEST;
+/// A bias that warms moves by less than [`STILL_RATE`] in this time, s.
+const WARMING: f64 = 20.0;
 /// A bias is within this many σ of its prior.
 const BIAS_SIGMAS: f64 = 6.0;
 
@@ -67,6 +69,37 @@ impl Windows {
         }
     }
 
+    /// Whether the gyros are at rest in each window, of those that may be. Their output at rest is what most windows say
+    /// that a bias could make; from the nearest of these on it is followed both ways as it warms.
+    fn at_rest(&self, run: &Run, rate: f64, may_be: impl Fn(usize) -> bool) -> Vec<bool> {
+        let prior = &run.instrument.prior.gyro;
+        let limit = (prior.bias_sigma * BIAS_SIGMAS).add_scalar(ROTATION_RATE + rate);
+        let could_rest = |mean: &Vector3<f64>| (mean - prior.bias).abs() <= limit;
+        let all: Vec<_> = self.means.iter().copied().filter(could_rest).collect();
+        let mut still = vec![false; self.means.len()];
+        let Some(most) = median_of_axes(&all) else {
+            return still;
+        };
+        let off = |k: usize| (self.means[k] - most).norm();
+        let may_begin = (0..still.len()).filter(|&k| may_be(k));
+        let Some(begin) = may_begin.min_by(|&a, &b| off(a).total_cmp(&off(b))) else {
+            return still;
+        };
+        let mut follow = |windows: &mut dyn Iterator<Item = usize>| {
+            let mut rest = most;
+            for k in windows.filter(|&k| may_be(k)) {
+                let off = self.means[k] - rest;
+                still[k] = off.norm() < rate;
+                if still[k] {
+                    rest += off * (WINDOW / WARMING);
+                }
+            }
+        };
+        follow(&mut (begin..self.means.len()));
+        follow(&mut (0..begin).rev());
+        still
+    }
+
     /// The part of a standstill at whose ends the output is what it is beside them.
     fn settled(&self, standstill: Range<usize>) -> Range<usize> {
         let Range { mut start, mut end } = standstill;
@@ -92,9 +125,6 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let imu = &run.recording.imu;
     let length = samples_of(WINDOW, imu.period);
     let [gyro, accel] = Sensor::ALL.map(|sensor| Windows::of(run, sensor, length));
-    let Some(rest) = output_at_rest(run, &gyro) else {
-        return Vec::new();
-    };
     let rate = STILL_SIGMAS * gyro.sigma + STILL_RATE;
     let force = STILL_SIGMAS * SQRT_2 * accel.sigma + STILL_FORCE;
     // Beyond the record, or what is known of it.
@@ -102,11 +132,10 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let steady = |k: usize, beside: usize| {
         unknown(beside) || (accel.means[k] - accel.means[beside]).norm() < force
     };
-    let is_still = |k: usize| {
-        (gyro.means[k] - rest).norm() < rate && steady(k, k.wrapping_sub(1)) && steady(k, k + 1)
-    };
+    let is_steady = |k: usize| steady(k, k.wrapping_sub(1)) && steady(k, k + 1);
+    let still = gyro.at_rest(run, rate, is_steady);
     let count = gyro.means.len();
-    let still = ranges(count, is_still).into_iter();
+    let still = ranges(count, |k| still[k]).into_iter();
     let standstills = still.filter_map(|still| {
         // A move begins and ends too gently for the windows at its ends to show it.
         let Range { start, end } = gyro.settled(still);
@@ -119,15 +148,4 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
         (end >= begin + FEWEST).then_some(samples)
     });
     standstills.collect()
-}
-
-/// What the gyros say at rest: what most of the windows say that a bias could make. None if no
-/// window does.
-fn output_at_rest(run: &Run, gyro: &Windows) -> Option<Vector3<f64>> {
-    let prior = &run.instrument.prior.gyro;
-    let limit = (prior.bias_sigma * BIAS_SIGMAS)
-        .add_scalar(ROTATION_RATE + STILL_RATE + STILL_SIGMAS * gyro.sigma);
-    let could_rest = |mean: &Vector3<f64>| (mean - prior.bias).abs() <= limit;
-    let means = gyro.means.iter().copied();
-    median_of_axes(&means.filter(could_rest).collect::<Vec<_>>())
 }

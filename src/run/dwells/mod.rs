@@ -28,13 +28,16 @@ impl Run {
         if !imu.continuous && !self.recording.segments.is_empty() {
             return self.labelled_dwells();
         }
-        let standstills = match self.observed_table(aiding) {
-            Some(table) => table::standstills(self, table),
+        let standstills: Vec<Dwell> = match self.observed_table(aiding) {
+            Some(table) => {
+                let standstills = table::standstills(self, table).into_iter();
+                let at_rest = |dwell: &Dwell| !self.turns(dwell.samples.clone(), dwell);
+                standstills.filter(at_rest).collect()
+            }
             None => imu::standstills(self).into_iter().map(Dwell::of).collect(),
         };
         let mut dwells: Vec<Dwell> = Vec::new();
-        let at_rest = |dwell: &Dwell| !self.turns(dwell.samples.clone(), dwell);
-        for dwell in standstills.into_iter().filter(at_rest) {
+        for dwell in standstills {
             match dwells.last_mut() {
                 Some(last) if self.same_position(last, &dwell) => last.extend(&dwell),
                 _ => dwells.push(dwell),

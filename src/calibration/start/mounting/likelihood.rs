@@ -11,9 +11,42 @@ use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
-/// Prior and noise may each be stated too small by these factors, all equally likely: then neither a careless prior nor
+/// Factors by which noise and prior may each be stated too small, all equally likely: then neither a careless prior nor
 /// motion that is no white noise counts for another mounting.
-const TOO_SMALL: [f64; 7] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+#[derive(Debug, Clone, Copy)]
+pub struct TooSmall {
+    pub noise: &'static [f64],
+    pub prior: &'static [f64],
+}
+
+const FACTORS: [f64; 7] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+
+impl TooSmall {
+    /// Both by any factor.
+    pub const ANY: Self = Self {
+        noise: &FACTORS,
+        prior: &FACTORS,
+    };
+
+    /// The prior by at most ten.
+    pub const CARELESS_PRIOR: Self = Self {
+        noise: &FACTORS,
+        prior: FACTORS.split_at(3).0,
+    };
+
+    /// Noise by at most ten.
+    pub const STATED_PRIOR: Self = Self {
+        noise: FACTORS.split_at(3).0,
+        prior: FACTORS.split_at(1).0,
+    };
+}
+
+/// 1σ of what the triads may be off by, and how much too small it may be.
+#[derive(Debug, Clone)]
+pub struct Errors {
+    pub sigma: ParameterVector,
+    pub too_small: TooSmall,
+}
 
 /// Logarithm of the likelihood of each order, and of none of them.
 #[derive(Debug, Clone)]
@@ -24,13 +57,17 @@ pub struct Likelihoods {
 
 impl Likelihoods {
     /// Of the residuals of these rows, the errors of the triads being integrated out with this prior.
-    fn new(prior_sigma: &ParameterVector, rows: impl Fn(&mut Equations, &AxisOrder)) -> Self {
+    fn new(
+        errors: &Errors,
+        orders: &[AxisOrder],
+        rows: impl Fn(&mut Equations, &AxisOrder),
+    ) -> Self {
         let mut none = f64::NEG_INFINITY;
-        let of = AxisOrder::all().map(|order| {
-            let mut equations = Equations::new(&ParameterVector::zeros(), prior_sigma);
-            rows(&mut equations, &order);
+        let of = orders.iter().map(|order| {
+            let mut equations = Equations::new(&ParameterVector::zeros(), &errors.sigma);
+            rows(&mut equations, order);
             none = none.max(log_likelihood_of_none(&equations));
-            log_likelihood(&equations)
+            log_likelihood(&equations, errors.too_small)
         });
         Self {
             of: of.collect(),
@@ -46,11 +83,12 @@ impl Likelihoods {
 /// The table holds gravity and turns: each triad by itself against it.
 pub fn by_table(
     motion: &Motion,
-    prior_sigma: &ParameterVector,
+    errors: &Errors,
     position_sigma: f64,
+    orders: &[AxisOrder],
 ) -> PerSensor<Likelihoods> {
     PerSensor::from_fn(|sensor| {
-        Likelihoods::new(prior_sigma, |equations, order| {
+        Likelihoods::new(errors, orders, |equations, order| {
             for of in motion.moves.iter().filter(|_| sensor == Sensor::Gyro) {
                 add_turn(equations, of, order);
             }
@@ -64,9 +102,9 @@ pub fn by_table(
 }
 
 /// Labels state which axis is up and about which it turns: each triad by itself against them.
-pub fn by_labels(motion: &Motion, prior_sigma: &ParameterVector) -> PerSensor<Likelihoods> {
+pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerSensor<Likelihoods> {
     PerSensor::from_fn(|sensor| {
-        Likelihoods::new(prior_sigma, |equations, order| {
+        Likelihoods::new(errors, orders, |equations, order| {
             // Angles are by gyros whose zero is that at rest.
             let zero = f64::from(u8::from(sensor == Sensor::Accel));
             for (_, sensed) in motion.labels.iter().filter(|(of, _)| *of == sensor) {
@@ -79,20 +117,24 @@ pub fn by_labels(motion: &Motion, prior_sigma: &ParameterVector) -> PerSensor<Li
 /// Gravity's direction turns against the body as the gyros turn it, and Earth turns upward as the latitude
 /// has it: one triad against the other. By the accelerometers' order as the gyros' axes see it, with the gyros
 /// as they are and with all of them reversed.
-pub fn by_gravity(motion: &Motion, prior_sigma: &ParameterVector) -> [Likelihoods; 2] {
+pub fn by_gravity(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> [Likelihoods; 2] {
     [0, 1].map(|reversed| {
-        Likelihoods::new(prior_sigma, |equations, order| {
+        Likelihoods::new(errors, orders, |equations, order| {
             for of in &motion.moves {
                 if let [before, after] = &motion.rests[of.from..of.from + 2] {
                     let turned = (&of.turns[reversed], of.variance);
                     add_carried(equations, turned, order, [&before.accel, &after.accel]);
                 }
             }
-            let tilt = |k| prior_sigma[parameter(Sensor::Accel, k)];
+            let tilt = |k| errors.sigma[parameter(Sensor::Accel, k)];
             let tilt = tilt(1).hypot(tilt(3));
-            for rest in &motion.rests {
+            for (upward, rest) in motion
+                .upward
+                .iter()
+                .flat_map(|&up| motion.rests.iter().map(move |rest| (up, rest)))
+            {
                 let sign = [1.0, -1.0][reversed];
-                add_earth_rate(equations, motion.upward, rest, (order, sign), tilt);
+                add_earth_rate(equations, upward, rest, (order, sign), tilt);
             }
         })
     })
@@ -179,7 +221,7 @@ fn add_earth_rate(
 }
 
 /// Logarithm of the likelihood of the residuals, the unknowns being integrated out.
-fn log_likelihood(equations: &Equations) -> f64 {
+fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
     let (design, residual) = equations.in_sigmas();
     let (information, vector) = (design.tr_mul(&design), design.tr_mul(&residual));
     // Samples of absurd size overflow, and tell nothing.
@@ -192,9 +234,9 @@ fn log_likelihood(equations: &Equations) -> f64 {
         .sum();
     let eigen = information.symmetric_eigen();
     let along = eigen.eigenvectors.tr_mul(&vector);
-    let mut logarithms = Vec::with_capacity(TOO_SMALL.len().pow(2));
-    for noise in TOO_SMALL {
-        for prior in TOO_SMALL {
+    let mut logarithms = Vec::with_capacity(too_small.noise.len() * too_small.prior.len());
+    for noise in too_small.noise {
+        for prior in too_small.prior {
             let ratio = (prior / noise).powi(2);
             let (mut explained, mut determinant) = (0.0, 0.0);
             for (value, part) in eigen.eigenvalues.iter().zip(&along) {
@@ -237,7 +279,7 @@ mod tests {
                 let partials = of(Sensor::Gyro, &partials);
                 equations.add(&Rows::new(partials, Vector1::new(sign * error), 1e-8));
             }
-            log_likelihood(&equations)
+            log_likelihood(&equations, TooSmall::ANY)
         };
         assert!(of(0.0) - of(1e-3) < 1.0);
         assert!(of(0.0) - of(2.0) > 5.0);

@@ -7,16 +7,20 @@
 //! mounting being likelier than another. A likelihood ratio of X in favour of a wrong hypothesis comes up
 //! at most once in X records.
 
+mod contradiction;
 mod likelihood;
 mod motion;
+mod sensitivity;
 mod statement;
 
 use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::problem::Problem;
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::{Aiding, Run};
-use likelihood::{Likelihoods, by_gravity, by_labels, by_table};
+pub use contradiction::Contradiction;
+use likelihood::{Errors, Likelihoods, TooSmall, by_gravity, by_labels, by_table};
 use motion::{Motion, unit};
+pub use sensitivity::Sensitivity;
 pub use statement::Mounting;
 use statement::{line, prior_differs};
 
@@ -28,30 +32,9 @@ const TOLD_APART: f64 = 1e3;
 const OTHERS: usize = 2;
 
 impl Mounting {
-    /// The first run of a problem whose mounting contradicts what it shows, if there is one.
-    pub fn contradicted(problem: &Problem) -> Option<Self> {
-        let mut runs = problem.runs().enumerate();
-        runs.find_map(|(recording, run)| Self::of(problem, recording, run))
-    }
-
-    fn of(problem: &Problem, recording: usize, run: &Run) -> Option<Self> {
-        let model = &problem.model;
-        let motion = Motion::of(problem, recording, run);
-        let prior_sigma = prior_sigma(run);
-        let hypotheses = match run.observed_table(model.aiding) {
-            Some(_) => {
-                let base = model.geometry.base.xy().norm();
-                let position_sigma = model.position_sigma.hypot(base);
-                Hypotheses {
-                    each: by_table(&motion, &prior_sigma, position_sigma),
-                    together: None,
-                }
-            }
-            None => Hypotheses {
-                each: by_labels(&motion, &prior_sigma),
-                together: Some(by_gravity(&motion, &prior_sigma)),
-            },
-        };
+    /// The likeliest one, if it is not the one that is stated.
+    fn likeliest(problem: &Problem, run: &Run, hypotheses: &Hypotheses) -> Option<Self> {
+        let motion = &hypotheses.motion;
         let (likely, log_ratio) = hypotheses.likely()?;
         let orders = *likely.first()?;
         let is = |sensor| *orders.get(sensor) == AxisOrder::IDENTITY;
@@ -60,8 +43,7 @@ impl Mounting {
         };
         let others = likely[1..].iter().filter(of_one_triad).take(OTHERS);
         Some(Self {
-            recording: run.recording.name.clone(),
-            known_from: known_from(problem, &motion),
+            known_from: known_from(problem, motion),
             line: line(run, &orders),
             others: others.map(|orders| line(run, orders)).collect(),
             log_ratio,
@@ -109,6 +91,7 @@ fn prior_sigma(run: &Run) -> ParameterVector {
 
 /// How likely each mounting is.
 struct Hypotheses {
+    motion: Motion,
     /// Of each triad by itself, against what is known of body axes.
     each: PerSensor<Likelihoods>,
     /// Of one triad against the other, as they are and with the gyros reversed.
@@ -116,6 +99,43 @@ struct Hypotheses {
 }
 
 impl Hypotheses {
+    /// All mountings of one run of a problem.
+    fn of(problem: &Problem, run: &Run, motion: Motion) -> Self {
+        let orders: Vec<AxisOrder> = AxisOrder::all().collect();
+        Self::among(problem, run, motion, &orders, TooSmall::ANY)
+    }
+
+    /// The mountings of some orders.
+    fn among(
+        problem: &Problem,
+        run: &Run,
+        motion: Motion,
+        orders: &[AxisOrder],
+        too_small: TooSmall,
+    ) -> Self {
+        let model = &problem.model;
+        let errors = Errors {
+            sigma: prior_sigma(run),
+            too_small,
+        };
+        let (each, together) = match run.observed_table(model.aiding) {
+            Some(_) => {
+                let base = model.geometry.base.xy().norm();
+                let position_sigma = model.position_sigma.hypot(base);
+                (by_table(&motion, &errors, position_sigma, orders), None)
+            }
+            None => (
+                by_labels(&motion, &errors, orders),
+                Some(by_gravity(&motion, &errors, orders)),
+            ),
+        };
+        Self {
+            motion,
+            each,
+            together,
+        }
+    }
+
     /// The mountings that are hardly less likely than the likeliest, the simplest first, if what is stated is not likely
     /// enough against it; and the logarithm of that ratio.
     fn likely(&self) -> Option<(Vec<PerSensor<AxisOrder>>, f64)> {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::attitude::{exp, matrix};
+use crate::attitude::{exp, log, matrix};
 use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::start::equations::OfTriad;
 use crate::calibration::start::labels::Section;
@@ -17,8 +17,7 @@ use crate::run::{Dwell, Run};
 /// What a sum of rotations by whole samples leaves of coning and of turns within a sample, rad. It stands
 /// for all that a noiseless record is off by.
 const FLOOR: f64 = 1e-4;
-/// A part of a move that turns by more is cut at the next reading of the table, rad: half a turn has no
-/// sense.
+/// A part of a move that turns by more is cut at the next reading of the table, rad: half a turn has no sense.
 const LEG: f64 = 1.0;
 
 /// A vector by the columns as they stand, and along body axes as it is known.
@@ -62,8 +61,8 @@ pub struct Motion {
     pub moves: Vec<Move>,
     /// Labelled sections: force over gravity, or the angle turned.
     pub labels: Vec<(Sensor, Sensed)>,
-    /// Upward part of Earth rate over the whole.
-    pub upward: f64,
+    /// Upward part of Earth rate over the whole, where the place is known.
+    pub upward: Option<f64>,
 }
 
 impl Motion {
@@ -91,7 +90,10 @@ impl Motion {
             labels: labelled(run, &dwells),
             rests,
             moves,
-            upward: run.site.earth_rate_n().z / ROTATION_RATE,
+            upward: run
+                .site
+                .is_known
+                .then(|| run.site.earth_rate_n().z / ROTATION_RATE),
         }
     }
 }
@@ -145,24 +147,29 @@ impl Legs<'_> {
         let (Some(table), Some(first), Some(last)) =
             (stretch.table, &before.position, &after.position)
         else {
-            return vec![self.leg(samples, None)];
+            return vec![self.leg(samples, None, 0.0)];
         };
         let mut legs = Vec::new();
         let (mut begin, mut held) = (samples.start, first.attitude);
-        let (mut way, mut measured) = (0.0, begin);
+        let (mut way, mut fastest) = (0.0, 0.0f64);
+        let (mut seen, mut edge_seen) = (held, begin);
         for (edge, attitude) in self.readings(table, first.readings.end..last.readings.start) {
-            if edge <= begin || edge >= samples.end {
+            if edge <= edge_seen || edge >= samples.end {
                 continue;
             }
-            let turned = self.increments(measured..edge.max(measured));
-            way += turned.map(|increment| increment.norm()).sum::<f64>();
-            measured = edge;
+            let angle = log(&seen.tr_mul(&attitude)).norm();
+            way += angle;
+            fastest = fastest.max(angle / (edge - edge_seen) as f64);
+            (seen, edge_seen) = (attitude, edge);
             if way > LEG {
-                legs.push(self.leg(begin..edge, Some(held.tr_mul(&attitude))));
-                (begin, held, way) = (edge, attitude, 0.0);
+                legs.push(self.leg(begin..edge, Some(held.tr_mul(&attitude)), fastest));
+                (begin, held) = (edge, attitude);
+                (way, fastest) = (0.0, 0.0);
             }
         }
-        legs.push(self.leg(begin..samples.end, Some(held.tr_mul(&last.attitude))));
+        let known = held.tr_mul(&last.attitude);
+        fastest = fastest.max(log(&known).norm() / (samples.end - begin).max(1) as f64);
+        legs.push(self.leg(begin..samples.end, Some(known), fastest));
         legs
     }
 
@@ -186,7 +193,8 @@ impl Legs<'_> {
         increments.map(|increment| increment - self.zero)
     }
 
-    fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>) -> Move {
+    /// `fastest`: by the table, rad a sample.
+    fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>, fastest: f64) -> Move {
         let turned = |sign: f64| {
             let mut rotation = Matrix3::identity();
             // By the component of the output.
@@ -205,11 +213,7 @@ impl Legs<'_> {
             Turned { rotation, partials }
         };
         // A reading is between two samples.
-        let of_edge = self
-            .increments(samples.clone())
-            .map(|increment| increment.norm());
-        let of_edge = of_edge.fold(0.0, f64::max);
-        let of_table = self.position_sigma.powi(2) + of_edge.powi(2);
+        let of_table = self.position_sigma.powi(2) + fastest.powi(2);
         Move {
             from: self.from,
             turns: [1.0, -1.0].map(turned),

@@ -13,8 +13,6 @@ use crate::units::DEGREE;
 /// What `run.toml` says of the axes and the motion contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mounting {
-    /// The run.
-    pub recording: String,
     /// The order of each triad's outputs, as they come in along right-front-up, that puts it right.
     pub orders: PerSensor<AxisOrder>,
     /// What it is known from, in a few words.
