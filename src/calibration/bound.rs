@@ -8,7 +8,7 @@ use super::estimate::Estimate;
 use super::linearisation::Linearisation;
 use super::parameters::PARAMETERS;
 use super::parameters::auxiliary::Auxiliary;
-use super::pass::open_pass;
+use super::pass::{Gate, pass};
 use super::problem::Problem;
 use super::reduction::{Epoch, Script};
 use crate::calibration::start::coarse::initial_attitudes;
@@ -44,7 +44,11 @@ pub fn bound(
     let attitudes = initial_attitudes(&problem)?;
     let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
     let at = Linearisation::new(*truth, *terms, initial);
-    let result = open_pass(&problem, &Script::new(&problem, &attitudes, &at)?)?;
+    let result = pass(
+        &problem,
+        &Script::new(&problem, &attitudes, &at)?,
+        Gate::Open,
+    )?;
     let prior = Prior::new(&result.reduction.constants, &problem.model, &at);
     Ok(Bound {
         estimate: Estimate {
@@ -72,7 +76,7 @@ pub fn thermal_bound(
         thermal: *coefficients,
         ..Linearisation::new(*truth, TermVector::zeros(), initial)
     };
-    let result = open_pass(problem, &Script::new(problem, &attitudes, &at)?)?;
+    let result = pass(problem, &Script::new(problem, &attitudes, &at)?, Gate::Open)?;
     let of_coefficients = result.thermal(&problem.model);
     let of_coefficients = of_coefficients.map(|thermal| thermal.covariance.diagonal());
     let of_coefficients = of_coefficients.unwrap_or_else(|| DVector::zeros(0));

@@ -196,7 +196,6 @@ fn outcome(
         alone: solved.alone,
         gravity: (problem.run().site.gravity + gravity.0, gravity.1),
         converged,
-        log_determinant: held.log_determinant,
         consistency: consistency(&held.innovations),
         history: held.reduction.history(&prior, &held.at),
         linearised_at: held.at,

@@ -76,8 +76,6 @@ pub struct Outcome {
     pub velocity_sigma: f64,
     /// Innovations of the last pass.
     pub innovations: Vec<Innovation>,
-    /// Logarithm of the determinant of the covariance of all innovations let in.
-    pub log_determinant: f64,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
     /// How much dwells scatter over what the covariance says; none where there are too few.

@@ -42,6 +42,8 @@ pub struct Innovation {
     pub observation: Observation,
     /// East, North and Up in units of their own σ, independent of each other.
     pub whitened: [f64; 3],
+    /// These σ, rad or m/s.
+    pub sigma: [f64; 3],
     /// Whether the gate let it in.
     pub accepted: bool,
     /// Number of the dwell in which it was made.
@@ -54,6 +56,11 @@ impl Innovation {
     /// Squared Mahalanobis distance, χ² with three degrees of freedom.
     pub fn distance(&self) -> f64 {
         self.whitened.iter().map(|w| w * w).sum()
+    }
+
+    /// −2 ln of its likelihood, except a constant.
+    pub fn deviance(&self) -> f64 {
+        self.distance() + 2.0 * self.sigma.map(f64::ln).iter().sum::<f64>()
     }
 }
 
@@ -259,6 +266,7 @@ mod tests {
                 time: 0.0,
                 observation,
                 whitened: [whitened; 3],
+                sigma: [1.0; 3],
                 accepted: true,
                 dwell,
                 after_move: dwell > 0,

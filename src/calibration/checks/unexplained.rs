@@ -79,6 +79,7 @@ mod tests {
                 time: f64::from(k),
                 observation: Observation::Velocity,
                 whitened: [factor; 3],
+                sigma: [1.0; 3],
                 accepted: true,
                 dwell: 0,
                 after_move: false,

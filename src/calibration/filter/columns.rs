@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::linear::Linear;
+use super::update::Linear;
 use crate::calibration::constants::triangle;
 
 /// What constants do to a filter.

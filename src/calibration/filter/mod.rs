@@ -1,21 +1,18 @@
 //! The Kalman filter over what moves or is drawn anew. What constants do to it are columns that it carries.
 
-pub mod columns;
-pub mod dwell_filter;
-pub mod gain_cache;
-pub mod input_prior;
-pub mod linear;
-pub mod measurement;
-pub mod rows;
-
-mod dwell_filters;
-mod dwell_update;
+mod at_rest;
+mod columns;
+mod dwell;
+mod dwell_filter;
+mod gain_cache;
+mod gate;
+mod input_prior;
 mod propagation;
-mod step_at_rest;
+mod rows;
 mod update;
 
-pub use dwell_filters::DwellFilters;
-pub use dwell_update::{Innovations, ObservationJudge, Taken, Verdict};
+pub use dwell::{DwellFilters, Taken};
+pub use gate::{Gate, Judge};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,7 +22,7 @@ use crate::calibration::constants::{Constant, DisturbanceKind};
 use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
 use crate::calibration::model::Model;
-use crate::calibration::record::segment::between;
+use crate::calibration::record::between;
 use crate::calibration::several::day_to_day::{DayToDay, Difference, Turned};
 use crate::imu::PerSensor;
 use crate::navigation::{ProcessNoise, State};

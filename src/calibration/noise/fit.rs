@@ -10,9 +10,11 @@ use rayon::prelude::*;
 
 use super::factors::{Factors, SOURCES, Scale};
 use super::likelihood_ratio::limit;
+use crate::calibration::checks::innovation::Innovation;
 use crate::calibration::error::CalibrationError;
+use crate::calibration::pass::{Gate, PassResult, pass};
 use crate::calibration::problem::Problem;
-use crate::calibration::reduction::{Replay, Script};
+use crate::calibration::reduction::Script;
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
@@ -46,7 +48,7 @@ pub struct Likelihood<'a> {
 /// A point with gradient and expected information of −½ of the deviance, by ln σ of a factor that is
 /// above zero, else by its variance over its reference.
 pub struct Slope {
-    pub here: Replay,
+    pub here: PassResult,
     pub score: DVector<f64>,
     pub information: DMatrix<f64>,
 }
@@ -62,10 +64,10 @@ pub struct Fit {
 }
 
 impl Likelihood<'_> {
-    pub fn replay(&self, factors: &Factors) -> Result<Replay, CalibrationError> {
+    pub fn replay(&self, factors: &Factors) -> Result<PassResult, CalibrationError> {
         let model = self.scale.apply(factors, &self.problem.model);
         let problem = self.problem.with_model(model);
-        self.script.replay(&problem, &self.accepted)
+        pass(&problem, self.script, Gate::As(&self.accepted))
     }
 
     /// Score and information by these sources, from one replay more than there are.
@@ -76,7 +78,7 @@ impl Likelihood<'_> {
     /// The same where the replay at the point is known.
     fn slope_from(
         &self,
-        here: Replay,
+        here: PassResult,
         factors: &Factors,
         sources: &[usize],
     ) -> Result<Slope, CalibrationError> {
@@ -87,26 +89,18 @@ impl Likelihood<'_> {
                 v => v * (2.0 * DIFFERENCE).exp(),
             };
             let there = self.replay(&moved)?;
-            let pairs = here.scalars.iter().zip(&there.scalars);
-            // Of ln of the variance, and of the innovation over σ.
-            Ok(pairs
-                .map(|(here, there)| {
-                    let variance = (there.variance / here.variance).ln() / DIFFERENCE;
-                    let change = there.innovation - here.innovation;
-                    (variance, change / (DIFFERENCE * here.variance.sqrt()))
-                })
-                .collect())
+            Ok(differences(&here, &there))
         });
         let differences: Vec<Vec<(f64, f64)>> =
             differences.collect::<Result<_, CalibrationError>>()?;
         let n = sources.len();
         let score = DVector::from_fn(n, |i, _| {
-            let each = here.scalars.iter().zip(&differences[i]);
-            each.map(|(scalar, (variance, innovation))| {
-                let whitened = scalar.innovation / scalar.variance.sqrt();
-                0.5 * variance * (whitened.powi(2) - 1.0) - whitened * innovation
-            })
-            .sum()
+            let each = here.let_in().flat_map(|of| of.whitened);
+            each.zip(&differences[i])
+                .map(|(whitened, (variance, innovation))| {
+                    0.5 * variance * (whitened.powi(2) - 1.0) - whitened * innovation
+                })
+                .sum()
         });
         let information = DMatrix::from_fn(n, n, |i, j| {
             let each = differences[i].iter().zip(&differences[j]);
@@ -297,7 +291,7 @@ impl Likelihood<'_> {
         free: &[usize],
         step: &DVector<f64>,
         cost: f64,
-    ) -> Option<(Factors, Replay)> {
+    ) -> Option<(Factors, PassResult)> {
         let mut fraction = 1.0;
         while fraction > SHORTEST {
             let mut there = *at;
@@ -338,6 +332,19 @@ impl Likelihood<'_> {
             .map(|i| Some(covariance.as_ref()?[(i, i)].sqrt()))
             .collect())
     }
+}
+
+/// Of each scalar that was let in, what changes between two passes over the step of a factor: ln of its variance, and
+/// the innovation over its σ.
+fn differences(here: &PassResult, there: &PassResult) -> Vec<(f64, f64)> {
+    let scalars = |of: &Innovation| [0, 1, 2].map(|k| (of.whitened[k], of.sigma[k]));
+    let here = here.let_in().flat_map(scalars);
+    let pairs = here.zip(there.let_in().flat_map(scalars));
+    let each = pairs.map(|((one, sigma), (other, there))| {
+        let change = other * (there / sigma) - one;
+        (2.0 * (there / sigma).ln() / DIFFERENCE, change / DIFFERENCE)
+    });
+    each.collect()
 }
 
 /// The solution of `information · step = score`; a direction of no information takes no step.

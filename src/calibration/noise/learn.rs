@@ -6,10 +6,10 @@ use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
 use super::source::Source;
-use crate::calibration::checks::innovation::Observation;
+use crate::calibration::checks::innovation::{Innovation, Observation};
 use crate::calibration::error::CalibrationError;
 use crate::calibration::gauss_newton::{Progress, iterate};
-use crate::calibration::pass::Gate;
+use crate::calibration::pass::{Gate, pass};
 use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;
 use crate::calibration::reduction::Script;
@@ -77,8 +77,9 @@ fn with_noise<'a>(
         let (problem, priors) = (&solved.problem, &solved.priors);
         let at = solved.iterated.estimate;
         let script = Script::new(problem, priors, &at)?;
-        let distances = script.replay(problem, &accepted)?.distances;
-        regate(&mut accepted, &distances, problem.gate_limit(), open);
+        let replay = pass(problem, &script, Gate::As(&accepted))?;
+        let distances = replay.innovations.iter().map(Innovation::distance);
+        regate(&mut accepted, distances, problem.gate_limit(), open);
         open = false;
         let (gate, passes) = (Gate::As(&accepted), &mut solved.passes);
         solved.iterated = iterate(problem, priors, at.clone(), gate, passes, progress)?;
@@ -154,8 +155,8 @@ impl<'a> Thinned<'a> {
 
 /// Lets in what the gate allows; leaves out what it does not where that is still `open`. Otherwise the set
 /// only grows, so it cannot toggle.
-fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) {
-    for (accepted, &distance) in accepted.iter_mut().zip(distances) {
+fn regate(accepted: &mut [bool], distances: impl Iterator<Item = f64>, gate: f64, open: bool) {
+    for (accepted, distance) in accepted.iter_mut().zip(distances) {
         let sound = distance <= gate;
         if sound || open {
             *accepted = sound;

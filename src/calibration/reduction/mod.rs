@@ -14,7 +14,7 @@ use super::linearisation::Linearisation;
 use super::parameters::{ParameterVector, from_vector, to_vector};
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::several::thermal::Coefficient;
-pub use script::{Moves, Replay, Script};
+pub use script::{Moves, Script};
 pub use smoothed::{Own, Smoothed};
 
 /// Whitened rows of all dwells, and the states that go with them.

@@ -5,15 +5,12 @@ use super::smoothed::Smoothed;
 use super::{Part, Reduction};
 use crate::calibration::constants::{Known, Prior};
 use crate::calibration::error::CalibrationError;
-use crate::calibration::filter::measurement::ScalarInnovation;
-use crate::calibration::filter::{
-    DwellFilters, Filter, Innovations, ObservationJudge, Since, Taken, Verdict,
-};
+use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken};
 use crate::calibration::layout::Layout;
 use crate::calibration::linearisation::{AttitudePrior, Linearisation};
 use crate::calibration::model::Model;
 use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::record::events::{Event, Rest, events};
+use crate::calibration::record::{Event, Rest, events};
 use crate::imu::{PerSensor, Sensor};
 
 /// Rows of a dwell are kept apart for each second …
@@ -38,23 +35,6 @@ pub struct Moves {
     pub motion: PerSensor<f64>,
 }
 
-/// A replay's innovations.
-#[derive(Default)]
-pub struct Replay {
-    /// Of observations that were let in, in order.
-    pub scalars: Vec<ScalarInnovation>,
-    /// Squared whitened innovation of every observation of three components, let in or not.
-    pub distances: Vec<f64>,
-}
-
-impl Replay {
-    /// −2 ln of the likelihood of the noise, but for a constant.
-    pub fn deviance(&self) -> f64 {
-        let each = |s: &ScalarInnovation| s.innovation.powi(2) / s.variance + s.variance.ln();
-        self.scalars.iter().map(each).sum()
-    }
-}
-
 impl<'a> Script<'a> {
     /// Navigates once through all stretches of a problem, linearised at this point.
     pub fn new(
@@ -77,7 +57,7 @@ impl<'a> Script<'a> {
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
-            if let Event::Move(block, _) = event {
+            if let Event::Move(block) = event {
                 for part in &block.noise.parts {
                     moves.duration += part.moving;
                     for sensor in Sensor::ALL {
@@ -95,29 +75,24 @@ impl<'a> Script<'a> {
         Known::new(Prior::new(layout.constants(), &problem.model, self.at))
     }
 
-    /// Innovations with the noise of a problem's model. `accepted` tells of each observation of
-    /// three components whether it is let in; those beyond its end are.
-    pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
-        let mut decided = Decided::new(accepted);
-        let mut known = self.known(problem);
-        self.follow(problem, &mut decided, Some(&mut known))?;
-        Ok(decided.replay)
-    }
-
     /// What the record says of the constants, without innovations.
     pub fn reduce(
         &self,
         problem: &Problem,
         accepted: &[bool],
     ) -> Result<Reduction, CalibrationError> {
-        self.follow(problem, &mut Decided::new(accepted), None)
+        self.follow(
+            problem,
+            &mut Judge::new(Gate::As(accepted), f64::INFINITY),
+            None,
+        )
     }
 
     /// Takes a filter through the record. What is `known` of the constants, if it is told, learns as it goes.
     pub fn follow(
         &self,
         problem: &Problem,
-        judge: &mut impl ObservationJudge,
+        judge: &mut Judge,
         known: Option<&mut Known>,
     ) -> Result<Reduction, CalibrationError> {
         let filter = Filter::new(&problem.model, problem.one_gravity());
@@ -203,7 +178,7 @@ impl Follower<'_> {
         &mut self,
         events: &[Event],
         of: (&Model, &Stretch),
-        judge: &mut impl ObservationJudge,
+        judge: &mut Judge,
     ) -> Result<(), CalibrationError> {
         let apart = APART.max(of.1.run.recording.imu.duration() / EPOCHS);
         let mut begin: Option<Begin> = None;
@@ -211,7 +186,7 @@ impl Follower<'_> {
         while let Some(event) = events.get(next) {
             next += 1;
             let rest = match event {
-                Event::Move(block, _) => {
+                Event::Move(block) => {
                     self.filter.propagate(block);
                     continue;
                 }
@@ -228,23 +203,18 @@ impl Follower<'_> {
                     self.go_back(begin);
                     next = begin.event;
                 }
-                _ => return Err(CalibrationError::Diverged { time: event.end() }),
+                _ => return Err(CalibrationError::Diverged { time: rest.end() }),
             }
         }
         Ok(())
     }
 
-    fn rest(
-        &mut self,
-        rest: &Rest,
-        of: (&Model, &Stretch),
-        judge: &mut impl ObservationJudge,
-    ) -> Taken {
-        rest.begin(&mut self.filter, of.0, of.1);
+    fn rest(&mut self, rest: &Rest, of: (&Model, &Stretch), judge: &mut Judge) -> Taken {
+        self.filter.begin_rest(rest, of.0, of.1);
         self.learn();
         let known = self.known.as_deref();
         self.dwells
-            .take_in(&mut self.filter, &rest.segment, of, known, judge)
+            .take_in(&mut self.filter, rest, of, known, judge)
     }
 
     fn learn(&mut self) {
@@ -256,7 +226,7 @@ impl Follower<'_> {
     /// Keeps the rows of a part, with those of the next one unless that is a second off.
     fn keep(&mut self, rest: &Rest, apart: f64) -> Result<(), CalibrationError> {
         self.learn();
-        let time = rest.segment.end();
+        let time = rest.end();
         let before = self.parts.last().filter(|part| part.dwell == self.dwell);
         if !rest.last && before.is_some_and(|before| time - before.time < apart) {
             return Ok(());
@@ -289,37 +259,5 @@ impl Follower<'_> {
         if let (Some(known), Some(before)) = (&mut self.known, &begin.known) {
             **known = before.clone();
         }
-    }
-}
-
-/// Lets in what was decided before, and keeps innovations.
-struct Decided<'a> {
-    accepted: std::slice::Iter<'a, bool>,
-    replay: Replay,
-}
-
-impl<'a> Decided<'a> {
-    fn new(accepted: &'a [bool]) -> Self {
-        Self {
-            accepted: accepted.iter(),
-            replay: Replay::default(),
-        }
-    }
-}
-
-impl ObservationJudge for Decided<'_> {
-    fn is_let_in(&mut self) -> bool {
-        self.accepted.next().is_none_or(|&accepted| accepted)
-    }
-
-    fn judge(&mut self, innovations: Innovations) -> Verdict {
-        let three = innovations.scalars;
-        let squares = three.map(|s| s.innovation.powi(2) / s.variance);
-        self.replay.distances.push(squares.iter().sum());
-        if !self.is_let_in() {
-            return Verdict::Rejected;
-        }
-        self.replay.scalars.extend(three);
-        Verdict::Accepted
     }
 }

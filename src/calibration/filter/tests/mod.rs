@@ -4,14 +4,14 @@ mod textbook;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{DVector, Matrix3, SVector, Vector3};
 
 use super::*;
 use crate::calibration::constants::{Known, Prior};
-use crate::calibration::filter::measurement::{Measurement, ScalarInnovation};
+use crate::calibration::filter::update::Linear;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::problem::Stretch;
-use crate::calibration::record::segment::{Segment, segments};
+use crate::calibration::record::{Rest, part_of};
 use crate::calibration::{AttitudePrior, ErrorTerm, Options, Problem};
 use crate::imu::{GaussMarkov, TermVector};
 use crate::navigation::{Block, ErrorMatrix, Navigator, NoiseInput, NoiseInputs, ParameterBlock};
@@ -67,9 +67,47 @@ fn begun(model: &Model) -> (Filter, Known) {
     (filter, Known::new(prior))
 }
 
+/// Three components `z = H x + v`, v white of the same variance R each.
+struct Measurement {
+    residual: Vector3<f64>,
+    /// H, row by row: state and coefficient of what is not zero.
+    rows: [Vec<(usize, f64)>; 3],
+    variance: f64,
+}
+
+/// One component of a measurement minus what a filter expected of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ScalarInnovation {
+    innovation: f64,
+    variance: f64,
+}
+
+fn scalars(judge: &Judge) -> Vec<ScalarInnovation> {
+    let each = judge.innovations.iter();
+    each.flat_map(|of| {
+        [0, 1, 2].map(|k| ScalarInnovation {
+            innovation: of.whitened[k] * of.sigma[k],
+            variance: of.sigma[k].powi(2),
+        })
+    })
+    .collect()
+}
+
+fn take(filter: &mut Filter, measurement: &Measurement) {
+    let mut h: Linear = filter.none(3);
+    for (row, of_row) in measurement.rows.iter().enumerate() {
+        for &(state, weight) in of_row {
+            h.states[(row, state)] = weight;
+        }
+    }
+    let z = DVector::from_column_slice(measurement.residual.as_slice());
+    let across = &h.states * &filter.p;
+    filter.take((&h, across), &z, measurement.variance);
+}
+
 /// A filter that learns of a measurement.
 fn update(filter: &mut Filter, known: &mut Known, measurement: &Measurement) {
-    filter.update(measurement);
+    take(filter, measurement);
     known.learn(&filter.columns.take_rows());
 }
 
@@ -159,7 +197,10 @@ fn a_varying_bias_goes_on_while_nothing_is_known() {
     let (mut filter, _) = begun(&model(&run(1), 1e-4, Some(sigma)));
     for k in 0..5 {
         filter.propagate(&block(f64::from(k)));
-        filter.update(&of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11));
+        take(
+            &mut filter,
+            &of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11),
+        );
     }
     let (state, ..) = filter.layout.varying_biases().next().unwrap();
     let before = filter.p[(state, state)];
@@ -223,42 +264,18 @@ fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
     }
 }
 
-/// Lets all but one in, and keeps the innovations.
-#[derive(Default)]
-struct Without {
-    scalars: Vec<ScalarInnovation>,
-    number: Option<usize>,
-}
-
-impl ObservationJudge for Without {
-    fn is_let_in(&mut self) -> bool {
-        true
-    }
-
-    fn judge(&mut self, innovations: Innovations) -> Verdict {
-        self.scalars.extend(innovations.scalars);
-        match self.scalars.len() / 3 == self.number.map_or(0, |number| number + 1) {
-            true => Verdict::Rejected,
-            false => Verdict::Accepted,
-        }
-    }
-}
-
 /// The first part of the first dwell in an attitude.
-fn first_part(
-    (problem, stretch): (&Problem, &Stretch),
-    attitude: &Matrix3<f64>,
-) -> (Segment, Block) {
+fn first_part((problem, stretch): (&Problem, &Stretch), attitude: &Matrix3<f64>) -> (Rest, Block) {
     let model = &problem.model;
     let triads = crate::calibration::from_vector(model.form, &model.prior_mean);
     let at = State::at_rest(*attitude);
     let run = problem.run();
     let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, at);
     let mut navigator = navigator.unwrap();
-    let part = segments(&stretch.steps).next().unwrap();
-    let before = navigator.standing(attitude, part[0].0.samples.clone());
-    let segment = Segment::navigate(&mut navigator, (problem, stretch), &part, attitude);
-    (segment, before)
+    let part = &stretch.steps[..part_of(&stretch.steps, usize::MAX / 2)];
+    let before = navigator.standing(attitude, part[0].samples.clone());
+    let rest = Rest::navigate(&mut navigator, (problem, stretch), part, attitude);
+    (rest, before)
 }
 
 #[test]
@@ -278,14 +295,13 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
         let (segment, _) = first_part(of, attitude);
         let through = |dwells: &mut DwellFilters| {
             let mut filter = filter.clone();
-            let mut judge = Without {
-                number,
-                ..Without::default()
-            };
+            // All but one are let in.
+            let accepted: Vec<bool> = (0..300).map(|k| Some(k) != number).collect();
+            let mut judge = Judge::new(Gate::As(&accepted), f64::INFINITY);
             let of = (model, stretch);
             let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
             assert_eq!(taken, Taken::Whole);
-            (filter.x, filter.p, judge.scalars)
+            (filter.x, filter.p, scalars(&judge))
         };
         assert_eq!(
             through(&mut shared),
@@ -326,15 +342,15 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         }
         filter.begin_to_hold();
         textbook.begin_to_hold(&filter);
-        let mut judge = Without::default();
+        let mut judge = Judge::new(Gate::Open, f64::INFINITY);
         let of = (model, stretch);
         let mut dwells = DwellFilters::of(&filter);
         let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
         assert_eq!(taken, Taken::Whole);
         known.learn(&filter.columns.take_rows());
-        let scalars = textbook.through(&filter, &segment, of);
-        assert_eq!(scalars.len(), judge.scalars.len());
-        for (one, other) in judge.scalars.iter().zip(&scalars) {
+        let (ours, theirs) = (scalars(&judge), textbook.through(&filter, &segment, of));
+        assert_eq!(ours.len(), theirs.len());
+        for (one, other) in ours.iter().zip(&theirs) {
             let sigma = other.variance.sqrt();
             assert_relative_eq!(one.variance, other.variance, max_relative = 1e-5);
             assert_relative_eq!(

@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Filter;
+use super::{Filter, Measurement, ScalarInnovation};
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::constants::{Constant, Known};
-use crate::calibration::filter::measurement::{Measurement, ScalarInnovation};
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::model::Model;
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::calibration::problem::Stretch;
-use crate::calibration::record::segment::{Seen, Segment};
+use crate::calibration::record::Rest;
+use crate::calibration::record::dwell::Seen;
 use crate::navigation::Block;
 
 /// Mean and covariance of the states of a filter, then of its constants.
@@ -114,7 +114,7 @@ impl Textbook {
     pub fn through(
         &mut self,
         filter: &Filter,
-        segment: &Segment,
+        segment: &Rest,
         (model, stretch): (&Model, &Stretch),
     ) -> Vec<ScalarInnovation> {
         let mut scalars = Vec::new();
