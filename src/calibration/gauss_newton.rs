@@ -8,7 +8,6 @@ use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
 use super::pass::{Gate, PassResult, pass};
 use super::problem::Problem;
 use super::reduction::Script;
-use crate::calibration::budget::curvature::curvature;
 use crate::calibration::checks::innovation::Innovation;
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
@@ -75,12 +74,8 @@ impl Iterated {
 
     /// What it makes of both triads.
     pub fn both_triads(&self) -> Estimate {
-        let triads = self.estimate.triads;
-        let covariance = self.held.posterior.parameter_covariance;
-        Estimate {
-            covariance: covariance + curvature(&triads, &covariance),
-            triads,
-        }
+        let linear = &self.held.posterior.parameter_covariance;
+        Estimate::with_curvature(self.estimate.triads, linear)
     }
 }
 

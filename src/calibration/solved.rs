@@ -49,6 +49,26 @@ impl<'a> Solved<'a> {
         }
     }
 
+    /// The problem that was solved with noise and prior as they are stated; recordings differ as they show.
+    pub fn as_stated(&self, stated: &Problem<'a>) -> Problem<'a> {
+        let mut model = self.problem.model.with_noise_of(&stated.model);
+        model.prior_sigma = stated.model.prior_sigma;
+        self.problem.with_model(model)
+    }
+
+    /// What iterating again led to, unless it failed or converged less than this did.
+    pub fn better(
+        &self,
+        again: Result<Self, CalibrationError>,
+    ) -> Result<Option<Self>, CalibrationError> {
+        match again {
+            Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
+            again => Ok(again
+                .ok()
+                .filter(|again| again.iterated.converged || !self.iterated.converged)),
+        }
+    }
+
     /// Iterates another problem from here.
     pub fn again(
         mut self,

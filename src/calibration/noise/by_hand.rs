@@ -3,10 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::likelihood_ratio::{INTERVAL, limit};
-use super::report::{NoiseReport, SourceFigures};
+use super::report::{NoiseReport, SourceFigures, noise_learnt};
 use super::source::Source;
 use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::noise_learnt::noise_learnt;
 use crate::calibration::model::Model;
 use crate::calibration::problem::Problem;
 use crate::statistics::FALSE_ALARM;

@@ -118,15 +118,20 @@ impl Reduction {
         parts.collect()
     }
 
+    /// Squares and products of all columns, summed over the rows.
+    pub fn squares(&self) -> DMatrix<f64> {
+        let n = self.constants.len();
+        let mut squares = DMatrix::zeros(n + 1, n + 1);
+        for part in &self.parts {
+            squares.gemm_tr(1.0, &part.rows, &part.rows, 1.0);
+        }
+        squares
+    }
+
     /// Information of the constants by the rows alone.
     pub fn information(&self) -> DMatrix<f64> {
         let n = self.constants.len();
-        let mut information = DMatrix::zeros(n, n);
-        for part in &self.parts {
-            let rows = part.rows.columns(0, n);
-            information += rows.tr_mul(&rows);
-        }
-        information
+        self.squares().view((0, 0), (n, n)).into_owned()
     }
 
     /// By how much each recording differs, linearised `at` a point.

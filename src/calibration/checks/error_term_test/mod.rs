@@ -4,6 +4,7 @@
 //! biases are not constant; they take a reduction of their own.
 
 mod bias_variation;
+mod evidence;
 mod explanation;
 mod terms_on;
 
@@ -20,9 +21,10 @@ use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
 use crate::calibration::problem::Problem;
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
+pub use evidence::Evidence;
 pub use explanation::UnmodelledEffect;
 use explanation::{Explanation, seen_and_left_off};
-use terms_on::TermsOn;
+use terms_on::{TermsOn, With};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -216,60 +218,59 @@ impl<'a> Tested<'a> {
         let chance = FALSE_ALARM / off.max(1) as f64;
         let scalars = 3.0 * outcome.innovations.len() as f64;
         let tests = tried.into_iter().filter_map(|term| {
-            let mut test = match term {
-                VARYING => tested.varying(model.has(term), chance),
-                _ => tested.constant(term, model.has(term), chance)?,
+            let test = match (term, model.has(term)) {
+                (VARYING, on) => tested.varying(on, chance),
+                (_, true) => tested.on(term, chance)?,
+                (_, false) => tested.off(term, chance)?,
             };
-            test.without /= scalars;
-            test.with /= scalars;
-            Some(test)
+            Some(ErrorTermTest {
+                without: test.without / scalars,
+                with: test.with / scalars,
+                ..test
+            })
         });
         tested.tests = tests.collect();
         tested.decide(chance);
         Ok(tested)
     }
 
-    /// The test of a constant term, with costs of the whole record. `None` if that is singular.
-    fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
-        let (with, without, evidence, left_off) = if on {
-            let (without, evidence) = self.terms.without(term);
-            (None, Some(without), evidence, None)
-        } else {
-            let evidence = self.terms.evidence(term, &[])?;
-            let with = self.terms.with(&[term]);
-            (Some(with), None, evidence, self.terms.left_off(term))
-        };
-        let own = &self.terms.own;
-        let (with, without) = (
-            with.as_ref().unwrap_or(own),
-            without.as_ref().unwrap_or(own),
-        );
+    /// The test of a constant term that is on, with costs of the whole record.
+    fn on(&self, term: ErrorTerm, chance: f64) -> Option<ErrorTermTest> {
+        let (with, without) = (&self.terms.own, self.terms.without(term));
+        let evidence = self.terms.evidence(term, with, &without)?;
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
-            left_off,
-            ..ErrorTermTest::new(term, on, with, without)
+            ..ErrorTermTest::new(term, true, &with.posterior, &without.posterior)
+        })
+    }
+
+    /// The same of one that is off.
+    fn off(&self, term: ErrorTerm, chance: f64) -> Option<ErrorTermTest> {
+        let (with, without) = (self.terms.with(&[term]), &self.terms.own);
+        let evidence = self.terms.evidence(term, &with, without)?;
+        Some(ErrorTermTest {
+            limit: evidence.limit(chance),
+            significance: evidence.significance(),
+            left_off: self.terms.left_off(term),
+            ..ErrorTermTest::new(term, false, &with.posterior, &without.posterior)
         })
     }
 
     /// The same of biases that vary.
     fn varying(&self, on: bool, chance: f64) -> ErrorTermTest {
-        let (own, otherwise) = (&self.terms.own, &self.otherwise);
-        let (with, without, gain) = match on {
-            true => (own, otherwise, -self.fall_otherwise()),
-            false => (otherwise, own, self.fall_otherwise()),
+        let (own, otherwise) = (&self.terms.own.posterior, &self.otherwise);
+        let (with, without) = match on {
+            true => (own, otherwise),
+            false => (otherwise, own),
         };
+        let gain = without.deviance - with.deviance;
         ErrorTermTest {
             gain,
             limit: -2.0 * chance.ln(),
             significance: gain,
             ..ErrorTermTest::new(VARYING, on, with, without)
         }
-    }
-
-    /// By how much −2 ln of the likelihood falls where biases vary otherwise than in the model.
-    fn fall_otherwise(&self) -> f64 {
-        self.terms.own.deviance - self.otherwise.deviance
     }
 
     /// Gives each test its role: the likeliest explanation first, then what is significant once it is on, until
@@ -287,8 +288,10 @@ impl<'a> Tested<'a> {
         while !on.contains(&VARYING) {
             let others = tests.iter_mut();
             let others = others.filter(|test| !test.on && !on.contains(&test.term));
+            let without: With = terms.with(&on);
             let others = others.filter_map(|test| {
-                let evidence = terms.evidence(test.term, &on)?;
+                let with = terms.with(&[&on[..], &[test.term]].concat());
+                let evidence = terms.evidence(test.term, &with, &without)?;
                 Some((evidence.significance(), test))
             });
             match others.max_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -333,12 +336,13 @@ impl<'a> Tested<'a> {
         if self.tests.iter().any(is_on) {
             return None;
         }
-        let ratio = 0.5 * self.fall_otherwise();
-        let added = self.otherwise.added_to(&self.terms.own);
+        let own = &self.terms.own.posterior;
+        let ratio = 0.5 * (own.deviance - self.otherwise.deviance);
+        let of_others = self.terms.with(others).posterior.added_to(own);
         Some(Explanation {
             ln_likelihood_ratio: ratio,
             of_term: ratio,
-            added: added + self.terms.added(others),
+            added: self.otherwise.added_to(own) + of_others,
         })
     }
 }

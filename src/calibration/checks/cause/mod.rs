@@ -5,10 +5,12 @@
 //! estimate follows from its score and information beside the constants, without another pass (Rao 1948, "Large sample
 //! tests of statistical hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
 
-use nalgebra::{DMatrix, DVector, Vector3};
+mod score;
+pub mod settling;
+
+use nalgebra::Vector3;
 use serde_json::json;
 
-use super::evidence::Evidence;
 use super::finding::Finding;
 use super::innovation::{Innovation, Observation};
 use crate::calibration::constants::{Constant, Disturbance, DisturbanceKind, Prior};
@@ -17,11 +19,12 @@ use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::linearisation::AttitudePrior;
 use crate::calibration::parameters::error_term::ErrorTerm;
 use crate::calibration::problem::Problem;
-use crate::calibration::reduction::{Reduction, Script};
+use crate::calibration::reduction::Script;
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
 use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
+use score::Scores;
 
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
@@ -33,12 +36,6 @@ pub enum Cause {
     Disturbance(Disturbance),
     /// An error term is there.
     Term(ErrorTerm),
-}
-
-impl Cause {
-    fn is(self, kind: DisturbanceKind) -> bool {
-        matches!(self, Self::Disturbance(disturbance) if disturbance.kind == kind)
-    }
 }
 
 /// A cause that is beyond chance.
@@ -62,7 +59,7 @@ struct Candidate {
     cause: Cause,
     time: f64,
     value: Vector3<f64>,
-    /// χ² if it is none, of so many degrees of freedom.
+    /// χ² if it is none, and its degrees of freedom.
     square: f64,
     degrees: f64,
 }
@@ -78,33 +75,28 @@ pub fn likeliest(
     priors: &[AttitudePrior],
     iterated: &Iterated,
 ) -> Result<Option<FoundCause>, CalibrationError> {
-    let of_readings = of_readings(&iterated.held.innovations);
-    let [once, terms] = by_score(problem, priors, iterated)?;
-    let count = of_readings.len() + once.len() + terms.len();
-    let limit = -2.0 * (FALSE_ALARM / count.max(1) as f64).ln();
-    let chance = |of_kind: &[Candidate]| {
-        let ratios = of_kind.iter().map(|of| of.square / of.degrees);
-        let median = median(&mut ratios.collect::<Vec<_>>());
-        median.unwrap_or(1.0).max(1.0)
+    let read = of_readings(&iterated.held.innovations);
+    let scored = by_score(problem, priors, iterated)?;
+    let limit = -2.0 * (FALSE_ALARM / (read.len() + scored.len()).max(1) as f64).ln();
+    let of_kind = |kind| {
+        let is = |of: &&Candidate| matches!(of.cause, Cause::Disturbance(of) if of.kind == kind);
+        chance(scored.iter().filter(is))
     };
-    let of_kind = |kind: DisturbanceKind| {
-        let of_kind = once.iter().copied().filter(|of| of.cause.is(kind));
-        chance(&of_kind.collect::<Vec<_>>())
-    };
-    let of_read = chance(&of_readings);
-    let of_positions = of_kind(DisturbanceKind::Position);
-    let of_slips = of_kind(DisturbanceKind::Slip);
-    let of_all = of_positions.max(of_slips);
-    let read = of_readings.into_iter().map(|of| (of, of_read));
+    let of_read = chance(read.iter());
+    let [of_positions, of_slips] = [DisturbanceKind::Position, DisturbanceKind::Slip].map(of_kind);
     // By hand every move is another; that one is worst only tells how wide chance is.
     let table = problem.model.aiding == Aiding::Table;
-    let taken = once.iter().copied().filter(|_| table);
-    let others = taken.chain(terms).map(|of| match of.cause {
-        cause if cause.is(DisturbanceKind::Position) => (of, of_positions),
-        cause if cause.is(DisturbanceKind::Slip) => (of, of_slips),
-        _ => (of, of_all),
+    let scored = scored.iter().filter_map(|of| match of.cause {
+        Cause::Term(_) => Some((of, of_positions.max(of_slips))),
+        Cause::Disturbance(_) if !table => None,
+        Cause::Disturbance(disturbance) => Some(match disturbance.kind {
+            DisturbanceKind::Position => (of, of_positions),
+            DisturbanceKind::Slip => (of, of_slips),
+            _ => (of, of_positions.max(of_slips)),
+        }),
     });
-    let each = read.chain(others).map(|(of, chance)| {
+    let each = read.iter().map(|of| (of, of_read)).chain(scored);
+    let each = each.map(|(of, chance)| {
         let found = FoundCause {
             cause: of.cause,
             time: of.time,
@@ -119,16 +111,23 @@ pub fn likeliest(
     Ok(most.map(|(_, found)| found))
 }
 
+/// How wide chance is: as half of these show, if that is wider than the noise says.
+fn chance<'a>(all: impl Iterator<Item = &'a Candidate>) -> f64 {
+    let mut ratios: Vec<f64> = all.map(|of| of.square / of.degrees).collect();
+    median(&mut ratios).unwrap_or(1.0).max(1.0)
+}
+
 /// Positions of the table, by the innovations of those of its readings that are no outliers.
 fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
     let dwells = innovations.chunk_by(|one, other| one.dwell == other.dwell);
     let sound = chi_square_limit(COMPONENTS as f64, FALSE_ALARM);
     let of_dwell = |dwell: &[Innovation]| {
+        let is_read = |of: &&Innovation| of.observation == Observation::Table && of.accepted;
+        // The first ones may show the move.
         let read = dwell
             .iter()
-            .filter(|of| of.observation == Observation::Table && of.accepted);
-        // The first ones may show the move.
-        let read = read.skip_while(|of| of.distance() > sound);
+            .filter(is_read)
+            .skip_while(|of| of.distance() > sound);
         let read: Vec<&Innovation> = read.collect();
         let largest = read
             .iter()
@@ -147,21 +146,20 @@ fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
     dwells.filter_map(of_dwell).collect()
 }
 
-/// All that may have happened once, and all error terms that are off, by their scores.
+/// All that may have happened once, then all error terms that are off and that the record can hold, by their scores.
 fn by_score(
     problem: &Problem,
     priors: &[AttitudePrior],
     iterated: &Iterated,
-) -> Result<[Vec<Candidate>; 2], CalibrationError> {
-    let disturbances = disturbances(problem);
-    let terms = terms(problem);
-    let mut model = problem.model.clone();
+) -> Result<Vec<Candidate>, CalibrationError> {
+    let (disturbances, mut model) = (disturbances(problem), problem.model.clone());
+    let terms = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
+    let terms: Vec<ErrorTerm> = terms.collect();
     model.disturbances.extend(&disturbances);
     terms.iter().for_each(|&term| model.switch_on(term));
-    let with = problem.with_model(model);
-    let script = Script::new(&with, priors, &iterated.estimate)?;
-    let reduction = script.reduce(&with, &iterated.held.accepted())?;
-    let prior = Prior::new(&reduction.constants, &with.model, &iterated.estimate);
+    let (with, at) = (problem.with_model(model), &iterated.estimate);
+    let reduction = Script::new(&with, priors, at)?.reduce(&with, &iterated.held.accepted())?;
+    let prior = Prior::new(&reduction.constants, &with.model, at);
     let is_off = |constant: &Constant| match *constant {
         Constant::Disturbance(of, _) => disturbances.contains(&of),
         constant => constant
@@ -169,9 +167,9 @@ fn by_score(
             .is_some_and(|term| terms.contains(&term)),
     };
     let Some(scores) = Scores::new(&reduction, &prior, is_off) else {
-        return Ok([Vec::new(), Vec::new()]);
+        return Ok(Vec::new());
     };
-    let once = disturbances.into_iter().filter_map(|of| {
+    let once = disturbances.iter().filter_map(|&of| {
         let (square, value) = scores.of_disturbance(of)?;
         Some(Candidate {
             cause: Cause::Disturbance(of),
@@ -181,7 +179,7 @@ fn by_score(
             degrees: COMPONENTS as f64,
         })
     });
-    let of_terms = terms.into_iter().filter_map(|term| {
+    let of_terms = terms.iter().filter_map(|&term| {
         let (square, degrees) = scores.of_term(term)?;
         Some(Candidate {
             cause: Cause::Term(term),
@@ -191,121 +189,42 @@ fn by_score(
             degrees,
         })
     });
-    Ok([once.collect(), of_terms.collect()])
-}
-
-/// The constant error terms that are off and that the record can hold.
-fn terms(problem: &Problem) -> Vec<ErrorTerm> {
-    let model = &problem.model;
-    let off = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
-    off.collect()
+    Ok(once.chain(of_terms).collect())
 }
 
 /// All that may have happened once and is not estimated already.
 fn disturbances(problem: &Problem) -> Vec<Disturbance> {
     let table = problem.model.aiding == Aiding::Table;
     let all = problem.dwells().enumerate().flat_map(|(dwell, of)| {
-        let position = (table && of.position.is_some()).then_some(DisturbanceKind::Position);
-        let slip = (dwell > 0).then_some(DisturbanceKind::Slip);
-        let steps = Sensor::ALL.map(DisturbanceKind::BiasStep);
-        let steps = steps.into_iter().filter(move |_| table && dwell > 0);
-        let earth_rate = (table && dwell == 0).then_some(DisturbanceKind::EarthRate);
-        let kinds = position
-            .into_iter()
-            .chain(slip)
-            .chain(steps)
-            .chain(earth_rate);
-        kinds.map(move |kind| Disturbance { kind, dwell })
+        let kinds = [
+            (DisturbanceKind::Position, table && of.position.is_some()),
+            (DisturbanceKind::Slip, dwell > 0),
+            (DisturbanceKind::BiasStep(Sensor::Gyro), table && dwell > 0),
+            (DisturbanceKind::BiasStep(Sensor::Accel), table && dwell > 0),
+            (DisturbanceKind::EarthRate, table && dwell == 0),
+        ];
+        let may_be = kinds.into_iter().filter(|(_, may_be)| *may_be);
+        may_be.map(move |(kind, _)| Disturbance { kind, dwell })
     });
-    all.filter(|of| !problem.model.disturbances.contains(of))
-        .collect()
+    let estimated = &problem.model.disturbances;
+    all.filter(|of| !estimated.contains(of)).collect()
 }
 
 /// When a disturbance happened, s: in the middle of the move before its dwell or, of a position, as the dwell begins.
 fn time_of(problem: &Problem, disturbance: Disturbance) -> f64 {
-    let stretches = problem.stretches().iter();
-    let times = stretches.flat_map(|stretch| {
+    let times = problem.stretches().iter().flat_map(|stretch| {
         let imu = &stretch.run.recording.imu;
+        let ends = |dwell: &Dwell| [dwell.samples.start, dwell.samples.end];
         let dwells = stretch.dwells.iter();
-        dwells.map(|dwell| (imu.time(dwell.samples.start), imu.time(dwell.samples.end)))
+        dwells.map(move |dwell| ends(dwell).map(|end| imu.time(end)))
     });
-    let times: Vec<(f64, f64)> = times.collect();
-    let begin = times[disturbance.dwell].0;
+    let times: Vec<[f64; 2]> = times.collect();
+    let begin = times[disturbance.dwell][0];
     match (disturbance.kind, disturbance.dwell.checked_sub(1)) {
         (DisturbanceKind::Slip | DisturbanceKind::BiasStep(_), Some(before)) => {
-            0.5 * (times[before].1 + begin)
+            0.5 * (times[before][1] + begin)
         }
         _ => begin,
-    }
-}
-
-/// Scores of the constants that are not estimated, beside those that are.
-struct Scores {
-    constants: Vec<Constant>,
-    /// 1σ of each before the data.
-    sigma: DVector<f64>,
-    score: DVector<f64>,
-    information: DMatrix<f64>,
-}
-
-impl Scores {
-    /// Of those that are off; none where rounding has the last word.
-    fn new(
-        reduction: &Reduction,
-        prior: &Prior,
-        is_off: impl Fn(&Constant) -> bool,
-    ) -> Option<Self> {
-        let constants = &reduction.constants;
-        let n = constants.len();
-        let (off, on): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_off(&constants[k]));
-        let mut squares = DMatrix::zeros(n + 1, n + 1);
-        for part in &reduction.parts {
-            squares.gemm_tr(1.0, &part.rows, &part.rows, 1.0);
-        }
-        let within =
-            |rows: &[usize], columns: &[usize]| squares.select_rows(rows).select_columns(columns);
-        let mut among = within(&on, &on);
-        let mut right = within(&on, &[n]);
-        for (i, &k) in on.iter().enumerate() {
-            among[(i, i)] += prior.sigma[k].powi(-2);
-            right[i] += prior.mean[k] / prior.sigma[k].powi(2);
-        }
-        // Each over its own σ, lest different units spoil the digits.
-        let scale = DMatrix::from_diagonal(&among.map_diagonal(|own| own.powf(-0.5)));
-        let root = (&scale * among * &scale).cholesky()?;
-        let across = &scale * within(&on, &off);
-        let explained = root.solve(&across);
-        let score = within(&off, &[n]) - explained.tr_mul(&(&scale * right));
-        Some(Self {
-            constants: off.iter().map(|&k| constants[k]).collect(),
-            sigma: prior.sigma.select_rows(&off),
-            score: score.column(0).into_owned(),
-            information: within(&off, &off) - explained.tr_mul(&across),
-        })
-    }
-
-    /// By how much the cost falls with a disturbance, and its components; none where the data do not show all of them.
-    fn of_disturbance(&self, disturbance: Disturbance) -> Option<(f64, Vector3<f64>)> {
-        let mut constants = self.constants.iter();
-        let first = constants.position(|of| *of == Constant::Disturbance(disturbance, 0))?;
-        let score = self.score.fixed_rows::<3>(first);
-        let value = self.information.fixed_view::<3, 3>(first, first);
-        let value = value.into_owned().cholesky()?.solve(&score);
-        Some((score.dot(&value), value))
-    }
-
-    /// χ² and degrees of freedom of what an error term of its usual size explains.
-    fn of_term(&self, term: ErrorTerm) -> Option<(f64, f64)> {
-        let constants = self.constants.iter().enumerate();
-        let of = constants.filter(|(_, constant)| constant.error_term() == Some(term));
-        let of: Vec<usize> = of.map(|(place, _)| place).collect();
-        let sigma = DMatrix::from_diagonal(&self.sigma.select_rows(&of));
-        let information = self.information.select_rows(&of).select_columns(&of);
-        let information = &sigma * information * &sigma + DMatrix::identity(of.len(), of.len());
-        let covariance = information.cholesky()?.inverse();
-        let score = &sigma * self.score.select_rows(&of);
-        let gain = score.dot(&(&covariance * &score));
-        Evidence::new(gain, &covariance).chi_square()
     }
 }
 
@@ -313,22 +232,17 @@ impl FoundCause {
     /// The problem with it: readings of a wrong position are left out, all else is estimated.
     pub fn taken_into<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let mut model = problem.model.clone();
-        let disturbance = match self.cause {
-            Cause::Term(term) => {
-                model.switch_on(term);
-                return problem.with_model(model);
+        match self.cause {
+            Cause::Term(term) => model.switch_on(term),
+            Cause::Disturbance(of) if of.kind == DisturbanceKind::Position => {
+                return problem.with_dwells(|number, _, dwell| {
+                    let position = dwell.position.clone().filter(|_| number != of.dwell);
+                    let samples = dwell.samples.clone();
+                    Some(Dwell { samples, position })
+                });
             }
-            Cause::Disturbance(disturbance) => disturbance,
-        };
-        let Disturbance { kind, dwell } = disturbance;
-        if kind == DisturbanceKind::Position {
-            return problem.with_dwells(|number, _, of| {
-                let position = of.position.clone().filter(|_| number != dwell);
-                let samples = of.samples.clone();
-                Some(Dwell { samples, position })
-            });
+            Cause::Disturbance(of) => model.disturbances.push(of),
         }
-        model.disturbances.push(disturbance);
         problem.with_model(model)
     }
 
