@@ -2,16 +2,11 @@
 
 use nalgebra::DVector;
 
-use super::constants::Prior;
-use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::linearisation::Linearisation;
-use super::parameters::PARAMETERS;
-use super::parameters::auxiliary::Auxiliary;
-use super::pass::{Gate, pass};
-use super::problem::Problem;
-use super::reduction::{Epoch, Script};
 use crate::calibration::start::coarse::initial_attitudes;
+use crate::calibration::{
+    Auxiliary, CalibrationError, Epoch, Estimate, Gate, Linearisation, PARAMETERS, Prior, Problem,
+    Script, pass,
+};
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
 /// What no estimator of a run can beat.

@@ -1,7 +1,7 @@
 //! Both triads with the covariance of their parameters.
 
-use super::budget::curvature::curvature;
-use super::parameters::{ParameterMatrix, ParameterVector, parameter, to_vector};
+use crate::calibration::budget::curvature::curvature;
+use crate::calibration::{ParameterMatrix, ParameterVector, parameter, to_vector};
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::run::Run;
 

@@ -1,19 +1,15 @@
 //! The estimator: coarse start, and Gauss–Newton iterations with the linearisation held until nothing moves.
 
-use super::budget::BudgetSource;
-use super::error::CalibrationError;
-use super::gauss_newton::Progress;
-use super::outcome::Outcome;
-use super::problem::Problem;
-use super::several;
-use super::solved::Solved;
-use crate::calibration::checks;
-use crate::calibration::checks::cause::{Cause, likeliest, settling};
-use crate::calibration::checks::form::{FormTest, form_test};
+use crate::calibration::checks::cause::{likeliest, settling};
+use crate::calibration::checks::form::form_test;
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::rounding::by_rounding;
 use crate::calibration::noise::learn;
 use crate::calibration::start::attempt::from_coarse_start;
+use crate::calibration::{
+    BudgetSource, CalibrationError, Cause, FormTest, Outcome, Problem, Progress, Solved, checks,
+    several,
+};
 use crate::run::Aiding;
 
 /// More than one cause in this many dwells explains noise.

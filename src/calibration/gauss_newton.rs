@@ -2,13 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
-use super::pass::{Gate, PassResult, pass};
-use super::problem::Problem;
-use super::reduction::Script;
-use crate::calibration::checks::innovation::Innovation;
+use crate::calibration::linearisation::not_invertible;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Estimate, Gate, Innovation, Linearisation, PassResult,
+    Problem, Script, pass,
+};
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
 /// of its own linearised problem only, so a small rise means nothing.

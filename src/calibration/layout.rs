@@ -24,12 +24,9 @@
 //! | disturbances | 3 each | see [`super::constants::Disturbance`] |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
-use super::budget::source::BudgetSource;
-use super::constants::Constant;
-use super::model::Model;
-use super::parameters::PARAMETERS;
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::several::day_to_day::OwnState;
-use crate::calibration::several::thermal::Coefficient;
+use crate::calibration::{Coefficient, Constant, Model, PARAMETERS};
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
 use crate::run::Aiding;
 use crate::turntable::AXIS_ERRORS;

@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::budget::source::BudgetSource;
-use super::constants::Disturbance;
-use super::options::Options;
-use super::parameters::error_term::ErrorTerm;
-use super::parameters::{ParameterVector, parameter, to_vector};
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::record::standstill::FLOOR;
-use crate::calibration::several::day_to_day::DayToDay;
+use crate::calibration::{
+    DayToDay, Disturbance, ErrorTerm, Options, ParameterVector, parameter, to_vector,
+};
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
     Term, TermVector, ThermalModel,

@@ -4,27 +4,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::budget::BudgetSource;
-use super::constants::{Posterior, Prior};
-use super::error::CalibrationError;
-use super::estimate::{Estimate, largest_growth};
-use super::gauss_newton::Pass;
-use super::linearisation::{AttitudePrior, Linearisation, UNKNOWN_HEADING, not_invertible};
-use super::model::Model;
-use super::noise::NoiseReport;
-use super::parameters::auxiliary::Auxiliary;
-use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
-use super::problem::Problem;
-use super::reduction::{Epoch, Own, Reduction, Script};
-use super::solved::Solved;
-use crate::calibration::checks::cause::FoundCause;
-use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::form::FormTest;
-use crate::calibration::checks::innovation::{Consistency, Innovation, consistency};
-use crate::calibration::checks::observability::Observability;
-use crate::calibration::several::separate_estimate::SeparateEstimate;
-use crate::calibration::several::thermal::Thermal;
+use crate::calibration::checks::dwell_scatter::DwellScores;
+use crate::calibration::checks::innovation::consistency;
+use crate::calibration::estimate::largest_growth;
+use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
+use crate::calibration::{
+    AttitudePrior, Auxiliary, BudgetSource, CalibrationError, Consistency, DwellScatter, Epoch,
+    Estimate, Finding, FormTest, FoundCause, Innovation, Linearisation, Model, NoiseReport,
+    OBSERVED_BELOW, Observability, Own, ParameterMatrix, ParameterVector, Pass, Posterior, Prior,
+    Problem, Reduction, Script, SeparateEstimate, Solved, Thermal,
+};
 use crate::imu::Sensor;
 
 /// χ² by which opposite headings differ where a run observes the heading.

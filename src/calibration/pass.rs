@@ -2,20 +2,14 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::error::CalibrationError;
-use super::problem::Problem;
-use super::reduction::Script;
-use crate::calibration::checks::innovation::Innovation;
 use crate::calibration::checks::observability::AttitudeCovariance;
-use crate::calibration::constants::{Constant, Posterior, parameters};
+use crate::calibration::constants::parameters;
 pub use crate::calibration::filter::Gate;
 use crate::calibration::filter::Judge;
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::PARAMETERS;
-use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_vector};
-use crate::calibration::reduction::Reduction;
-use crate::calibration::several::thermal::Thermal;
+use crate::calibration::{
+    Auxiliary, CalibrationError, Constant, Innovation, Linearisation, Model, PARAMETERS, Posterior,
+    Problem, Reduction, Script, Thermal, auxiliary_vector,
+};
 
 /// What a pass gives.
 #[derive(Debug, Clone)]

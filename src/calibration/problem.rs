@@ -4,14 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use super::budget::source::BudgetSource;
-use super::linearisation::{AttitudePrior, Start};
-use super::model::Model;
-use super::options::Options;
 use crate::attitude::{self, to_tilt_and_heading};
-use crate::calibration::checks::innovation::Observation;
+use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::linearisation::Start;
 use crate::calibration::record::schedule::{Step, first_reading, step_length, steps};
 use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
+use crate::calibration::{AttitudePrior, Model, Observation, Options};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};

@@ -1,20 +1,12 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
-use super::budget::{Budget, BudgetSource};
-use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::estimator::estimate;
-use super::gauss_newton::Progress;
-use super::outcome::Outcome;
-use super::problem::Problem;
-use super::result::{Calibration, Method, Provenance};
-use crate::calibration::checks::error_term_test::{
-    ErrorTermTest, bias_variation, test_error_terms,
+use crate::calibration::checks::error_term_test::bias_variation;
+use crate::calibration::result::Provenance;
+use crate::calibration::{
+    Budget, BudgetSource, Calibration, CalibrationError, ClosedForm, ErrorTermTest, Estimate,
+    Finding, Method, Mounting, Outcome, Problem, Progress, Quality, estimate, six_position,
+    test_error_terms,
 };
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::quality::Quality;
-use crate::calibration::start::closed_form::{ClosedForm, six_position};
-use crate::calibration::start::mounting::Mounting;
 use crate::imu::PerSensor;
 use crate::room;
 use crate::run::Run;

@@ -1,14 +1,9 @@
 //! What iterations found, and with what they were made.
 
-use super::error::CalibrationError;
-use super::gauss_newton::{Iterated, Pass, Progress, iterate};
-use super::linearisation::AttitudePrior;
-use super::pass::Gate;
-use super::problem::Problem;
-use crate::calibration::checks::cause::FoundCause;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::noise::NoiseReport;
-use crate::calibration::several::separate_estimate::SeparateEstimate;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Finding, FoundCause, Gate, Iterated, NoiseReport, Pass,
+    Problem, Progress, SeparateEstimate, iterate,
+};
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]

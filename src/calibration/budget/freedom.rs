@@ -1,8 +1,7 @@
 //! How well the variance of a source is known.
 
 use super::source::BudgetSource;
-use crate::calibration::noise::Source;
-use crate::calibration::outcome::Outcome;
+use crate::calibration::{Outcome, Source};
 
 /// The end of a 95 % interval, in σ.
 const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;

@@ -15,13 +15,11 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::constants::{Prior, of_parameters};
-use super::error::CalibrationError;
-use super::outcome::Outcome;
-use super::parameters::{PARAMETERS, ParameterMatrix};
-use super::problem::Problem;
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::layout::Layout;
+use crate::calibration::constants::of_parameters;
+use crate::calibration::{
+    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem,
+};
 use crate::imu::{MotionNoise, Sensor};
 use crate::run::{Aiding, Run};
 use crate::statistics::student_limit;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::finding::Finding;
+use crate::calibration::Finding;
 use crate::statistics::FALSE_ALARM;
 
 /// What was observed.

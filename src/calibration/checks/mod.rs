@@ -17,9 +17,7 @@ pub mod rest_scatter;
 pub mod rounding;
 pub mod unexplained;
 
-use super::budget::BudgetSource;
-use super::outcome::Outcome;
-use super::problem::Problem;
+use crate::calibration::{BudgetSource, Outcome, Problem};
 use cause::{FoundCause, settling};
 use error_term_test::{ErrorTermTest, biases_may_vary};
 use finding::Finding;

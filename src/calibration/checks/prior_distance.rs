@@ -3,11 +3,9 @@
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-use super::finding::Finding;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{
-    ParameterMatrix, from_vector, parameter, parameter_name, sensor_and_parameter,
+use crate::calibration::{
+    Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
+    sensor_and_parameter,
 };
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};

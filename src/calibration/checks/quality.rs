@@ -6,13 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::attitude::{exp, level, log, tilt};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::linearisation::{Linearisation, singular};
-use crate::calibration::outcome::Outcome;
-use crate::calibration::pass::{Gate, pass};
-use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::reduction::Script;
-use crate::calibration::start::closed_form::{ClosedForm, Reference, six_position_by};
+use crate::calibration::linearisation::singular;
+use crate::calibration::start::closed_form::six_position_by;
+use crate::calibration::{
+    CalibrationError, ClosedForm, Gate, Linearisation, Outcome, Problem, Reference, Script,
+    Stretch, pass,
+};
 use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
 use crate::recording::{LabelledMotion, Segment};

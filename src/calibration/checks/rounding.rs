@@ -11,10 +11,9 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde_json::json;
 
-use super::finding::{Finding, triad_name, widened_by};
+use super::finding::{triad_name, widened_by};
 use crate::calibration::estimate::largest_growth;
-use crate::calibration::parameters::{ParameterMatrix, parameter};
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, ParameterMatrix, Problem, parameter};
 use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;

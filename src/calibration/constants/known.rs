@@ -3,7 +3,7 @@
 use faer::MatRef;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Posterior, Prior};
+use crate::calibration::{Posterior, Prior};
 
 /// What is known of constants so far.
 #[derive(Debug, Clone)]

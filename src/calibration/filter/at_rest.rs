@@ -7,9 +7,10 @@ use super::gain_cache::StepModel;
 use super::input_prior::InputPrior;
 use super::propagation::{effect_of, of_moving, own};
 use super::update::Linear;
-use crate::calibration::constants::{Constant, DisturbanceKind, Known};
-use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::Rest;
+use crate::calibration::{
+    ATTITUDE, Constant, DisturbanceKind, Known, NAVIGATION, POSITION, VELOCITY,
+};
 use crate::navigation::Block;
 
 /// Rates and specific forces that are constant in a dwell.

@@ -5,12 +5,10 @@ use super::at_rest::{Map, begins};
 use super::dwell_filter::{DwellFilter, Observed, Summary};
 use super::gain_cache::GainCache;
 use super::gate::{Judge, Verdict};
-use crate::calibration::checks::innovation::Observation;
-use crate::calibration::constants::Known;
-use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
-use crate::calibration::model::Model;
-use crate::calibration::problem::Stretch;
 use crate::calibration::record::Rest;
+use crate::calibration::{
+    ATTITUDE, Known, Model, NAVIGATION, Observation, POSITION, Stretch, VELOCITY,
+};
 
 /// What a part of a dwell did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

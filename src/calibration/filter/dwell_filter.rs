@@ -14,7 +14,7 @@ use super::gain_cache::GainCache;
 use super::gate::{Judge, Verdict};
 use super::input_prior::InputPrior;
 use super::rows::{add, factor};
-use crate::calibration::checks::innovation::Observation;
+use crate::calibration::Observation;
 
 /// An observation of three components: navigation errors from `state` on.
 pub struct Observed {

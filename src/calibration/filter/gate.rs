@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::calibration::checks::innovation::{Innovation, Observation};
+use crate::calibration::{Innovation, Observation};
 
 /// After this many rejections in a row the gate doubts itself rather than the data.
 const REOPEN: usize = 5;

@@ -18,12 +18,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::constants::{Constant, DisturbanceKind};
-use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
-use crate::calibration::model::Model;
 use crate::calibration::record::between;
-use crate::calibration::several::day_to_day::{DayToDay, Difference, Turned};
+use crate::calibration::several::day_to_day::Turned;
+use crate::calibration::{
+    ATTITUDE, Constant, DayToDay, Difference, DisturbanceKind, Layout, Model, NAVIGATION, POSITION,
+    VELOCITY,
+};
 use crate::imu::PerSensor;
 use crate::navigation::{ProcessNoise, State};
 use columns::Columns;

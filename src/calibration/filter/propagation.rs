@@ -4,10 +4,11 @@ use nalgebra::DMatrix;
 
 use super::Filter;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::constants::{Constant, DisturbanceKind};
-use crate::calibration::layout::{ATTITUDE, NAVIGATION, VELOCITY};
-use crate::calibration::parameters::{ParameterVector, parameter, sensor_and_parameter};
 use crate::calibration::several::day_to_day::OwnState;
+use crate::calibration::{
+    ATTITUDE, Constant, DisturbanceKind, NAVIGATION, ParameterVector, VELOCITY, parameter,
+    sensor_and_parameter,
+};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix};
 

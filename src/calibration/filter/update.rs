@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Filter;
-use crate::calibration::layout::POSITION;
+use crate::calibration::POSITION;
 use crate::navigation::State;
 
 /// Quantities that are linear in the errors, a row each: by state, and by constant that is no state.

@@ -5,9 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::likelihood_ratio::{INTERVAL, limit};
 use super::report::{NoiseReport, SourceFigures, noise_learnt};
 use super::source::Source;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::model::Model;
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, Model, Problem};
 use crate::statistics::FALSE_ALARM;
 
 /// Longest step of ln of a variance.

@@ -1,10 +1,9 @@
 //! The variance of every source, over a reference.
 
 use super::source::Source;
-use crate::calibration::model::Model;
-use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::step_length;
 use crate::calibration::reduction::Moves;
+use crate::calibration::{Model, Problem};
 use crate::imu::Sensor;
 use crate::run::Aiding;
 

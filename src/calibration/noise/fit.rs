@@ -10,11 +10,7 @@ use rayon::prelude::*;
 
 use super::factors::{Factors, SOURCES, Scale};
 use super::likelihood_ratio::limit;
-use crate::calibration::checks::innovation::Innovation;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::pass::{Gate, PassResult, pass};
-use crate::calibration::problem::Problem;
-use crate::calibration::reduction::Script;
+use crate::calibration::{CalibrationError, Gate, Innovation, PassResult, Problem, Script, pass};
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;

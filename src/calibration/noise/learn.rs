@@ -6,14 +6,11 @@ use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
 use super::source::Source;
-use crate::calibration::checks::innovation::{Innovation, Observation};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::gauss_newton::{Progress, iterate};
-use crate::calibration::pass::{Gate, pass};
-use crate::calibration::problem::Problem;
 use crate::calibration::record::schedule::Step;
-use crate::calibration::reduction::Script;
-use crate::calibration::solved::Solved;
+use crate::calibration::{
+    CalibrationError, Gate, Innovation, Observation, Problem, Progress, Script, Solved, iterate,
+    pass,
+};
 use crate::statistics::FALSE_ALARM;
 
 /// Points of linearisation at most.

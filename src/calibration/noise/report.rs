@@ -7,8 +7,7 @@ use serde_json::json;
 
 use super::policy::NoisePolicy;
 use super::source::Source;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, Problem};
 
 /// What noise a calibration used, and how it came to that.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

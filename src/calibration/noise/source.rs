@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::model::Model;
-use crate::calibration::problem::Problem;
+use crate::calibration::{Model, Problem};
 use crate::imu::{GaussMarkov, PerSensor, Sensor};
 use crate::navigation::ProcessNoise;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};

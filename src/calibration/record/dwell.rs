@@ -7,8 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::schedule::{AtRest, Step};
 use crate::attitude::{log, to_tilt_and_heading};
-use crate::calibration::checks::innovation::Observation;
-use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::{Observation, Problem, Stretch};
 use crate::navigation::{Block, Navigator, State};
 use crate::turntable::AxisResponse;
 

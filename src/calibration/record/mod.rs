@@ -6,11 +6,8 @@ pub mod standstill;
 
 use nalgebra::Matrix3;
 
-use super::error::CalibrationError;
-use super::layout::Layout;
-use super::linearisation::{Linearisation, singular};
-use super::model::Model;
-use super::problem::{Problem, Stretch};
+use crate::calibration::linearisation::singular;
+use crate::calibration::{CalibrationError, Layout, Linearisation, Model, Problem, Stretch};
 use crate::navigation::{Block, Navigator, State};
 pub use dwell::{Rest, between, part_of};
 use dwell::{longest, samples_of};

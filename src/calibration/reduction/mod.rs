@@ -9,11 +9,12 @@ mod smoothed;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::constants::{Constant, Known, Posterior, Prior, triangle};
-use super::linearisation::Linearisation;
-use super::parameters::{ParameterVector, from_vector, to_vector};
 use crate::attitude::from_tilt_and_heading;
-use crate::calibration::several::thermal::Coefficient;
+use crate::calibration::constants::triangle;
+use crate::calibration::{
+    Coefficient, Constant, Known, Linearisation, ParameterVector, Posterior, Prior, from_vector,
+    to_vector,
+};
 pub use script::{Moves, Script};
 pub use smoothed::{Own, Smoothed};
 

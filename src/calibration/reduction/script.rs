@@ -1,16 +1,14 @@
 //! What happens in a record at one point of linearisation: navigation is done once, the filter as often as noise is tried
 //! or a variance is changed.
 
+use super::Part;
 use super::smoothed::Smoothed;
-use super::{Part, Reduction};
-use crate::calibration::constants::{Known, Prior};
-use crate::calibration::error::CalibrationError;
 use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken};
-use crate::calibration::layout::Layout;
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::model::Model;
-use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::record::{Event, Rest, events};
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Known, Layout, Linearisation, Model, Prior, Problem,
+    Reduction, Stretch,
+};
 use crate::imu::{PerSensor, Sensor};
 
 /// Rows of a dwell are kept apart for each second …

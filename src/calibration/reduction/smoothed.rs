@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibration::constants::Posterior;
 use crate::calibration::filter::Filter;
-use crate::calibration::several::day_to_day::{Difference, OwnState};
+use crate::calibration::several::day_to_day::OwnState;
+use crate::calibration::{Difference, Posterior};
 
 /// States with what constants do to them: with these at c their mean is `x + U c`.
 ///

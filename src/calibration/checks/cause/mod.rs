@@ -11,15 +11,10 @@ pub mod settling;
 use nalgebra::Vector3;
 use serde_json::json;
 
-use super::finding::Finding;
-use super::innovation::{Innovation, Observation};
-use crate::calibration::constants::{Constant, Disturbance, DisturbanceKind, Prior};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::gauss_newton::Iterated;
-use crate::calibration::linearisation::AttitudePrior;
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::problem::Problem;
-use crate::calibration::reduction::Script;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
+    Innovation, Iterated, Observation, Prior, Problem, Script,
+};
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
 use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};

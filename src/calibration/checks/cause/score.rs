@@ -3,9 +3,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::calibration::checks::error_term_test::Evidence;
-use crate::calibration::constants::{Constant, Disturbance, Prior};
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::reduction::Reduction;
+use crate::calibration::{Constant, Disturbance, ErrorTerm, Prior, Reduction};
 
 /// Scores of the constants that are not estimated, beside those that are.
 pub struct Scores {

@@ -2,9 +2,7 @@
 
 use serde_json::json;
 
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::innovation::{Innovation, Observation};
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, Innovation, Observation, Problem};
 use crate::run::Aiding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 

@@ -3,16 +3,13 @@
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::{ErrorTermTest, Role};
-use crate::calibration::checks::finding::{Finding, widened_by};
-use crate::calibration::constants::Posterior;
-use crate::calibration::error::CalibrationError;
+use crate::calibration::checks::finding::widened_by;
 use crate::calibration::model::usual_variation;
 use crate::calibration::noise::LOG_SIGMA;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::ParameterMatrix;
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::problem::Problem;
+use crate::calibration::{
+    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Outcome, ParameterMatrix, Posterior,
+    Problem, Role,
+};
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 

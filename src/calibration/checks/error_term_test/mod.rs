@@ -11,14 +11,11 @@ mod terms_on;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::finding::{Finding, widened_by};
-use crate::calibration::constants::Posterior;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::parameters::group::Group;
-use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
-use crate::calibration::problem::Problem;
+use super::finding::widened_by;
+use crate::calibration::{
+    CalibrationError, ErrorTerm, Finding, Group, Outcome, PARAMETERS, ParameterMatrix, Posterior,
+    Problem,
+};
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
 pub use evidence::Evidence;

@@ -4,15 +4,10 @@ use nalgebra::DMatrix;
 
 use super::evidence::Evidence;
 use super::explanation::{Explanation, UnmodelledEffect};
-use crate::calibration::constants::{Posterior, Prior};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::model::Model;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::ParameterVector;
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::problem::Problem;
-use crate::calibration::reduction::Reduction;
+use crate::calibration::{
+    CalibrationError, ErrorTerm, Linearisation, Model, Outcome, ParameterVector, Posterior, Prior,
+    Problem, Reduction,
+};
 
 /// What a calibrated record says of every constant that it can hold, whatever is on.
 pub struct TermsOn<'a> {
