@@ -203,45 +203,35 @@ impl Model {
     /// Switches an error term on, with its usual σ unless the run states one. Nothing changes where the
     /// run cannot hold it.
     pub fn switch_on(&mut self, term: ErrorTerm) {
-        if self.has(term) || !self.can_have(term) {
-            return;
-        }
-        match term {
-            ErrorTerm::GaussMarkovBias => {
-                for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.gauss_markov = Some(usual_variation(noise));
-                }
-            }
-            ErrorTerm::TableBase => {
-                self.geometry.base = Vector3::new(USUAL_LEVEL, USUAL_LEVEL, USUAL_NORTH);
-            }
-            ErrorTerm::TableAxes(kind) => {
-                let sigma = usual_axis_error(kind, self.position_sigma);
-                self.geometry.axes += kind.of_table(self.table_axes, sigma);
-            }
-            ErrorTerm::Instrument(term) => {
-                for parameter in term.parameters() {
-                    self.term_sigma[parameter] = term.usual_sigma();
-                }
-            }
+        if !self.has(term) && self.can_have(term) {
+            self.set(term, 1.0);
         }
     }
 
     /// Switches an error term off.
     pub fn switch_off(&mut self, term: ErrorTerm) {
+        self.set(term, 0.0);
+    }
+
+    /// Sets an error term to its usual σ times this: one or zero.
+    fn set(&mut self, term: ErrorTerm, times: f64) {
         match term {
             ErrorTerm::GaussMarkovBias => {
                 for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.gauss_markov = None;
+                    noise.gauss_markov = (times > 0.0).then(|| usual_variation(noise));
                 }
             }
-            ErrorTerm::TableBase => self.geometry.base = Vector3::zeros(),
+            ErrorTerm::TableBase => {
+                self.geometry.base = times * Vector3::new(USUAL_LEVEL, USUAL_LEVEL, USUAL_NORTH);
+            }
             ErrorTerm::TableAxes(kind) => {
+                let sigma = times * usual_axis_error(kind, self.position_sigma);
                 self.geometry.axes.rows_range_mut(kind.range()).fill(0.0);
+                self.geometry.axes += kind.of_table(self.table_axes, sigma);
             }
             ErrorTerm::Instrument(term) => {
                 for parameter in term.parameters() {
-                    self.term_sigma[parameter] = 0.0;
+                    self.term_sigma[parameter] = times * term.usual_sigma();
                 }
             }
         }

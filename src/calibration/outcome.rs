@@ -177,9 +177,7 @@ impl Outcome {
         let problem = causes.fold(problem.settled(self.settling), |problem, of| {
             of.taken_into(&problem)
         });
-        let mut model = problem.model.clone();
-        model.prior_sigma = self.model.prior_sigma;
-        problem.with_model(model)
+        problem.with(|model| model.prior_sigma = self.model.prior_sigma)
     }
 
     /// Which observations were let in.

@@ -8,7 +8,7 @@ pub use crate::calibration::filter::Gate;
 use crate::calibration::filter::Judge;
 use crate::calibration::{
     Auxiliary, CalibrationError, Constant, Innovation, Linearisation, Model, PARAMETERS, Posterior,
-    Problem, Reduction, Script, Thermal, auxiliary_vector,
+    Prior, Problem, Reduction, Script, Thermal, auxiliary_vector,
 };
 
 /// What a pass gives.
@@ -33,13 +33,13 @@ pub fn pass(
 ) -> Result<PassResult, CalibrationError> {
     let limit = problem.gate_limit();
     let mut judge = Judge::new(gate, limit);
-    let mut known = script.known(problem);
-    let reduction = script.follow(problem, &mut judge, Some(&mut known))?;
+    let reduction = script.follow(problem, &mut judge, true)?;
+    let prior = Prior::new(&reduction.constants, &problem.model, script.at);
     let innovations = judge.innovations;
     let cost = |of: &Innovation| if of.accepted { of.distance() } else { limit };
     Ok(PassResult {
         at: script.at.clone(),
-        posterior: reduction.posterior_of(&known),
+        posterior: reduction.posterior(&prior),
         reduction,
         cost: innovations.iter().map(cost).sum(),
         innovations,

@@ -46,9 +46,10 @@ impl<'a> Solved<'a> {
 
     /// The problem that was solved with noise and prior as they are stated; recordings differ as they show.
     pub fn as_stated(&self, stated: &Problem<'a>) -> Problem<'a> {
-        let mut model = self.problem.model.with_noise_of(&stated.model);
-        model.prior_sigma = stated.model.prior_sigma;
-        self.problem.with_model(model)
+        self.problem.with(|model| {
+            *model = model.with_noise_of(&stated.model);
+            model.prior_sigma = stated.model.prior_sigma;
+        })
     }
 
     /// What iterating again led to, unless it failed or converged less than this did.

@@ -62,9 +62,8 @@ impl Budget {
         let problem = &outcome.as_calibrated(problem);
         let (script, accepted) = (outcome.script(problem)?, outcome.accepted());
         let reduction = |varied| {
-            let mut model = problem.model.clone();
-            model.varied = varied;
-            script.reduce(&problem.with_model(model), &accepted)
+            let problem = problem.with(|model| model.varied = varied);
+            script.reduce(&problem, &accepted)
         };
         let own = reduction(None)?;
         let prior = Prior::new(&own.constants, &problem.model, &outcome.linearised_at);

@@ -4,7 +4,6 @@ use super::source::Source;
 use crate::calibration::record::schedule::step_length;
 use crate::calibration::reduction::Moves;
 use crate::calibration::{Model, Problem};
-use crate::imu::Sensor;
 use crate::run::Aiding;
 
 /// Number of sources.
@@ -31,52 +30,35 @@ pub struct Scale {
 
 impl Scale {
     pub fn new(problem: &Problem, moves: &Moves) -> Self {
-        let step = problem.stretches().first().map_or(0.0, |stretch| {
-            let period = stretch.run.recording.imu.period;
-            step_length(period) as f64 * period
-        });
-        let durations = problem
-            .stretches()
-            .iter()
-            .map(|stretch| stretch.run.recording.imu.duration());
-        let walk = |sensor| problem.model.noise.get(sensor).random_walk.powi(2);
-        // Over all moves as much as the random walk.
-        let of_moves = |sensor: Sensor, input: f64| {
-            if input > 0.0 {
-                walk(sensor) * moves.duration / input
-            } else {
-                0.0
-            }
-        };
-        // As much in a step as the random walk.
-        let over_step = |variance: f64| if step > 0.0 { variance / step } else { 0.0 };
+        let of_stretches = problem.stretches().iter();
+        let periods = of_stretches.clone().map(|of| of.run.recording.imu.period);
+        let mut steps = periods.map(|period| step_length(period) as f64 * period);
+        let step = steps.next().unwrap_or(0.0);
+        let durations = of_stretches.map(|of| of.run.recording.imu.duration());
+        let over = |variance: f64, input: f64| if input > 0.0 { variance / input } else { 0.0 };
         let table = problem.model.aiding == Aiding::Table;
         let reference = |source: Source| {
-            let sigma = source.sigma(problem);
+            let sensor = source.triad();
+            let walk = problem.model.noise.get(sensor).random_walk.powi(2);
+            // Over all moves as much as the random walk.
+            let of_moves = |input: f64| over(walk * moves.duration, input);
             match source {
                 // Beside a table's readings it says nothing.
                 Source::Attitude | Source::RotationAtRest if table => 0.0,
                 Source::AccelMotion | Source::AccelMoving if problem.model.velocity_anew => 0.0,
-                _ if source.stated(problem) => sigma.powi(2),
-                Source::GyroMotion => of_moves(Sensor::Gyro, moves.motion.gyro),
-                Source::AccelMotion => of_moves(Sensor::Accel, moves.motion.accel),
-                Source::GyroMoving => of_moves(Sensor::Gyro, moves.duration),
-                Source::AccelMoving => of_moves(Sensor::Accel, moves.duration),
-                Source::Velocity => walk(Sensor::Accel) * step,
-                Source::Attitude => walk(Sensor::Gyro) * step,
-                Source::RotationAtRest => walk(Sensor::Gyro),
-                Source::GyroGaussMarkov => over_step(walk(Sensor::Gyro)),
-                Source::AccelGaussMarkov => over_step(walk(Sensor::Accel)),
+                _ if source.stated(problem) => source.sigma(problem).powi(2),
+                Source::GyroMotion | Source::AccelMotion => of_moves(*moves.motion.get(sensor)),
+                Source::GyroMoving | Source::AccelMoving => of_moves(moves.duration),
+                // As much in a step as the random walk.
+                Source::Velocity | Source::Attitude => walk * step,
+                Source::RotationAtRest => walk,
+                Source::GyroGaussMarkov | Source::AccelGaussMarkov => over(walk, step),
                 _ => 0.0,
             }
         };
         let reference = Source::ALL.map(reference);
-        let mut initial = Factors([0.0; SOURCES]);
-        for (k, source) in Source::ALL.into_iter().enumerate() {
-            if reference[k] > 0.0 {
-                initial.0[k] = source.sigma(problem).powi(2) / reference[k];
-            }
-        }
+        let initial = |k: usize| over(Source::ALL[k].sigma(problem).powi(2), reference[k]);
+        let initial = Factors(std::array::from_fn(initial));
         Self {
             reference,
             stated: std::array::from_fn(|k| reference[k] > 0.0 && Source::ALL[k].stated(problem)),

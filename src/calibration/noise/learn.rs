@@ -35,8 +35,9 @@ pub fn learn<'a>(
     if policy == NoisePolicy::Stated {
         return Ok(solved);
     }
-    let model = solved.problem.model.with_noise_of(&as_stated.model);
-    let as_stated = solved.problem.with_model(model);
+    let as_stated = solved
+        .problem
+        .with(|model| *model = model.with_noise_of(&as_stated.model));
     let accepted = solved.iterated.held.accepted();
     let thinned = Thinned::new(&as_stated, (accepted.len() / ENOUGH).clamp(1, LONGEST));
     let script = Script::new(&thinned.problem, &solved.priors, &solved.iterated.estimate)?;
@@ -47,11 +48,11 @@ pub fn learn<'a>(
     if test.rejected || policy == NoisePolicy::Learnt {
         return with_noise(&as_stated, solved.clone(), (fit, test), &scale, progress);
     }
+    let solved = match solved.problem.model == as_stated.model {
+        true => solved,
+        false => solved.again(as_stated, progress)?,
+    };
     let noise = NoiseReport::stated(policy, Some(test));
-    if solved.problem.model == as_stated.model {
-        return Ok(Solved { noise, ..solved });
-    }
-    let solved = solved.again(as_stated, progress)?;
     Ok(Solved { noise, ..solved })
 }
 
@@ -107,13 +108,11 @@ impl<'a> Thinned<'a> {
         let thinned = problem.observed_every(steps_of_dwell);
         let mut groups = Vec::new();
         let mut next = 0;
-        for (all, few) in problem.stretches().iter().zip(thinned.stretches()) {
-            let mut all = all
-                .steps
-                .iter()
-                .filter(|step| step.at_rest.is_some())
-                .peekable();
-            for step in few.steps.iter().filter(|step| step.at_rest.is_some()) {
+        let pairs = problem.stretches().iter().zip(thinned.stretches());
+        for (all, few) in pairs {
+            let [all, few] = [all, few].map(|of| of.steps.iter().filter(|s| s.at_rest.is_some()));
+            let mut all = all.peekable();
+            for step in few {
                 let mut of_kinds: [Vec<usize>; Observation::ALL.len()] = Default::default();
                 let within = |one: &&Step| one.samples.end <= step.samples.end;
                 while let Some(one) = all.next_if(within) {
@@ -189,25 +188,17 @@ impl Likelihood<'_> {
         let sigmas = self.sigma(factors, &sources)?;
         let stated = self.scale.initial();
         let of = |(&k, sigma): (&usize, &Option<f64>)| {
-            let source = Source::ALL[k];
-            let (unit, value) = source.unit();
-            let used = self.scale.sigma(factors, k) / value;
+            let used = self.scale.sigma(factors, k);
             let interval = sigma.map(|sigma| match factors.0[k] {
                 0.0 => {
                     let mut upper = *factors;
                     upper.0[k] = ONE_SIDED * sigma;
-                    [0.0, self.scale.sigma(&upper, k) / value]
+                    [0.0, self.scale.sigma(&upper, k)]
                 }
                 _ => [-1.0, 1.0].map(|side| used * (side * INTERVAL * sigma).exp()),
             });
-            SourceFigures {
-                source,
-                name: source.name().to_owned(),
-                unit: unit.to_owned(),
-                stated: (stated.0[k] > 0.0).then(|| self.scale.sigma(&stated, k) / value),
-                used,
-                interval,
-            }
+            let stated = (stated.0[k] > 0.0).then(|| self.scale.sigma(&stated, k));
+            SourceFigures::new(Source::ALL[k], stated, used, interval)
         };
         Ok(NoiseReport {
             policy,

@@ -92,6 +92,24 @@ impl fmt::Display for NoiseReport {
 }
 
 impl SourceFigures {
+    /// Of σ in SI and radians.
+    pub(in crate::calibration) fn new(
+        source: Source,
+        stated: Option<f64>,
+        used: f64,
+        interval: Option<[f64; 2]>,
+    ) -> Self {
+        let (unit, value) = source.unit();
+        Self {
+            source,
+            name: source.name().to_owned(),
+            unit: unit.to_owned(),
+            stated: stated.map(|sigma| sigma / value),
+            used: used / value,
+            interval: interval.map(|ends| ends.map(|sigma| sigma / value)),
+        }
+    }
+
     /// Whether it is there at all, stated or learnt.
     pub fn counts(&self) -> bool {
         self.used > 0.0 || self.stated.is_some()

@@ -90,11 +90,6 @@ impl Reduction {
     pub fn posterior(&self, prior: &Prior) -> Posterior {
         let mut known = Known::new(prior.clone());
         self.parts.iter().for_each(|part| known.learn(&part.rows));
-        self.posterior_of(&known)
-    }
-
-    /// With what is known where all rows are among it.
-    pub fn posterior_of(&self, known: &Known) -> Posterior {
         let of_rows = known.posterior();
         Posterior {
             cost: of_rows.cost + self.squares,

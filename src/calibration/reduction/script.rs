@@ -67,37 +67,30 @@ impl<'a> Script<'a> {
         moves
     }
 
-    /// What is known of the constants before the data.
-    pub fn known(&self, problem: &Problem) -> Known {
-        let layout = Layout::new(&problem.model, problem.one_gravity());
-        Known::new(Prior::new(layout.constants(), &problem.model, self.at))
-    }
-
-    /// What the record says of the constants, without innovations.
+    /// What the record says of the constants, without innovations. `accepted` tells of each observation of
+    /// three components whether it is let in; those beyond its end are.
     pub fn reduce(
         &self,
         problem: &Problem,
         accepted: &[bool],
     ) -> Result<Reduction, CalibrationError> {
-        self.follow(
-            problem,
-            &mut Judge::new(Gate::As(accepted), f64::INFINITY),
-            None,
-        )
+        let mut judge = Judge::new(Gate::As(accepted), f64::INFINITY);
+        self.follow(problem, &mut judge, false)
     }
 
-    /// Takes a filter through the record. What is `known` of the constants, if it is told, learns as it goes.
+    /// Takes a filter through the record, with innovations or without.
     pub fn follow(
         &self,
         problem: &Problem,
         judge: &mut Judge,
-        known: Option<&mut Known>,
+        with_innovations: bool,
     ) -> Result<Reduction, CalibrationError> {
         let filter = Filter::new(&problem.model, problem.one_gravity());
+        let prior = Prior::new(filter.layout.constants(), &problem.model, self.at);
         let mut follower = Follower {
             dwells: DwellFilters::of(&filter),
+            known: with_innovations.then(|| Known::new(prior)),
             filter,
-            known,
             parts: Vec::new(),
             dwell: 0,
         };
@@ -153,25 +146,17 @@ impl<'a> Script<'a> {
 }
 
 /// A filter on its way through a record.
-struct Follower<'k> {
+struct Follower {
     filter: Filter,
     dwells: DwellFilters,
-    known: Option<&'k mut Known>,
+    /// What is known of the constants so far, where innovations are worked out.
+    known: Option<Known>,
     parts: Vec<Part>,
     /// Number of dwells that have ended.
     dwell: usize,
 }
 
-/// Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an outlier that it lets in
-/// closes the gate to the good observations that follow.
-struct Begin {
-    event: usize,
-    filter: Filter,
-    known: Option<Known>,
-    parts: usize,
-}
-
-impl Follower<'_> {
+impl Follower {
     fn through(
         &mut self,
         events: &[Event],
@@ -179,7 +164,9 @@ impl Follower<'_> {
         judge: &mut Judge,
     ) -> Result<(), CalibrationError> {
         let apart = APART.max(of.1.run.recording.imu.duration() / EPOCHS);
-        let mut begin: Option<Begin> = None;
+        // Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an outlier that
+        // it lets in closes the gate to the good observations that follow.
+        let mut begin: Option<(usize, usize, Filter, Known)> = None;
         let mut next = 0;
         while let Some(event) = events.get(next) {
             next += 1;
@@ -190,29 +177,29 @@ impl Follower<'_> {
                 }
                 Event::Rest(rest) => rest,
             };
-            if rest.first && begin.as_ref().is_none_or(|begin| begin.event + 1 != next) {
+            if rest.first && begin.as_ref().is_none_or(|&(event, ..)| event + 1 != next) {
                 judge.begin(rest.new_position);
-                begin = self.known.is_some().then(|| self.here(next - 1));
+                begin = self.known.clone().map(|known| {
+                    let filter = self.filter.clone();
+                    (next - 1, self.parts.len(), filter, known)
+                });
             }
-            match (self.rest(rest, of, judge), &begin) {
+            self.filter.begin_rest(rest, of.0, of.1);
+            self.learn();
+            let (filter, known) = (&mut self.filter, self.known.as_ref());
+            match (self.dwells.take_in(filter, rest, of, known, judge), &begin) {
                 (Taken::Whole, _) => self.keep(rest, apart)?,
-                (Taken::Abandoned, Some(begin)) => {
+                (Taken::Abandoned, Some((event, parts, filter, known))) => {
                     judge.begin_again();
-                    self.go_back(begin);
-                    next = begin.event;
+                    self.parts.truncate(*parts);
+                    self.filter = filter.clone();
+                    self.known = Some(known.clone());
+                    next = *event;
                 }
                 _ => return Err(CalibrationError::Diverged { time: rest.end() }),
             }
         }
         Ok(())
-    }
-
-    fn rest(&mut self, rest: &Rest, of: (&Model, &Stretch), judge: &mut Judge) -> Taken {
-        self.filter.begin_rest(rest, of.0, of.1);
-        self.learn();
-        let known = self.known.as_deref();
-        self.dwells
-            .take_in(&mut self.filter, rest, of, known, judge)
     }
 
     fn learn(&mut self) {
@@ -240,22 +227,5 @@ impl Follower<'_> {
         });
         self.dwell += usize::from(rest.last);
         Ok(())
-    }
-
-    fn here(&self, event: usize) -> Begin {
-        Begin {
-            event,
-            filter: self.filter.clone(),
-            known: self.known.as_deref().cloned(),
-            parts: self.parts.len(),
-        }
-    }
-
-    fn go_back(&mut self, begin: &Begin) {
-        self.filter = begin.filter.clone();
-        self.parts.truncate(begin.parts);
-        if let (Some(known), Some(before)) = (&mut self.known, &begin.known) {
-            **known = before.clone();
-        }
     }
 }

@@ -193,13 +193,11 @@ struct Tested<'a> {
 impl<'a> Tested<'a> {
     fn new(problem: &'a Problem, outcome: &'a Outcome) -> Result<Self, CalibrationError> {
         let model = &problem.model;
-        let mut other = model.clone();
-        match model.has(VARYING) {
+        let other = &problem.with(|other| match model.has(VARYING) {
             true => other.switch_off(VARYING),
             false => other.switch_on(VARYING),
-        }
+        });
         // The longer of the two first: a thread that is done with something else can take the other.
-        let other = &problem.with_model(other);
         let (otherwise, terms) = rayon::join(
             || Ok::<_, CalibrationError>(outcome.posterior(other, &outcome.reduction(other)?)),
             || TermsOn::new(problem, outcome),

@@ -27,9 +27,9 @@ pub struct With {
 impl<'a> TermsOn<'a> {
     pub fn new(problem: &'a Problem, outcome: &'a Outcome) -> Result<Self, CalibrationError> {
         let (model, at) = (&problem.model, &outcome.linearised_at);
-        let mut everything = model.clone();
-        ErrorTerm::constant().for_each(|term| everything.switch_on(term));
-        let reduction = outcome.reduction(&problem.with_model(everything))?.folded();
+        let everything =
+            problem.with(|model| ErrorTerm::constant().for_each(|term| model.switch_on(term)));
+        let reduction = outcome.reduction(&everything)?.folded();
         Ok(Self {
             own: With::new(&reduction, model, at),
             model,

@@ -16,6 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{log, skew, to_tilt_and_heading};
 use crate::calibration::budget::curvature::curvature;
+use crate::calibration::checks::innovation::Observation;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
@@ -164,7 +165,9 @@ impl<'a> Batch<'a> {
         }
         let mut rows = Vec::new();
         if accepted() {
-            let variance = self.stretch.velocity_variance(model);
+            let variance = self
+                .stretch
+                .observation_variance(model, Observation::Velocity, 1);
             rows.push((VELOCITY, state.velocity, variance));
         }
         if let Some((reading, count)) = &at_rest.reading
@@ -176,7 +179,9 @@ impl<'a> Batch<'a> {
         }
         if held && accepted() {
             let difference = -log(&(state.attitude * self.held.transpose()));
-            let variance = self.stretch.attitude_variance(model);
+            let variance = self
+                .stretch
+                .observation_variance(model, Observation::Attitude, 1);
             rows.push((ATTITUDE, difference, variance));
         }
         self.information.observe(&rows);
