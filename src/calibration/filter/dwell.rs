@@ -6,9 +6,7 @@ use super::dwell_filter::{DwellFilter, Observed, Summary};
 use super::gain_cache::GainCache;
 use super::gate::{Judge, Verdict};
 use crate::calibration::record::Rest;
-use crate::calibration::{
-    ATTITUDE, Known, Model, NAVIGATION, Observation, POSITION, Stretch, VELOCITY,
-};
+use crate::calibration::{ATTITUDE, Known, NAVIGATION, Observation, POSITION, Stretch, VELOCITY};
 
 /// What a part of a dwell did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,51 +17,45 @@ pub enum Taken {
     Diverged,
 }
 
-/// Takes parts of dwells into filters of one kind, by what moves in them.
-pub enum DwellFilters {
-    /// Navigation errors alone.
-    Navigation(GainCache<9, 12>),
-    /// And the turn at rest, or the biases of a triad.
-    Three(GainCache<12, 15>),
-    /// And two of these.
-    Six(GainCache<15, 18>),
-    /// And all of them.
-    Nine(GainCache<18, 21>),
-}
-
-impl DwellFilters {
-    /// Of filters like this.
-    pub fn of(filter: &Filter) -> Self {
-        let moving = filter.moving().len();
-        match moving {
-            9 => Self::Navigation(GainCache::new(begins(moving))),
-            12 => Self::Three(GainCache::new(begins(moving))),
-            15 => Self::Six(GainCache::new(begins(moving))),
-            _ => Self::Nine(GainCache::new(begins(moving))),
-        }
-    }
-
+/// Takes parts of dwells into filters of one kind.
+pub trait DwellFilters {
     /// Takes in a part of a dwell. Innovations are worked out where it is told what is `known` of the constants.
-    pub fn take_in(
+    fn take_in(
         &mut self,
         filter: &mut Filter,
-        rest: &Rest,
-        of: (&Model, &Stretch),
+        of: (&Rest, &Stretch),
+        known: Option<&Known>,
+        judge: &mut Judge,
+    ) -> Taken;
+}
+
+impl<const M: usize, const G: usize> DwellFilters for GainCache<M, G> {
+    fn take_in(
+        &mut self,
+        filter: &mut Filter,
+        of: (&Rest, &Stretch),
         known: Option<&Known>,
         judge: &mut Judge,
     ) -> Taken {
-        match self {
-            Self::Navigation(gains) => filter.update_dwell((rest, gains), of, known, judge),
-            Self::Three(gains) => filter.update_dwell((rest, gains), of, known, judge),
-            Self::Six(gains) => filter.update_dwell((rest, gains), of, known, judge),
-            Self::Nine(gains) => filter.update_dwell((rest, gains), of, known, judge),
-        }
+        filter.update_dwell(self, of, known, judge)
+    }
+}
+
+/// Of filters like this, by what moves in them: navigation errors, then turn at rest or the biases of a triad, then
+/// two of these, then all.
+pub fn dwell_filters(filter: &Filter) -> Box<dyn DwellFilters> {
+    let moving = filter.moving().len();
+    match moving {
+        9 => Box::new(GainCache::<9, 12>::new(begins(moving))),
+        12 => Box::new(GainCache::<12, 15>::new(begins(moving))),
+        15 => Box::new(GainCache::<15, 18>::new(begins(moving))),
+        _ => Box::new(GainCache::<18, 21>::new(begins(moving))),
     }
 }
 
 impl Filter {
     /// A part of a dwell begins, before anything is observed of it.
-    pub fn begin_rest(&mut self, rest: &Rest, model: &Model, stretch: &Stretch) {
+    pub fn begin_rest(&mut self, rest: &Rest, stretch: &Stretch) {
         if rest.first {
             self.come_to_rest(&rest.from);
         }
@@ -72,21 +64,21 @@ impl Filter {
             self.begin_dwell();
             self.begin_to_hold();
         }
-        if rest.first && rest.new_position && model.velocity_anew {
-            self.redraw_velocity(stretch.velocity_sigma());
-        }
         if rest.first && rest.new_position {
-            self.redraw_table(model.position_sigma);
+            if self.model.velocity_anew {
+                self.redraw_velocity(stretch.velocity_sigma());
+            }
+            self.redraw_table();
             // Between positions the IMU moves by its distance from the table's centre, within one
             // not at all: one observation a dwell, however long it is.
-            self.update_position(&rest.begin, stretch.position_variance(model));
+            self.update_position(&rest.begin, stretch.position_variance(&self.model));
         }
     }
 
     fn update_dwell<const M: usize, const G: usize>(
         &mut self,
-        (rest, gains): (&Rest, &mut GainCache<M, G>),
-        of: (&Model, &Stretch),
+        gains: &mut GainCache<M, G>,
+        (rest, stretch): (&Rest, &Stretch),
         known: Option<&Known>,
         judge: &mut Judge,
     ) -> Taken {
@@ -100,7 +92,7 @@ impl Filter {
         let across = &map.given.states * &self.p;
         let given = known.map(|known| self.given(&map.given, &across, known));
         let mut dwell = DwellFilter::new(given, gains);
-        match self.through(&mut dwell, rest, of, judge) {
+        match self.through(&mut dwell, (rest, stretch), judge) {
             Taken::Whole => {}
             other => return other,
         }
@@ -120,8 +112,7 @@ impl Filter {
     fn through<const M: usize, const G: usize>(
         &self,
         dwell: &mut DwellFilter<M, G>,
-        rest: &Rest,
-        (model, stretch): (&Model, &Stretch),
+        (rest, stretch): (&Rest, &Stretch),
         judge: &mut Judge,
     ) -> Taken {
         let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
@@ -142,7 +133,7 @@ impl Filter {
                         Observation::Attitude => turn.unwrap_or(ATTITUDE),
                     },
                     residual: seen.residual,
-                    variance: stretch.observation_variance(model, seen.kind, seen.readings),
+                    variance: stretch.observation_variance(&self.model, seen.kind, seen.readings),
                 };
                 match dwell.observe(&observed, judge) {
                     None => return Taken::Diverged,

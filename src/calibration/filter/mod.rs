@@ -11,19 +11,17 @@ mod propagation;
 mod rows;
 mod update;
 
-pub use dwell::{DwellFilters, Taken};
+pub use dwell::{DwellFilters, Taken, dwell_filters};
 pub use gate::{Gate, Judge};
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::attitude::skew;
-use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::linearisation::Start;
 use crate::calibration::record::between;
 use crate::calibration::several::day_to_day::Turned;
 use crate::calibration::{
-    ATTITUDE, Constant, DayToDay, Difference, DisturbanceKind, Layout, Model, NAVIGATION, POSITION,
-    VELOCITY,
+    ATTITUDE, Constant, Difference, DisturbanceKind, Layout, Model, NAVIGATION, POSITION, VELOCITY,
 };
 use crate::imu::PerSensor;
 use crate::navigation::{ProcessNoise, State};
@@ -35,20 +33,16 @@ pub struct Filter {
     pub layout: Layout,
     x: DVector<f64>,
     p: DMatrix<f64>,
+    model: Model,
     noise: PerSensor<ProcessNoise>,
-    /// Of the turn at rest alone, rad/√s.
-    rotation_at_rest: f64,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-    day_to_day: DayToDay,
     /// What the mounting of the recording does to the parameters, where it has its own.
     turned: Option<Turned>,
     /// What constants do.
     pub columns: Columns,
     /// Number of dwells that have begun.
     dwells: usize,
-    /// The source whose variance is multiplied, and by what, see [`Model::weight`].
-    varied: Option<(BudgetSource, f64)>,
 }
 
 /// What a stretch begins after.
@@ -75,13 +69,10 @@ impl Filter {
             layout,
             x: DVector::zeros(n),
             p: DMatrix::zeros(n, n),
-            rotation_at_rest: model.turning_at_rest
-                * model.weight(BudgetSource::RotationAtRest).sqrt(),
             noise: model.process_noise(),
-            day_to_day: model.day_to_day,
+            model: model.clone(),
             turned: None,
             dwells: 0,
-            varied: model.varied,
         }
     }
 
@@ -89,7 +80,7 @@ impl Filter {
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
     /// 4th ed., §3.8) does, too, and what is of the recording; in the same one it has gone on meanwhile. `gravity` is
     /// its 1σ at another site.
-    pub fn begin(&mut self, start: &Start, table_sigma: f64, since: Since, gravity: Option<f64>) {
+    pub fn begin(&mut self, start: &Start, since: Since, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude();
         for axis in 0..3 {
             for (first, mean, sigma) in [
@@ -107,7 +98,7 @@ impl Filter {
             self.p[(ATTITUDE + axis, initial + axis)] = variance;
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
-        self.redraw_table(table_sigma);
+        self.redraw_table();
         if let Some(first) = self.layout.earth_rate() {
             for axis in 0..3 {
                 let (mean, sigma) = (start.earth_rate[axis], start.earth_rate_sigma[axis]);
@@ -126,7 +117,7 @@ impl Filter {
                     self.redraw(state, 0.0, sigma);
                 }
                 for (state, own) in self.layout.own().collect::<Vec<_>>() {
-                    self.redraw(state, -at.get(own), self.day_to_day.of(own));
+                    self.redraw(state, -at.get(own), self.model.day_to_day.of(own));
                 }
             }
         }
@@ -143,15 +134,13 @@ impl Filter {
 
     /// What the variance of the source that draws a state is multiplied by.
     fn weight_of(&self, state: usize) -> f64 {
-        let varied = self
-            .varied
-            .filter(|&(varied, _)| varied == self.layout.source(state));
-        varied.map_or(1.0, |(_, factor)| factor)
+        self.model.weight(self.layout.source(state))
     }
 
     /// The table has left its position: its error is drawn anew.
-    pub fn redraw_table(&mut self, sigma: f64) {
+    pub fn redraw_table(&mut self) {
         if let Some(table) = self.layout.table_position() {
+            let sigma = self.model.position_sigma;
             (table..table + 3).for_each(|state| self.redraw(state, 0.0, sigma));
         }
     }

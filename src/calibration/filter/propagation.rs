@@ -75,7 +75,7 @@ impl Filter {
     pub fn noise_of(&self, block: &Block) -> ErrorMatrix {
         let mut noise = block.noise.covariance(&self.noise);
         // Of interpolated samples alone, which no density scales.
-        if let Some((BudgetSource::Interpolated, factor)) = self.varied {
+        if let Some((BudgetSource::Interpolated, factor)) = self.model.varied {
             noise += block.noise.covariance(&PerSensor::default()) * (factor - 1.0);
         }
         noise
@@ -90,7 +90,8 @@ impl Filter {
         column: usize,
     ) -> f64 {
         let alone = f64::from(row == column && row >= NAVIGATION);
-        let turning = self.rotation_at_rest.powi(2) * duration;
+        let weight = self.model.weight(BudgetSource::RotationAtRest);
+        let turning = self.model.turning_at_rest.powi(2) * weight * duration;
         of_navigation[(own(row), own(column))] + alone * turning
     }
 

@@ -3,11 +3,11 @@
 
 use super::Part;
 use super::smoothed::Smoothed;
-use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken};
+use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken, dwell_filters};
 use crate::calibration::record::{Event, Rest, events};
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Known, Layout, Linearisation, Model, Prior, Problem,
-    Reduction, Stretch,
+    AttitudePrior, CalibrationError, Known, Layout, Linearisation, Prior, Problem, Reduction,
+    Stretch,
 };
 use crate::imu::{PerSensor, Sensor};
 
@@ -88,7 +88,7 @@ impl<'a> Script<'a> {
         let filter = Filter::new(&problem.model, problem.one_gravity());
         let prior = Prior::new(filter.layout.constants(), &problem.model, self.at);
         let mut follower = Follower {
-            dwells: DwellFilters::of(&filter),
+            dwells: dwell_filters(&filter),
             known: with_innovations.then(|| Known::new(prior)),
             filter,
             parts: Vec::new(),
@@ -100,7 +100,7 @@ impl<'a> Script<'a> {
         for (number, (stretch, events)) in stretches.iter().zip(&self.events).enumerate() {
             self.begin(&mut follower.filter, problem, before, (stretch, number));
             before = Some(stretch);
-            follower.through(events, (&problem.model, stretch), judge)?;
+            follower.through(events, stretch, judge)?;
             let filter = &follower.filter;
             attitudes.push(Smoothed::of(filter, filter.layout.initial_attitude(), 3));
             let next = stretches.get(number + 1);
@@ -141,14 +141,14 @@ impl<'a> Script<'a> {
         };
         let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
         let gravity = moved.then_some(stretch.run.site.gravity_sigma);
-        filter.begin(&start, model.position_sigma, since, gravity);
+        filter.begin(&start, since, gravity);
     }
 }
 
 /// A filter on its way through a record.
 struct Follower {
     filter: Filter,
-    dwells: DwellFilters,
+    dwells: Box<dyn DwellFilters>,
     /// What is known of the constants so far, where innovations are worked out.
     known: Option<Known>,
     parts: Vec<Part>,
@@ -160,10 +160,10 @@ impl Follower {
     fn through(
         &mut self,
         events: &[Event],
-        of: (&Model, &Stretch),
+        stretch: &Stretch,
         judge: &mut Judge,
     ) -> Result<(), CalibrationError> {
-        let apart = APART.max(of.1.run.recording.imu.duration() / EPOCHS);
+        let apart = APART.max(stretch.run.recording.imu.duration() / EPOCHS);
         // Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an outlier that
         // it lets in closes the gate to the good observations that follow.
         let mut begin: Option<(usize, usize, Filter, Known)> = None;
@@ -184,10 +184,14 @@ impl Follower {
                     (next - 1, self.parts.len(), filter, known)
                 });
             }
-            self.filter.begin_rest(rest, of.0, of.1);
+            self.filter.begin_rest(rest, stretch);
             self.learn();
             let (filter, known) = (&mut self.filter, self.known.as_ref());
-            match (self.dwells.take_in(filter, rest, of, known, judge), &begin) {
+            match (
+                self.dwells
+                    .take_in(filter, (&**rest, stretch), known, judge),
+                &begin,
+            ) {
                 (Taken::Whole, _) => self.keep(rest, apart)?,
                 (Taken::Abandoned, Some((event, parts, filter, known))) => {
                     judge.begin_again();

@@ -138,7 +138,7 @@ impl<'a> Batch<'a> {
         new_position: bool,
         mut accepted: impl FnMut() -> bool,
     ) -> Result<(), CalibrationError> {
-        let (model, variance) = (self.model, self.stretch.variance);
+        let model = self.model;
         let tied = at_rest.tied(&self.navigator.state, &self.accel);
         if at_rest.first {
             self.information.come_to_rest(&self.navigator.state);
@@ -152,7 +152,11 @@ impl<'a> Batch<'a> {
         }
 
         if new_position {
-            let row = (POSITION, tied.position, variance.position);
+            let row = (
+                POSITION,
+                tied.position,
+                self.stretch.position_variance(model),
+            );
             self.information.observe(&[row]);
         }
         let end = samples.end;
@@ -174,7 +178,9 @@ impl<'a> Batch<'a> {
             && accepted()
         {
             let difference = -log(&(state.attitude * reading.transpose()));
-            let variance = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
+            let variance = self
+                .stretch
+                .observation_variance(model, Observation::Table, *count);
             rows.push((ATTITUDE, difference, variance));
         }
         if held && accepted() {

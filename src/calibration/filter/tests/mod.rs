@@ -31,6 +31,7 @@ fn run(number: u64) -> Run {
 fn model(run: &Run, sigma: f64, varying: Option<f64>) -> Model {
     let mut model = Model::new(run, &Options::default());
     model.prior_sigma.fill(sigma);
+    model.position_sigma = 5e-6;
     for noise in [&mut model.noise.gyro, &mut model.noise.accel] {
         noise.gauss_markov = varying.map(|sigma| GaussMarkov {
             sigma,
@@ -60,7 +61,7 @@ const ANEW: Since = Since::Anew(
 /// A filter at its begin, and what is known of the constants.
 fn begun(model: &Model) -> (Filter, Known) {
     let mut filter = Filter::new(model, true);
-    filter.begin(&START, 5e-6, ANEW, None);
+    filter.begin(&START, ANEW, None);
     let triads = crate::calibration::from_vector(model.form, &model.prior_mean.add_scalar(-1e-4));
     let at = Linearisation::new(triads, TermVector::zeros(), Vec::new());
     let prior = Prior::new(filter.layout.constants(), model, &at);
@@ -207,7 +208,7 @@ fn a_varying_bias_goes_on_while_nothing_is_known() {
     let by_constant = filter.columns.of_states[(0, state)];
     // Without observations of it a stationary process stays as uncertain as it was.
     assert!(before <= sigma.powi(2));
-    filter.begin(&START, 5e-6, Since::Lost(2.0 * CORRELATION_TIME), None);
+    filter.begin(&START, Since::Lost(2.0 * CORRELATION_TIME), None);
     let keep = (-2.0f64).exp();
     let expected = before * keep.powi(2) + sigma.powi(2) * (1.0 - keep.powi(2));
     assert_relative_eq!(filter.p[(state, state)], expected, max_relative = 1e-12);
@@ -245,7 +246,7 @@ fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
             update(&mut filter, &mut known, &measurement);
         }
         if k % 50 == 0 {
-            filter.redraw_table(5e-6);
+            filter.redraw_table();
         }
     }
     let covariance = known.posterior().parameter_covariance;
@@ -285,7 +286,7 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
     let (model, stretch) = (&problem.model, &problem.stretches()[0]);
     let of = (&problem, stretch);
     let (filter, known) = begun(model);
-    let mut shared = DwellFilters::of(&filter);
+    let mut shared = dwell_filters(&filter);
     let attitudes = [Vector3::zeros(), Vector3::new(0.3, -1.0, 2.0)].map(crate::attitude::exp);
     for (attitude, number) in attitudes
         .iter()
@@ -293,20 +294,16 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
         .chain([(&attitudes[0], Some(40)), (&attitudes[1], None)])
     {
         let (segment, _) = first_part(of, attitude);
-        let through = |dwells: &mut DwellFilters| {
+        let through = |dwells: &mut dyn DwellFilters| {
             let mut filter = filter.clone();
             // All but one are let in.
             let accepted: Vec<bool> = (0..300).map(|k| Some(k) != number).collect();
             let mut judge = Judge::new(Gate::As(&accepted), f64::INFINITY);
-            let of = (model, stretch);
-            let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
+            let taken = dwells.take_in(&mut filter, (&segment, stretch), Some(&known), &mut judge);
             assert_eq!(taken, Taken::Whole);
             (filter.x, filter.p, scalars(&judge))
         };
-        assert_eq!(
-            through(&mut shared),
-            through(&mut DwellFilters::of(&filter))
-        );
+        assert_eq!(through(&mut *shared), through(&mut *dwell_filters(&filter)));
     }
 }
 
@@ -332,7 +329,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         };
         let (mut filter, mut known) = begun(model);
         let start = stretch.start(&prior, &Matrix3::identity());
-        filter.begin(&start, model.position_sigma, ANEW, None);
+        filter.begin(&start, ANEW, None);
         let (segment, before) = first_part((&problem, stretch), &Matrix3::identity());
         let mut textbook = Textbook::new(&filter, &known);
         // What has gone on before leaves nothing independent of anything.
@@ -344,8 +341,8 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         textbook.begin_to_hold(&filter);
         let mut judge = Judge::new(Gate::Open, f64::INFINITY);
         let of = (model, stretch);
-        let mut dwells = DwellFilters::of(&filter);
-        let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
+        let mut dwells = dwell_filters(&filter);
+        let taken = dwells.take_in(&mut filter, (&segment, stretch), Some(&known), &mut judge);
         assert_eq!(taken, Taken::Whole);
         known.learn(&filter.columns.take_rows());
         let (ours, theirs) = (scalars(&judge), textbook.through(&filter, &segment, of));

@@ -66,7 +66,7 @@ impl Textbook {
             let mut rows = phi.rows_mut(turn, 3);
             rows += change;
             (0..3).for_each(|axis| phi[(turn + axis, ATTITUDE + axis)] -= 1.0);
-            let own = filter.rotation_at_rest.powi(2) * block.duration;
+            let own = filter.model.turning_at_rest.powi(2) * block.duration;
             for axis in 0..3 {
                 for other in 0..3 {
                     let of_attitude = q[(ATTITUDE + axis, ATTITUDE + other)];
