@@ -120,8 +120,8 @@ impl Model {
                 by_motion,
                 by_duration,
             } = *self.motion_noise.get(sensor);
-            let of_moves = self.weight(BudgetSource::moves(sensor)).sqrt();
-            let white = self.weight(BudgetSource::white(sensor)).sqrt();
+            let of_moves = self.weight(BudgetSource::Moves(sensor)).sqrt();
+            let white = self.weight(BudgetSource::White(sensor)).sqrt();
             ProcessNoise {
                 random_walk: white * self.noise.get(sensor).random_walk,
                 by_motion: of_moves * by_motion,

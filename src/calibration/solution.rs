@@ -45,7 +45,6 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] where the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
-        let samples: usize = self.runs().map(|run| run.recording.imu.len()).sum();
         let bytes_of = |run: &Run| {
             let imu = &run.recording.imu;
             let each = match imu.is_packed() {
@@ -54,11 +53,14 @@ impl Problem<'_> {
             };
             imu.len().saturating_mul(each)
         };
-        let bytes = self.runs().map(bytes_of).fold(0, usize::saturating_add);
-        if !room::is_there(bytes.saturating_add(BYTES_BESIDE)) {
+        let bytes = self
+            .runs()
+            .map(bytes_of)
+            .fold(BYTES_BESIDE, usize::saturating_add);
+        if !room::is_there(bytes) {
             return Err(CalibrationError::NoMemory {
-                samples,
-                megabytes: (bytes + BYTES_BESIDE) >> 20,
+                samples: self.runs().map(|run| run.recording.imu.len()).sum(),
+                megabytes: bytes >> 20,
             });
         }
         if let Some(mounting) = Mounting::contradicted(self) {
@@ -69,10 +71,8 @@ impl Problem<'_> {
             Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),
         })
     }
-}
 
-impl Problem<'_> {
-    /// What a calibration of it is made of, but for the files.
+    /// What a calibration of it is made of, except the files.
     pub fn provenance(&self) -> Provenance {
         let run = self.run();
         let imu = &run.recording.imu;
@@ -134,40 +134,41 @@ impl Solution {
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the solution.
     pub fn assess(&mut self, problem: &Problem) -> Result<Assessment, CalibrationError> {
-        match self {
-            Self::Filter(outcome) => {
-                let (error_terms, (quality, budget)) = rayon::join(
-                    || test_error_terms(problem, outcome),
-                    || (outcome.quality(problem), Budget::new(problem, outcome)),
-                );
-                let (error_terms, left_off) = match error_terms {
-                    // Where the iterations ended without convergence there may be nothing to test.
-                    Err(_) if !outcome.converged => (Vec::new(), None),
-                    tests => tests?,
-                };
-                // A calibration is one without its budget, too.
-                let mut budget = budget.ok();
-                let variation = bias_variation(problem, outcome, &error_terms)?;
-                for (source, part) in [
-                    (BudgetSource::ErrorTermsLeftOff, left_off),
-                    (BudgetSource::UnseenVariation, variation),
-                ] {
-                    let Some(part) = part else { continue };
-                    outcome.set_part(source, part);
-                    budget = budget.map(|budget| budget.and(source, part));
-                }
-                Ok(Assessment {
-                    error_terms,
-                    quality: quality?,
-                    budget,
-                })
+        let outcome = match self {
+            Self::Filter(outcome) => outcome,
+            Self::ClosedForm(closed_form) => {
+                return Ok(Assessment {
+                    error_terms: Vec::new(),
+                    quality: closed_form.quality(problem)?,
+                    budget: None,
+                });
             }
-            Self::ClosedForm(closed_form) => Ok(Assessment {
-                error_terms: Vec::new(),
-                quality: closed_form.quality(problem)?,
-                budget: None,
-            }),
+        };
+        let (error_terms, (quality, budget)) = rayon::join(
+            || test_error_terms(problem, outcome),
+            || (outcome.quality(problem), Budget::new(problem, outcome)),
+        );
+        let (error_terms, left_off) = match error_terms {
+            // Where the iterations ended without convergence there may be nothing to test.
+            Err(_) if !outcome.converged => (Vec::new(), None),
+            tests => tests?,
+        };
+        // A calibration is one without its budget, too.
+        let mut budget = budget.ok();
+        let variation = bias_variation(problem, outcome, &error_terms)?;
+        for (source, part) in [
+            (BudgetSource::ErrorTermsLeftOff, left_off),
+            (BudgetSource::UnseenVariation, variation),
+        ] {
+            let Some(part) = part else { continue };
+            outcome.set_part(source, part);
+            budget = budget.map(|budget| budget.and(source, part));
         }
+        Ok(Assessment {
+            error_terms,
+            quality: quality?,
+            budget,
+        })
     }
 
     /// What must be known before using the figures.
@@ -182,14 +183,10 @@ impl Solution {
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {
-                let Assessment {
-                    error_terms,
-                    quality,
-                    budget,
-                } = assessment;
-                let mut record = outcome.record(problem, error_terms, quality);
-                if let Some(budget) = budget {
-                    record.take_budget(problem.run(), outcome, budget, error_terms);
+                let tests = &assessment.error_terms;
+                let mut record = outcome.record(problem, tests, &assessment.quality);
+                if let Some(budget) = &assessment.budget {
+                    record.take_budget(problem.run(), outcome, budget, tests);
                 }
                 record
             }

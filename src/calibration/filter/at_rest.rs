@@ -31,7 +31,7 @@ pub fn begins(moving: usize) -> impl Iterator<Item = usize> {
 impl Filter {
     /// The states that move in a dwell: navigation errors, the turn at rest, varying biases.
     pub fn moving(&self) -> Vec<usize> {
-        let varying = self.layout.varying_biases().map(|(state, ..)| state);
+        let varying = self.layout.varying_biases.iter().map(|of| of.0);
         self.moving_in_moves().into_iter().chain(varying).collect()
     }
 
@@ -80,10 +80,10 @@ impl Filter {
         let mut table = self.none(3);
         let response = rest.axes.as_deref();
         for axis in 0..3 {
-            if let Some(position) = self.layout.table_position() {
+            if let Some(position) = self.layout.table_position {
                 table.states[(axis, position + axis)] = 1.0;
             }
-            for (k, constant) in self.layout.constants().iter().enumerate() {
+            for (k, constant) in self.layout.constants.iter().enumerate() {
                 table.columns[(axis, k)] = match constant {
                     Constant::Base(of) => f64::from(*of == axis),
                     Constant::Axis(of) => response.map_or(0.0, |response| response[(axis, *of)]),
@@ -122,8 +122,8 @@ impl Filter {
         let navigation = block.navigation.column_iter();
         let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
         let turn = std::iter::repeat_n([0.0; NAVIGATION], first - NAVIGATION);
-        let varying = self.layout.varying_biases();
-        let varying = varying.map(|(_, sensor, constant)| effect_of(block, sensor, constant));
+        let varying = self.layout.varying_biases.iter();
+        let varying = varying.map(|&(_, sensor, constant)| effect_of(block, sensor, constant));
         let columns: Vec<_> = navigation.chain(turn).chain(varying).collect();
         let constants = driven_at_rest(block);
         let of_navigation = self.noise_of(block);

@@ -115,7 +115,7 @@ impl Filter {
         (rest, stretch): (&Rest, &Stretch),
         judge: &mut Judge,
     ) -> Taken {
-        let turn = self.layout.turn_at_rest().map(|_| NAVIGATION);
+        let turn = self.layout.turn_at_rest.map(|_| NAVIGATION);
         for step in &rest.steps {
             let errors = [ATTITUDE, VELOCITY, POSITION].into_iter();
             let turned = turn.map(|turn| (turn, step.referred[0]));

@@ -79,7 +79,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
     pub fn propagate(&mut self, model: usize) {
         self.at = self.gains.step(self.at, model);
         let mut mean = [0.0; M];
-        for &(row, column, phi) in &self.gains.model(model).transition {
+        for &(row, column, phi) in &self.gains.models[model].transition {
             mean[row] += phi * self.mean[column];
         }
         self.mean = mean;
@@ -98,7 +98,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
             ..
         } = observed;
         let to = self.gains.observe(self.at, state, variance)?;
-        let gain = self.gains.gain(to)?;
+        let gain = self.gains.course[to].gain.as_ref()?;
         let expected = Vector3::from_fn(|axis, _| self.mean[state + axis]);
         let whitened = gain.root.solve_lower_triangular(&(residual - expected))?;
         if let Some(given) = &mut self.given {
@@ -121,7 +121,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
     }
 
     pub fn summary(self) -> Summary {
-        let known = self.gains.known(self.at);
+        let known = &self.gains.course[self.at].known;
         let rows = factor(known.information, self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         let values = DVector::from_vec(values);

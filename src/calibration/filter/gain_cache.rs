@@ -22,17 +22,17 @@ pub struct StepModel<const M: usize> {
 
 /// The course that a part of a dwell has taken, as far as the next one repeats it.
 pub struct GainCache<const M: usize, const G: usize> {
-    models: Vec<StepModel<M>>,
-    course: Vec<Point<M, G>>,
+    pub models: Vec<StepModel<M>>,
+    pub course: Vec<Point<M, G>>,
 }
 
 /// A point of a course.
-struct Point<const M: usize, const G: usize> {
+pub struct Point<const M: usize, const G: usize> {
     /// What led to it.
     event: Event,
-    known: Known<M, G>,
+    pub known: Known<M, G>,
     /// How an observation was taken in, if that led to it.
-    gain: Option<Gain<M, G>>,
+    pub gain: Option<Gain<M, G>>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -99,20 +99,6 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         let first = self.course.iter().position(other);
         self.course.truncate(first.unwrap_or(self.course.len()));
         self.models = models;
-    }
-
-    pub fn model(&self, number: usize) -> &StepModel<M> {
-        &self.models[number]
-    }
-
-    /// What is known at a point.
-    pub fn known(&self, point: usize) -> &Known<M, G> {
-        &self.course[point].known
-    }
-
-    /// How the observation of a point was taken in.
-    pub fn gain(&self, point: usize) -> Option<&Gain<M, G>> {
-        self.course[point].gain.as_ref()
     }
 
     /// Where a step leads.
@@ -252,7 +238,7 @@ mod tests {
             };
             let mut alone = gains();
             let (point, at) = (along(&mut shared), along(&mut alone));
-            let (shared, alone) = (shared.known(point), alone.known(at));
+            let (shared, alone) = (&shared.course[point].known, &alone.course[at].known);
             assert_eq!(shared.of_given, alone.of_given);
             assert_eq!(shared.covariance, alone.covariance);
             assert_eq!(shared.information, alone.information);

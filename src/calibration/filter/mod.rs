@@ -31,8 +31,8 @@ use columns::Columns;
 #[derive(Debug, Clone)]
 pub struct Filter {
     pub layout: Layout,
-    x: DVector<f64>,
-    p: DMatrix<f64>,
+    pub x: DVector<f64>,
+    pub p: DMatrix<f64>,
     model: Model,
     noise: PerSensor<ProcessNoise>,
     /// 1σ and correlation time of each varying bias, by its state.
@@ -58,14 +58,17 @@ impl Filter {
     /// Before the first stretch begins, of recordings with one gravity or with more.
     pub fn new(model: &Model, one_gravity: bool) -> Self {
         let layout = Layout::new(model, one_gravity);
-        let n = layout.size();
-        let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
-            let variation = model.noise.get(sensor).gauss_markov?;
-            Some((state, variation.sigma, variation.correlation_time))
-        });
+        let n = layout.sources.len();
+        let varying = layout
+            .varying_biases
+            .iter()
+            .filter_map(|&(state, sensor, _)| {
+                let variation = model.noise.get(sensor).gauss_markov?;
+                Some((state, variation.sigma, variation.correlation_time))
+            });
         Self {
             varying: varying.collect(),
-            columns: Columns::new(layout.constants().len(), n),
+            columns: Columns::new(layout.constants.len(), n),
             layout,
             x: DVector::zeros(n),
             p: DMatrix::zeros(n, n),
@@ -81,7 +84,7 @@ impl Filter {
     /// 4th ed., §3.8) does, too, and what is of the recording; in the same one it has gone on meanwhile. `gravity` is
     /// its 1σ at another site.
     pub fn begin(&mut self, start: &Start, since: Since, gravity: Option<f64>) {
-        let initial = self.layout.initial_attitude();
+        let initial = self.layout.initial_attitude;
         for axis in 0..3 {
             for (first, mean, sigma) in [
                 (ATTITUDE, start.attitude[axis], start.attitude_sigma[axis]),
@@ -99,13 +102,13 @@ impl Filter {
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
         self.redraw_table();
-        if let Some(first) = self.layout.earth_rate() {
+        if let Some(first) = self.layout.earth_rate {
             for axis in 0..3 {
                 let (mean, sigma) = (start.earth_rate[axis], start.earth_rate_sigma[axis]);
                 self.redraw(first + axis, mean, sigma);
             }
         }
-        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+        if let Some((state, sigma)) = self.layout.gravity.zip(gravity) {
             self.redraw(state, 0.0, sigma);
         }
         match since {
@@ -116,7 +119,7 @@ impl Filter {
                     let (state, sigma, _) = self.varying[k];
                     self.redraw(state, 0.0, sigma);
                 }
-                for (state, own) in self.layout.own().collect::<Vec<_>>() {
+                for (state, own) in self.layout.own.clone() {
                     self.redraw(state, -at.get(own), self.model.day_to_day.of(own));
                 }
             }
@@ -126,7 +129,7 @@ impl Filter {
     /// Forgets a state: its error is drawn anew, independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
-        self.columns.redraw(state);
+        self.columns.of_states.column_mut(state).fill(0.0);
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
         self.p[(state, state)] = sigma.powi(2) * self.weight_of(state);
@@ -134,12 +137,12 @@ impl Filter {
 
     /// What the variance of the source that draws a state is multiplied by.
     fn weight_of(&self, state: usize) -> f64 {
-        self.model.weight(self.layout.source(state))
+        self.model.weight(self.layout.sources[state])
     }
 
     /// The table has left its position: its error is drawn anew.
     pub fn redraw_table(&mut self) {
-        if let Some(table) = self.layout.table_position() {
+        if let Some(table) = self.layout.table_position {
             let sigma = self.model.position_sigma;
             (table..table + 3).for_each(|state| self.redraw(state, 0.0, sigma));
         }
@@ -152,7 +155,7 @@ impl Filter {
 
     /// A dwell begins.
     pub fn begin_dwell(&mut self) {
-        for (k, constant) in self.layout.constants().iter().enumerate() {
+        for (k, constant) in self.layout.constants.iter().enumerate() {
             if let Constant::Disturbance(of, component) = constant
                 && (of.kind, of.dwell) == (DisturbanceKind::Slip, self.dwells)
             {
@@ -169,7 +172,7 @@ impl Filter {
 
     /// The body does not turn from now on: what the computed attitude does is an error.
     pub fn begin_to_hold(&mut self) {
-        if let Some(turn) = self.layout.turn_at_rest() {
+        if let Some(turn) = self.layout.turn_at_rest {
             (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));
         }
     }
@@ -188,10 +191,10 @@ impl Filter {
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;
-            for row in 0..3 {
-                let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
-                self.columns.add(first + row, turned);
-            }
+            let by_attitude = self.columns.of_states.fixed_columns::<3>(ATTITUDE);
+            let columns = by_attitude * turn.transpose();
+            let mut of_error = self.columns.of_states.fixed_columns_mut::<3>(first);
+            of_error += columns;
             let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
             let mut of_error = self.p.fixed_rows_mut::<3>(first);
             of_error += rows;
@@ -204,22 +207,12 @@ impl Filter {
     /// Refers the navigation errors to another computed state of the same moment.
     pub fn refer(&mut self, from: &State, to: &State) {
         let by = between(from, to);
-        let turn = self.layout.turn_at_rest();
+        let turn = self.layout.turn_at_rest;
         let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
         for (first, by) in firsts.chain(turn.map(|turn| (turn, by[0]))) {
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += by;
         }
-    }
-
-    /// Mean of a state's error.
-    pub fn mean(&self, state: usize) -> f64 {
-        self.x[state]
-    }
-
-    /// Covariance of two states' errors.
-    pub fn covariance(&self, one: usize, other: usize) -> f64 {
-        self.p[(one, other)]
     }
 }
 

@@ -39,7 +39,7 @@ impl Filter {
 
     /// The states that a move drives: navigation errors and, where there is one, the turn at rest.
     pub fn moving_in_moves(&self) -> Vec<usize> {
-        let turn = self.layout.turn_at_rest();
+        let turn = self.layout.turn_at_rest;
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
         (0..NAVIGATION).chain(turn).collect()
     }
@@ -68,7 +68,11 @@ impl Filter {
                 self.p[(at_row, at_column)] = corner[(row, column)];
             }
         }
-        self.columns.propagate(moving, &transition, added);
+        let u = &mut self.columns.of_states;
+        let moved = u.columns(0, first) * transition.transpose() + added;
+        for (&state, column) in moving.iter().zip(moved.column_iter()) {
+            u.column_mut(state).copy_from(&column);
+        }
     }
 
     /// Covariance that a block adds to the navigation errors.
@@ -100,14 +104,14 @@ impl Filter {
         let layout = &self.layout;
         let navigation = block.navigation.column_iter();
         let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
-        let gravity = layout.gravity().map(|_| Constant::Gravity);
+        let gravity = layout.gravity.map(|_| Constant::Gravity);
         let gravity = gravity.map(|gravity| self.effect(block, gravity));
-        let earth_rate = layout.earth_rate().into_iter().flat_map(|_| 0..3);
+        let earth_rate = layout.earth_rate.into_iter().flat_map(|_| 0..3);
         let earth_rate = earth_rate.map(|axis| of_earth_rate(block, axis));
         // A bias does the same whether it varies or stays.
-        let varying = layout.varying_biases();
-        let varying = varying.map(|(_, sensor, constant)| effect_of(block, sensor, constant));
-        let own = layout.own().map(|(_, own)| match own {
+        let varying = layout.varying_biases.iter();
+        let varying = varying.map(|&(_, sensor, constant)| effect_of(block, sensor, constant));
+        let own = layout.own.iter().map(|&(_, own)| match own {
             OwnState::Parameter(index) => self.effect(block, Constant::Parameter(index)),
             OwnState::Mounting(axis) => {
                 let turned = self.turned.as_ref();
@@ -128,7 +132,7 @@ impl Filter {
         &'a self,
         block: &'a Block,
     ) -> impl Iterator<Item = [f64; NAVIGATION]> + 'a {
-        let constants = self.layout.constants().iter();
+        let constants = self.layout.constants.iter();
         constants.map(|&constant| self.effect(block, constant))
     }
 
@@ -176,7 +180,7 @@ impl Filter {
             let (state, sigma, correlation_time) = self.varying[k];
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
-            self.columns.scale(state, keep);
+            self.columns.of_states.column_mut(state).scale_mut(keep);
             self.p.row_mut(state).scale_mut(keep);
             self.p.column_mut(state).scale_mut(keep);
             let driven = sigma.powi(2) * self.weight_of(state);

@@ -37,7 +37,7 @@ impl Filter {
     pub fn none(&self, rows: usize) -> Linear {
         Linear {
             states: DMatrix::zeros(rows, self.x.len()),
-            columns: DMatrix::zeros(rows, self.layout.constants().len()),
+            columns: DMatrix::zeros(rows, self.layout.constants.len()),
         }
     }
 

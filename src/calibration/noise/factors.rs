@@ -20,9 +20,9 @@ pub struct Scale {
     /// Reference variance of each source in SI and radians; zero where the run cannot have it.
     reference: [f64; SOURCES],
     /// Whether a figure that is not zero is stated, of what the run can have.
-    stated: [bool; SOURCES],
-    /// What the problem has.
-    initial: Factors,
+    pub stated: [bool; SOURCES],
+    /// What the problem has without learning.
+    pub initial: Factors,
     /// Of a bias that is not stated to vary, s. What varies faster acts as random walk, what varies
     /// slower as a constant bias: the length of the longest recording.
     correlation_time: f64,
@@ -67,11 +67,6 @@ impl Scale {
         }
     }
 
-    /// What the problem has without learning.
-    pub fn initial(&self) -> Factors {
-        self.initial
-    }
-
     /// What is stated, and of what is not as much as the stated random walks make.
     pub fn broad(&self) -> Factors {
         let mut broad = self.initial;
@@ -86,11 +81,6 @@ impl Scale {
     /// The sources that the run can have.
     pub fn present(&self) -> Vec<usize> {
         (0..SOURCES).filter(|&k| self.reference[k] > 0.0).collect()
-    }
-
-    /// Whether a figure of it is stated that is not zero.
-    pub fn is_stated(&self, source: usize) -> bool {
-        self.stated[source]
     }
 
     /// σ of a source at some factors, in SI and radians.

@@ -111,7 +111,7 @@ impl Likelihood<'_> {
 
     /// Twice what the prior of stated figures takes off ln of the likelihood.
     fn penalty(&self, factors: &Factors) -> f64 {
-        let stated = (0..SOURCES).filter(|&k| self.scale.is_stated(k));
+        let stated = (0..SOURCES).filter(|&k| self.scale.stated[k]);
         stated
             .map(|k| (0.5 * factors.0[k].ln() / LOG_SIGMA).powi(2))
             .sum()
@@ -121,7 +121,7 @@ impl Likelihood<'_> {
     /// stated where the score of no source is beyond chance.
     pub fn fit(&self, before: Option<&Fit>) -> Result<Fit, CalibrationError> {
         let present = self.scale.present();
-        let stated = self.scale.initial();
+        let stated = self.scale.initial;
         let start = match before {
             Some(before) => before.factors,
             None => {
@@ -170,7 +170,7 @@ impl Likelihood<'_> {
             return Ok(left);
         };
         // How far each variance is from what is stated, in itself; 1σ of one is twice that of ln σ.
-        let stated = |k: usize| self.scale.is_stated(k);
+        let stated = |k: usize| self.scale.stated[k];
         let mut values = DVector::from_fn(left.len(), |i, _| match stated(left[i]) {
             true => at.0[left[i]].ln(),
             false => 1.0,
@@ -272,7 +272,7 @@ impl Likelihood<'_> {
     ) -> (DVector<f64>, DMatrix<f64>) {
         let (mut score, mut information) = (slope.score.clone(), slope.information.clone());
         for (i, &k) in sources.iter().enumerate() {
-            if self.scale.is_stated(k) {
+            if self.scale.stated[k] {
                 score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
                 information[(i, i)] += LOG_SIGMA.powi(-2);
             }
@@ -295,7 +295,7 @@ impl Likelihood<'_> {
                 let v = &mut there.0[k];
                 if *v > 0.0 {
                     *v *= (2.0 * (fraction * step).clamp(-LONGEST, LONGEST)).exp();
-                    if *v < NOTHING && !self.scale.is_stated(k) {
+                    if *v < NOTHING && !self.scale.stated[k] {
                         *v = 0.0;
                     }
                 } else if *step > 0.0 {

@@ -163,7 +163,7 @@ fn regate(accepted: &mut [bool], distances: impl Iterator<Item = f64>, gate: f64
 impl Likelihood<'_> {
     /// The test of what is stated against a fit.
     fn test(&self, fit: &Fit) -> Result<NoiseTest, CalibrationError> {
-        let stated = self.scale.initial();
+        let stated = self.scale.initial;
         let free = fit.sources.iter();
         let (bounded, free): (Vec<usize>, Vec<usize>) = free.partition(|&&k| stated.0[k] == 0.0);
         let ratio = match fit.sources.is_empty() {
@@ -186,7 +186,7 @@ impl Likelihood<'_> {
     ) -> Result<NoiseReport, CalibrationError> {
         let sources = self.scale.present();
         let sigmas = self.sigma(factors, &sources)?;
-        let stated = self.scale.initial();
+        let stated = self.scale.initial;
         let of = |(&k, sigma): (&usize, &Option<f64>)| {
             let used = self.scale.sigma(factors, k);
             let interval = sigma.map(|sigma| match factors.0[k] {

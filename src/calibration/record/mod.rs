@@ -29,10 +29,8 @@ pub fn events(
     let (problem, stretch) = of;
     let imu = &stretch.run.recording.imu;
     // Where biases vary a move is cut as dwells are.
-    let piece = layout
-        .varying_biases()
-        .next()
-        .map(|_| step_length(imu.period));
+    let varies = !layout.varying_biases.is_empty();
+    let piece = varies.then(|| step_length(imu.period));
     let mut navigator = navigator(stretch, at, (&problem.model, layout))?;
     let mut events = Vec::new();
     let (mut next, mut most, mut new_position) = (0, 0, false);

@@ -86,7 +86,7 @@ impl<'a> Script<'a> {
         with_innovations: bool,
     ) -> Result<Reduction, CalibrationError> {
         let filter = Filter::new(&problem.model, problem.one_gravity());
-        let prior = Prior::new(filter.layout.constants(), &problem.model, self.at);
+        let prior = Prior::new(&filter.layout.constants, &problem.model, self.at);
         let mut follower = Follower {
             dwells: dwell_filters(&filter),
             known: with_innovations.then(|| Known::new(prior)),
@@ -102,7 +102,7 @@ impl<'a> Script<'a> {
             before = Some(stretch);
             follower.through(events, stretch, judge)?;
             let filter = &follower.filter;
-            attitudes.push(Smoothed::of(filter, filter.layout.initial_attitude(), 3));
+            attitudes.push(Smoothed::of(filter, filter.layout.initial_attitude, 3));
             let next = stretches.get(number + 1);
             if next.is_none_or(|next| next.recording != stretch.recording) {
                 own.extend(Smoothed::of_recording(filter));
@@ -110,7 +110,7 @@ impl<'a> Script<'a> {
         }
         let Follower { filter, parts, .. } = follower;
         Ok(Reduction {
-            constants: filter.layout.constants().to_vec(),
+            constants: filter.layout.constants.clone(),
             parts,
             squares: filter.columns.squares,
             log_determinant: filter.columns.log_determinant,
@@ -118,7 +118,7 @@ impl<'a> Script<'a> {
             own,
             gravity: filter
                 .layout
-                .gravity()
+                .gravity
                 .map(|state| Smoothed::of(&filter, state, 1)),
         })
     }

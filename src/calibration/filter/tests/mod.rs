@@ -64,7 +64,7 @@ fn begun(model: &Model) -> (Filter, Known) {
     filter.begin(&START, ANEW, None);
     let triads = crate::calibration::from_vector(model.form, &model.prior_mean.add_scalar(-1e-4));
     let at = Linearisation::new(triads, TermVector::zeros(), Vec::new());
-    let prior = Prior::new(filter.layout.constants(), model, &at);
+    let prior = Prior::new(&filter.layout.constants, model, &at);
     (filter, Known::new(prior))
 }
 
@@ -121,7 +121,7 @@ fn of_velocity(z: Vector3<f64>, variance: f64) -> Measurement {
 }
 
 fn of_table(filter: &Filter, z: Vector3<f64>, variance: f64) -> Measurement {
-    let table = filter.layout.table_position().unwrap();
+    let table = filter.layout.table_position.unwrap();
     Measurement {
         residual: z,
         rows: [0, 1, 2].map(|axis| vec![(ATTITUDE + axis, 1.0), (table + axis, -1.0)]),
@@ -203,7 +203,7 @@ fn a_varying_bias_goes_on_while_nothing_is_known() {
             &of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11),
         );
     }
-    let (state, ..) = filter.layout.varying_biases().next().unwrap();
+    let (state, ..) = filter.layout.varying_biases[0];
     let before = filter.p[(state, state)];
     let by_constant = filter.columns.of_states[(0, state)];
     // Without observations of it a stationary process stays as uncertain as it was.

@@ -29,7 +29,7 @@ impl Textbook {
     }
 
     pub fn begin_to_hold(&mut self, filter: &Filter) {
-        let turn = filter.layout.turn_at_rest();
+        let turn = filter.layout.turn_at_rest;
         for state in turn.into_iter().flat_map(|turn| turn..turn + 3) {
             self.x[state] = 0.0;
             self.p.row_mut(state).fill(0.0);
@@ -46,14 +46,14 @@ impl Textbook {
             .copy_from(&block.navigation);
         q.view_mut((0, 0), (NAVIGATION, NAVIGATION))
             .copy_from(&block.noise.covariance(&filter.noise));
-        for (k, constant) in layout.constants().iter().enumerate() {
+        for (k, constant) in layout.constants.iter().enumerate() {
             if let Constant::Parameter(index) = constant {
                 let (sensor, of_triad) = sensor_and_parameter(*index);
                 phi.view_mut((0, self.states + k), (NAVIGATION, 1))
                     .copy_from(&block.parameters.get(sensor).column(of_triad));
             }
         }
-        for (state, sensor, of_triad) in layout.varying_biases() {
+        for (state, sensor, of_triad) in layout.varying_biases.iter().copied() {
             let variation = filter.varying.iter().find(|of| of.0 == state).unwrap();
             phi.view_mut((0, state), (NAVIGATION, 1))
                 .copy_from(&block.parameters.get(sensor).column(of_triad));
@@ -61,7 +61,7 @@ impl Textbook {
             phi[(state, state)] = keep;
             q[(state, state)] = variation.1.powi(2) * (1.0 - keep * keep);
         }
-        if let Some(turn) = layout.turn_at_rest() {
+        if let Some(turn) = layout.turn_at_rest {
             let change = phi.rows(ATTITUDE, 3).into_owned();
             let mut rows = phi.rows_mut(turn, 3);
             rows += change;
@@ -118,7 +118,7 @@ impl Textbook {
         (model, stretch): (&Model, &Stretch),
     ) -> Vec<ScalarInnovation> {
         let mut scalars = Vec::new();
-        let turn = filter.layout.turn_at_rest();
+        let turn = filter.layout.turn_at_rest;
         for step in &segment.steps {
             let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter();
             let referred = firsts.zip(step.referred);
@@ -144,14 +144,14 @@ impl Textbook {
         let first = match seen.kind {
             Observation::Velocity => VELOCITY,
             Observation::Table => ATTITUDE,
-            Observation::Attitude => layout.turn_at_rest().unwrap(),
+            Observation::Attitude => layout.turn_at_rest.unwrap(),
         };
         h[first + axis] = 1.0;
         if seen.kind == Observation::Table {
-            if let Some(position) = layout.table_position() {
+            if let Some(position) = layout.table_position {
                 h[position + axis] = -1.0;
             }
-            for (k, constant) in layout.constants().iter().enumerate() {
+            for (k, constant) in layout.constants.iter().enumerate() {
                 if *constant == Constant::Base(axis) {
                     h[self.states + k] = -1.0;
                 }
