@@ -66,13 +66,8 @@ impl Likelihood<'_> {
         pass(&problem, self.script, Gate::As(&self.accepted))
     }
 
-    /// Score and information by these sources, from one replay more than there are.
-    pub fn slope(&self, factors: &Factors, sources: &[usize]) -> Result<Slope, CalibrationError> {
-        self.slope_from(self.replay(factors)?, factors, sources)
-    }
-
-    /// The same where the replay at the point is known.
-    fn slope_from(
+    /// Score and information by these sources from a replay at a point, from as many replays more as there are sources.
+    pub fn slope(
         &self,
         here: PassResult,
         factors: &Factors,
@@ -125,7 +120,7 @@ impl Likelihood<'_> {
         let start = match before {
             Some(before) => before.factors,
             None => {
-                let slope = self.slope(&stated, &present)?;
+                let slope = self.slope(self.replay(&stated)?, &stated, &present)?;
                 if !self.is_called_for(&slope, &stated, &present) {
                     return Ok(Fit {
                         factors: stated,
@@ -164,9 +159,9 @@ impl Likelihood<'_> {
         let at = *factors;
         let above_zero = sources.iter().copied().filter(|&k| at.0[k] > 0.0);
         let mut left: Vec<usize> = above_zero.collect();
-        let slope = self.slope(&at, &left)?;
-        let (_, information) = self.posterior(&slope, &at, &left);
-        let Some(inverse) = information.cholesky().map(|root| root.inverse()) else {
+        let slope = self.slope(self.replay(&at)?, &at, &left)?;
+        let slope = slope.with_prior(self.scale, &at, &left);
+        let Some(inverse) = slope.information.cholesky().map(|root| root.inverse()) else {
             return Ok(left);
         };
         // How far each variance is from what is stated, in itself; 1σ of one is twice that of ln σ.
@@ -181,10 +176,10 @@ impl Likelihood<'_> {
             // Over its limit.
             let part = |i: &usize| {
                 let stated = stated(left[*i]);
-                let value = if stated {
+                let value = if stated || values[*i] > 0.0 {
                     values[*i]
                 } else {
-                    values[*i].max(0.0)
+                    0.0
                 };
                 value.powi(2) / covariance[(*i, *i)] / limits[usize::from(stated)]
             };
@@ -204,14 +199,15 @@ impl Likelihood<'_> {
         }
     }
 
-    /// Whether the score of any source is beyond chance.
+    /// Whether the score of any source is beyond chance; where a variance is zero and would fall it is not.
     fn is_called_for(&self, slope: &Slope, stated: &Factors, present: &[usize]) -> bool {
-        let beyond = (0..present.len()).filter(|&i| {
-            let one_sided = usize::from(stated.0[present[i]] == 0.0);
+        present.iter().enumerate().any(|(i, &k)| {
+            let one_sided = usize::from(stated.0[k] == 0.0);
             let limit = limit(1 - one_sided, one_sided, SCREEN / present.len() as f64);
-            slope.statistic(i, one_sided == 1) > limit
-        });
-        beyond.count() > 0
+            let (score, information) = (slope.score[i], slope.information[(i, i)]);
+            let rises = score > 0.0 || one_sided == 0;
+            rises && information > 0.0 && score.powi(2) / information > limit
+        })
     }
 
     /// The factors of largest posterior density of these sources, the others held, and −2 ln of the likelihood there.
@@ -231,16 +227,14 @@ impl Likelihood<'_> {
         for _ in 0..STEPS {
             let moving = sources.iter().filter(|k| !resting.contains(k));
             let moving: Vec<usize> = moving.copied().collect();
-            let slope = self.slope_from(here, &at, &moving)?;
+            let slope = self.slope(here, &at, &moving)?;
+            let slope = slope.with_prior(self.scale, &at, &moving);
             let cost = deviance + self.penalty(&at);
-            let (gradient, information) = self.posterior(&slope, &at, &moving);
             let (free, rests): (Vec<usize>, Vec<usize>) =
-                (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || gradient[i] > 0.0);
+                (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || slope.score[i] > 0.0);
             resting.extend(rests.iter().map(|&i| moving[i]));
-            let of_free = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
-            let information = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-                information[(free[i], free[j])]
-            });
+            let of_free = slope.score.select_rows(&free);
+            let information = slope.information.select_rows(&free).select_columns(&free);
             let Some(step) = solve(information, &of_free) else {
                 break;
             };
@@ -261,23 +255,6 @@ impl Likelihood<'_> {
             deviance = here.deviance();
         }
         Ok((at, deviance))
-    }
-
-    /// Score and information with those of the prior.
-    fn posterior(
-        &self,
-        slope: &Slope,
-        at: &Factors,
-        sources: &[usize],
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let (mut score, mut information) = (slope.score.clone(), slope.information.clone());
-        for (i, &k) in sources.iter().enumerate() {
-            if self.scale.stated[k] {
-                score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
-                information[(i, i)] += LOG_SIGMA.powi(-2);
-            }
-        }
-        (score, information)
     }
 
     /// The point at the longest fraction of a step that lowers the cost; none if none does.
@@ -320,13 +297,12 @@ impl Likelihood<'_> {
         factors: &Factors,
         sources: &[usize],
     ) -> Result<Vec<Option<f64>>, CalibrationError> {
-        let slope = self.slope(factors, sources)?;
-        let (_, information) = self.posterior(&slope, factors, sources);
+        let slope = self.slope(self.replay(factors)?, factors, sources)?;
+        let slope = slope.with_prior(self.scale, factors, sources);
         // None where the data do not show all of them.
-        let covariance = information.cholesky().map(|factor| factor.inverse());
-        Ok((0..sources.len())
-            .map(|i| Some(covariance.as_ref()?[(i, i)].sqrt()))
-            .collect())
+        let covariance = slope.information.cholesky().map(|root| root.inverse());
+        let sigma = |i: usize| covariance.as_ref().map(|of| of[(i, i)].sqrt());
+        Ok((0..sources.len()).map(sigma).collect())
     }
 }
 
@@ -352,12 +328,16 @@ fn solve(mut information: DMatrix<f64>, score: &DVector<f64>) -> Option<DVector<
 }
 
 impl Slope {
-    /// Score statistic of one factor; zero where a variance at zero would fall.
-    fn statistic(&self, factor: usize, bounded: bool) -> f64 {
-        let (score, information) = (self.score[factor], self.information[(factor, factor)]);
-        match information > 0.0 && (score > 0.0 || !bounded) {
-            true => score.powi(2) / information,
-            false => 0.0,
+    /// With the prior of what is stated.
+    fn with_prior(mut self, scale: &Scale, at: &Factors, sources: &[usize]) -> Self {
+        for (i, &k) in sources
+            .iter()
+            .enumerate()
+            .filter(|(_, k)| scale.stated[**k])
+        {
+            self.score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
+            self.information[(i, i)] += LOG_SIGMA.powi(-2);
         }
+        self
     }
 }
