@@ -172,19 +172,14 @@ fn beyond(result: &PassResult, gate: f64) -> f64 {
 }
 
 fn summary(result: &PassResult) -> Pass {
-    let sigma = result
-        .posterior
-        .parameter_covariance
-        .diagonal()
-        .map(f64::sqrt);
-    let step = result.posterior.parameters;
+    let posterior = &result.posterior;
+    let variance = posterior.parameter_covariance.diagonal();
+    // What is not estimated has no σ; a step that is no number is no step to end with.
+    let steps = posterior.parameters.iter().zip(&variance);
+    let steps = steps.filter(|&(_, &variance)| variance != 0.0);
     Pass {
-        largest_step: step
-            .iter()
-            .zip(&sigma)
-            // What is not estimated has none; one that is no number is no step to end with.
-            .filter(|&(_, &sigma)| sigma != 0.0)
-            .map(|(step, sigma)| (step / sigma).abs())
+        largest_step: steps
+            .map(|(step, variance)| (step / variance.sqrt()).abs())
             .max_by(f64::total_cmp)
             .unwrap_or(0.0),
         cost: result.cost,

@@ -76,22 +76,17 @@ impl<'a> Problem<'a> {
 
     /// Some of its recordings, at least one, told by number.
     pub(in crate::calibration) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
-        let mut runs = self.runs().enumerate().filter(|&(number, _)| which(number));
-        let first = runs.next();
-        let others = runs.map(|(_, run)| run).collect();
-        let stretches = self.stretches.iter().filter(|of| which(of.recording));
-        let renumbered = stretches.map(|stretch| Stretch {
-            recording: (0..stretch.recording)
-                .filter(|&before| which(before))
-                .count(),
+        let renumbered = self.stretches.iter().filter(|of| which(of.recording));
+        let renumbered = renumbered.map(|stretch| Stretch {
+            recording: (0..stretch.recording).filter(|&k| which(k)).count(),
             ..stretch.clone()
         });
-        Self {
-            run: first.map_or(self.run, |(_, run)| run),
-            others,
-            stretches: renumbered.collect(),
-            ..self.clone()
-        }
+        let runs = self.runs().enumerate().filter(|&(number, _)| which(number));
+        let mut runs = runs.map(|(_, run)| run);
+        let mut of = self.with_stretches(renumbered.collect());
+        of.run = runs.next().unwrap_or(self.run);
+        of.others = runs.collect();
+        of
     }
 
     /// Without the recordings that have no dwell, of which it says so; as it is where none has.

@@ -48,27 +48,25 @@ impl Filter {
             given.states[(component, moving[place])] = 1.0;
         }
         let first = size - CONSTANTS;
+        let drive = |to: &mut DMatrix<f64>, by: usize, column: &[f64; NAVIGATION]| {
+            for (k, rate) in rates(block, column).into_iter().enumerate() {
+                to[(first + k, by)] = rate;
+            }
+        };
         for (state, column) in self.driving_columns(block).iter().enumerate() {
             if !moving.contains(&state) {
-                for (k, rate) in rates(block, column).into_iter().enumerate() {
-                    given.states[(first + k, state)] = rate;
-                }
+                drive(&mut given.states, state, column);
             }
         }
         for (k, column) in self.constant_effects(block).enumerate() {
-            for (row, rate) in rates(block, &column).into_iter().enumerate() {
-                given.columns[(first + row, k)] = rate;
-            }
+            drive(&mut given.columns, k, &column);
         }
         // What the table's attitude does to `g`.
         let mut shift = DMatrix::zeros(size, 3);
         for axis in 0..3 {
             let itself = |row| f64::from(row == ATTITUDE + axis);
             let change = |row| block.navigation[(row, ATTITUDE + axis)] - itself(row);
-            let rates = rates(block, &std::array::from_fn(change));
-            for (k, rate) in rates.into_iter().enumerate() {
-                shift[(first + k, axis)] = rate;
-            }
+            drive(&mut shift, axis, &std::array::from_fn(change));
             shift[(ATTITUDE + axis, axis)] = -1.0;
         }
         given.add(0, &table.combined(&shift));

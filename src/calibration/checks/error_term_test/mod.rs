@@ -213,10 +213,9 @@ impl<'a> Tested<'a> {
         let chance = FALSE_ALARM / off.max(1) as f64;
         let scalars = 3.0 * outcome.innovations.len() as f64;
         let tests = tried.into_iter().filter_map(|term| {
-            let test = match (term, model.has(term)) {
-                (VARYING, on) => tested.varying(on, chance),
-                (_, true) => tested.on(term, chance)?,
-                (_, false) => tested.off(term, chance)?,
+            let test = match term {
+                VARYING => tested.varying(model.has(term), chance),
+                _ => tested.constant(term, model.has(term), chance)?,
             };
             Some(ErrorTermTest {
                 without: test.without / scalars,
@@ -229,26 +228,23 @@ impl<'a> Tested<'a> {
         Ok(tested)
     }
 
-    /// The test of a constant term that is on, with costs of the whole record.
-    fn on(&self, term: ErrorTerm, chance: f64) -> Option<ErrorTermTest> {
-        let (with, without) = (&self.terms.own, self.terms.without(term));
-        let evidence = self.terms.evidence(term, with, &without)?;
+    /// The test of a constant term, with costs of the whole record.
+    fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
+        let (terms, own) = (&self.terms, &self.terms.own);
+        let other = match on {
+            true => terms.without(term),
+            false => terms.with(&[term]),
+        };
+        let (with, without) = match on {
+            true => (own, &other),
+            false => (&other, own),
+        };
+        let evidence = terms.evidence(term, with, without)?;
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
-            ..ErrorTermTest::new(term, true, &with.posterior, &without.posterior)
-        })
-    }
-
-    /// The same of one that is off.
-    fn off(&self, term: ErrorTerm, chance: f64) -> Option<ErrorTermTest> {
-        let (with, without) = (self.terms.with(&[term]), &self.terms.own);
-        let evidence = self.terms.evidence(term, &with, without)?;
-        Some(ErrorTermTest {
-            limit: evidence.limit(chance),
-            significance: evidence.significance(),
-            left_off: self.terms.left_off(term),
-            ..ErrorTermTest::new(term, false, &with.posterior, &without.posterior)
+            left_off: (!on).then(|| terms.left_off(term)).flatten(),
+            ..ErrorTermTest::new(term, on, &with.posterior, &without.posterior)
         })
     }
 
