@@ -6,7 +6,6 @@ use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
 use super::source::Source;
-use crate::calibration::record::schedule::Step;
 use crate::calibration::{
     CalibrationError, Gate, Innovation, Observation, Problem, Progress, Script, Solved, iterate,
     pass,
@@ -39,10 +38,17 @@ pub fn learn<'a>(
         .problem
         .with(|model| *model = model.with_noise_of(&as_stated.model));
     let accepted = solved.iterated.held.accepted();
-    let thinned = Thinned::new(&as_stated, (accepted.len() / ENOUGH).clamp(1, LONGEST));
-    let script = Script::new(&thinned.problem, &solved.priors, &solved.iterated.estimate)?;
+    // Few observations tell whether noise is called for at all; the first after each move is among them.
+    let steps = (accepted.len() / ENOUGH).clamp(1, LONGEST);
+    let thinned = as_stated.observed_every(steps);
+    let script = Script::new(&thinned, &solved.priors, &solved.iterated.estimate)?;
     let scale = Scale::new(&as_stated, &script.moves());
-    let likelihood = thinned.likelihood(&script, &scale, &accepted);
+    let likelihood = Likelihood {
+        problem: &thinned,
+        script: &script,
+        scale: &scale,
+        accepted: taken_together(&as_stated, &accepted, steps),
+    };
     let fit = likelihood.fit(None)?;
     let test = likelihood.test(&fit)?;
     if test.rejected || policy == NoisePolicy::Learnt {
@@ -68,8 +74,6 @@ fn with_noise<'a>(
     let mut accepted = solved.iterated.held.accepted();
     // Other noise may have thrown the gate open; the estimated one decides once.
     let mut open = accepted.iter().all(|&accepted| accepted);
-    // Near the end all observations count: few cannot tell white noise from random walk.
-    let whole = Thinned::new(as_stated, 1);
     for round in 1.. {
         solved.problem = as_stated.with_model(scale.apply(&fit.factors, &as_stated.model));
         let (problem, priors) = (&solved.problem, &solved.priors);
@@ -81,8 +85,13 @@ fn with_noise<'a>(
         open = false;
         let (gate, passes) = (Gate::As(&accepted), &mut solved.passes);
         solved.iterated = iterate(problem, priors, at.clone(), gate, passes, progress)?;
-        let script = Script::new(&whole.problem, priors, &solved.iterated.estimate)?;
-        let likelihood = whole.likelihood(&script, scale, &accepted);
+        // Near the end all observations count: few cannot tell white noise from random walk.
+        let likelihood = Likelihood {
+            problem: as_stated,
+            script: &Script::new(as_stated, priors, &solved.iterated.estimate)?,
+            scale,
+            accepted: accepted.clone(),
+        };
         let before = likelihood.replay(&fit.factors)?.deviance();
         let now = likelihood.fit(Some(&fit))?;
         let settled = (now.deviance - before).abs() < SETTLED;
@@ -95,58 +104,27 @@ fn with_noise<'a>(
     Ok(solved)
 }
 
-/// A problem of which only so many observations are looked at as noise needs: those of a dwell are thinned
-/// out, the first after each move stays.
-struct Thinned<'a> {
-    problem: Problem<'a>,
-    /// Observations of three components that one of each kind stands for, in their order.
-    groups: Vec<Vec<usize>>,
-}
-
-impl<'a> Thinned<'a> {
-    fn new(problem: &Problem<'a>, steps_of_dwell: usize) -> Self {
-        let thinned = problem.observed_every(steps_of_dwell);
-        let mut groups = Vec::new();
-        let mut next = 0;
-        let pairs = problem.stretches().iter().zip(thinned.stretches());
-        for (all, few) in pairs {
-            let [all, few] = [all, few].map(|of| of.steps.iter().filter(|s| s.at_rest.is_some()));
-            let mut all = all.peekable();
-            for step in few {
-                let mut of_kinds: [Vec<usize>; Observation::ALL.len()] = Default::default();
-                let within = |one: &&Step| one.samples.end <= step.samples.end;
-                while let Some(one) = all.next_if(within) {
-                    for kind in problem.observed(one) {
-                        of_kinds[kind as usize].push(next);
-                        next += 1;
-                    }
-                }
-                let kinds = problem.observed(step);
-                groups.extend(kinds.map(|kind| std::mem::take(&mut of_kinds[kind as usize])));
+/// Of each observation where this many steps of a dwell are taken together, whether all that it stands for are let in.
+fn taken_together(problem: &Problem, accepted: &[bool], steps: usize) -> Vec<bool> {
+    let (mut accepted, mut together) = (accepted.iter(), Vec::new());
+    for stretch in problem.stretches() {
+        let at_rest = stretch
+            .steps
+            .iter()
+            .filter_map(|step| Some((step, step.at_rest.as_ref()?)));
+        let at_rest: Vec<_> = at_rest.collect();
+        let dwells = at_rest.chunk_by(|_, (_, next)| !next.first);
+        for part in dwells.flat_map(|dwell| dwell.chunks(steps)) {
+            let mut of_kinds = [None; Observation::ALL.len()];
+            for kind in part.iter().flat_map(|(step, _)| problem.observed(step)) {
+                let let_in = accepted.next().is_none_or(|&accepted| accepted);
+                let of_kind = &mut of_kinds[kind as usize];
+                *of_kind = Some(of_kind.unwrap_or(true) && let_in);
             }
-        }
-        Self {
-            problem: thinned,
-            groups,
+            together.extend(of_kinds.into_iter().flatten());
         }
     }
-
-    /// The likelihood of noise where these of all observations are let in.
-    fn likelihood<'b>(
-        &'b self,
-        script: &'b Script<'b>,
-        scale: &'b Scale,
-        accepted: &[bool],
-    ) -> Likelihood<'b> {
-        let let_in = |index: &usize| accepted.get(*index).copied().unwrap_or(true);
-        let group = |group: &Vec<usize>| group.iter().all(let_in);
-        Likelihood {
-            problem: &self.problem,
-            script,
-            scale,
-            accepted: self.groups.iter().map(group).collect(),
-        }
-    }
+    together
 }
 
 /// Lets in what the gate allows; leaves out what it does not where that is still `open`. Otherwise the set
