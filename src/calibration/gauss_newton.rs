@@ -106,7 +106,8 @@ pub fn iterate(
         let summary = summary(&result);
         tell(progress, &summary)?;
         passes.push(summary);
-        let same_data = before.as_ref().is_some_and(|last| same_data(last, &result));
+        let same_data = |last: &PassResult| last.accepted() == result.accepted();
+        let same_data = before.as_ref().is_some_and(same_data);
         let settled = summary.largest_step <= problem.options.converged_sigma
             && (decided || same_data || (before.is_none() && summary.rejected == 0));
         let doubtful = !given && beyond(&result, problem.gate_limit()) > MOST_OUTLIERS;
@@ -147,22 +148,14 @@ fn pass_towards(
 ) -> Result<PassResult, CalibrationError> {
     let made_at = |at: &Linearisation| pass(problem, &Script::new(problem, priors, at)?, gate);
     let mut made = made_at(at);
-    let Some(before) = before else {
-        return made;
-    };
     for _ in 0..MOST_SHORTENED {
-        if made.is_ok() {
+        let (Err(_), Some(before)) = (&made, before) else {
             break;
-        }
+        };
         *at = before.at.towards(at, 0.5);
         made = made_at(at);
     }
     made
-}
-
-/// Whether two passes let the same observations in.
-fn same_data(a: &PassResult, b: &PassResult) -> bool {
-    a.accepted() == b.accepted()
 }
 
 /// Part of all observations that are beyond the gate or were left out.

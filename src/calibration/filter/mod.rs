@@ -14,7 +14,7 @@ mod update;
 pub use dwell::{DwellFilters, Taken, dwell_filters};
 pub use gate::{Gate, Judge};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::attitude::skew;
 use crate::calibration::linearisation::Start;
@@ -85,16 +85,11 @@ impl Filter {
     /// its 1σ at another site.
     pub fn begin(&mut self, start: &Start, since: Since, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude;
-        for axis in 0..3 {
-            for (first, mean, sigma) in [
-                (ATTITUDE, start.attitude[axis], start.attitude_sigma[axis]),
-                (VELOCITY, 0.0, start.velocity_sigma),
-                (POSITION, 0.0, start.position_sigma),
-                (initial, start.attitude[axis], start.attitude_sigma[axis]),
-            ] {
-                self.redraw(first + axis, mean, sigma);
-            }
-        }
+        let (still, level) = (Vector3::zeros(), (&start.attitude, &start.attitude_sigma));
+        self.redraw_three(ATTITUDE, level);
+        self.redraw_three(VELOCITY, (&still, &Vector3::repeat(start.velocity_sigma)));
+        self.redraw_three(POSITION, (&still, &Vector3::repeat(start.position_sigma)));
+        self.redraw_three(initial, level);
         for axis in 0..3 {
             // φ starts as φ₀: fully correlated.
             let variance = self.p[(initial + axis, initial + axis)];
@@ -103,10 +98,7 @@ impl Filter {
         }
         self.redraw_table();
         if let Some(first) = self.layout.earth_rate {
-            for axis in 0..3 {
-                let (mean, sigma) = (start.earth_rate[axis], start.earth_rate_sigma[axis]);
-                self.redraw(first + axis, mean, sigma);
-            }
+            self.redraw_three(first, (&start.earth_rate, &start.earth_rate_sigma));
         }
         if let Some((state, sigma)) = self.layout.gravity.zip(gravity) {
             self.redraw(state, 0.0, sigma);
@@ -124,6 +116,11 @@ impl Filter {
                 }
             }
         }
+    }
+
+    /// Forgets three states, given means and 1σ of their errors.
+    fn redraw_three(&mut self, first: usize, (mean, sigma): (&Vector3<f64>, &Vector3<f64>)) {
+        (0..3).for_each(|axis| self.redraw(first + axis, mean[axis], sigma[axis]));
     }
 
     /// Forgets a state: its error is drawn anew, independent of all others.

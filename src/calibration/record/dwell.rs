@@ -87,7 +87,7 @@ impl Rest {
     ) -> Self {
         let begin = navigator.state;
         let imu = &stretch.run.recording.imu;
-        let whole = samples_of(part);
+        let whole_part = samples_of(part);
         let part = part
             .iter()
             .filter_map(|step| Some((step, step.at_rest.as_ref()?)));
@@ -95,18 +95,27 @@ impl Rest {
             .clone()
             .next()
             .and_then(|(_, at_rest)| at_rest.dwell.axes.clone());
-        let mut models = Models::default();
+        // With the number of samples that each is for, and whether some of these are interpolated.
+        let mut models: Vec<(usize, bool, Block)> = Vec::new();
         let (mut steps, mut seen) = (Vec::new(), Vec::new());
         for (step, at_rest) in part {
             let referred = between(&navigator.state, &begin);
             navigator.state = begin;
+            let length = step.samples.len();
             let bridged = imu.bridged(&step.samples).next().is_some();
-            let model = models.of_step(step.samples.len(), bridged, |like| match like {
-                Some(model) => navigator.standing_like(model, &step.samples),
-                None => {
-                    navigator.warm(&whole);
-                    navigator.standing(&begin.attitude, step.samples.clone())
-                }
+            let whole = |of: &(usize, bool, Block)| !bridged && (of.0, of.1) == (length, false);
+            let model = models.iter().rposition(whole).unwrap_or_else(|| {
+                let like = models.iter().rfind(|of| bridged && of.0 == length);
+                let model = match like {
+                    // It differs by its interpolated samples alone.
+                    Some((.., model)) => navigator.standing_like(model, &step.samples),
+                    None => {
+                        navigator.warm(&whole_part);
+                        navigator.standing(&begin.attitude, step.samples.clone())
+                    }
+                };
+                models.push((length, bridged, model));
+                models.len() - 1
             });
             navigator.warm(&step.samples);
             navigator.stand(&at_rest.sums);
@@ -120,7 +129,6 @@ impl Rest {
                 seen: first..seen.len(),
             });
         }
-        models.all.shrink_to_fit();
         steps.shrink_to_fit();
         seen.shrink_to_fit();
         Self {
@@ -130,7 +138,7 @@ impl Rest {
             from: begin,
             begin,
             axes,
-            models: models.all,
+            models: models.into_iter().map(|(.., model)| model).collect(),
             steps,
             seen,
         }
@@ -170,43 +178,6 @@ impl Seen {
 pub fn samples_of(steps: &[Step]) -> Range<usize> {
     let ends = steps.first().zip(steps.last());
     ends.map_or(0..0, |(first, last)| first.samples.start..last.samples.end)
-}
-
-/// Error models of a part's steps, and with their number of samples the last of which none is interpolated, and the
-/// last of all.
-#[derive(Default)]
-struct Models {
-    all: Vec<Block>,
-    whole: Option<(usize, usize)>,
-    last: Option<(usize, usize)>,
-}
-
-impl Models {
-    /// The number of the model of a step of this length, `made` where no other step is like it: anew, or after one that
-    /// differs by its interpolated samples alone.
-    fn of_step(
-        &mut self,
-        length: usize,
-        bridged: bool,
-        made: impl FnOnce(Option<&Block>) -> Block,
-    ) -> usize {
-        let as_long = |model: Option<(usize, usize)>| {
-            let (of, number) = model?;
-            (of == length).then_some(number)
-        };
-        let number = as_long(self.whole).filter(|_| !bridged);
-        let number = number.unwrap_or_else(|| {
-            let like = as_long(self.last).filter(|_| bridged);
-            let model = made(like.and_then(|number| self.all.get(number)));
-            self.all.push(model);
-            self.all.len() - 1
-        });
-        self.last = Some((length, number));
-        if !bridged {
-            self.whole = self.last;
-        }
-        number
-    }
 }
 
 /// By how much errors of attitude, velocity and position become more when they are referred to another
