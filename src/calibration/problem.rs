@@ -237,18 +237,17 @@ impl<'a> Problem<'a> {
     pub(in crate::calibration) fn notes(&self) -> Vec<String> {
         let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
         for run in self.runs() {
-            let name = run.recording.name.as_str();
             for note in &run.recording.notes {
                 match found.iter_mut().find(|(other, _)| *other == note) {
-                    Some((_, names)) => names.push(name),
-                    None => found.push((note, vec![name])),
+                    Some((_, names)) => names.push(&run.recording.name),
+                    None => found.push((note, vec![&run.recording.name])),
                 }
             }
         }
-        let of_all = self.runs().count();
+        let count = self.runs().count();
         let found = found
             .into_iter()
-            .map(|(note, names)| match names.len() == of_all {
+            .map(|(note, names)| match names.len() == count {
                 true => note.clone(),
                 false => format!("{}: {note}", names.join(", ")),
             });
