@@ -19,19 +19,11 @@ use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
 use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
+pub use score::Cause;
 use score::Scores;
 
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
-
-/// What explains a record better than its model.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Cause {
-    /// Something happened once.
-    Disturbance(Disturbance),
-    /// An error term is there.
-    Term(ErrorTerm),
-}
 
 /// A cause that is beyond chance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,36 +147,27 @@ fn by_score(
     let (with, at) = (problem.with_model(model), &iterated.estimate);
     let reduction = Script::new(&with, priors, at)?.reduce(&with, &iterated.held.accepted())?;
     let prior = Prior::new(&reduction.constants, &with.model, at);
-    let is_off = |constant: &Constant| match *constant {
-        Constant::Disturbance(of, _) => disturbances.contains(&of),
-        constant => constant
-            .error_term()
-            .is_some_and(|term| terms.contains(&term)),
-    };
+    let once = disturbances.into_iter().map(Cause::Disturbance);
+    let causes: Vec<Cause> = once.chain(terms.into_iter().map(Cause::Term)).collect();
+    let is_off = |constant: &Constant| Cause::of(constant).is_some_and(|of| causes.contains(&of));
     let Some(scores) = Scores::new(&reduction, &prior, is_off) else {
         return Ok(Vec::new());
     };
-    let once = disturbances.iter().filter_map(|&of| {
-        let (square, value) = scores.of_disturbance(of)?;
+    let candidates = causes.iter().filter_map(|&cause| {
+        let (square, degrees, value) = scores.explained_by(cause)?;
+        let time = match cause {
+            Cause::Disturbance(of) => time_of(problem, of),
+            Cause::Term(_) => 0.0,
+        };
         Some(Candidate {
-            cause: Cause::Disturbance(of),
-            time: time_of(problem, of),
+            cause,
+            time,
             value,
-            square,
-            degrees: COMPONENTS as f64,
-        })
-    });
-    let of_terms = terms.iter().filter_map(|&term| {
-        let (square, degrees) = scores.of_term(term)?;
-        Some(Candidate {
-            cause: Cause::Term(term),
-            time: 0.0,
-            value: Vector3::zeros(),
             square,
             degrees,
         })
     });
-    Ok(once.chain(of_terms).collect())
+    Ok(candidates.collect())
 }
 
 /// All that may have happened once and is not estimated already.

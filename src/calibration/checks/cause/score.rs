@@ -5,6 +5,25 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use crate::calibration::checks::error_term_test::Evidence;
 use crate::calibration::{Constant, Disturbance, ErrorTerm, Prior, Reduction};
 
+/// What explains a record better than its model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cause {
+    /// Something happened once.
+    Disturbance(Disturbance),
+    /// An error term is there.
+    Term(ErrorTerm),
+}
+
+impl Cause {
+    /// What a constant is of, if it is of a cause.
+    pub fn of(constant: &Constant) -> Option<Self> {
+        match *constant {
+            Constant::Disturbance(of, _) => Some(Self::Disturbance(of)),
+            constant => constant.error_term().map(Self::Term),
+        }
+    }
+}
+
 /// Scores of the constants that are not estimated, beside those that are.
 pub struct Scores {
     constants: Vec<Constant>,
@@ -47,27 +66,24 @@ impl Scores {
         })
     }
 
-    /// By how much the cost falls with a disturbance, and its components; none where the data do not show all of them.
-    pub fn of_disturbance(&self, disturbance: Disturbance) -> Option<(f64, Vector3<f64>)> {
-        let mut constants = self.constants.iter();
-        let first = constants.position(|of| *of == Constant::Disturbance(disturbance, 0))?;
-        let score = self.score.fixed_rows::<3>(first);
-        let value = self.information.fixed_view::<3, 3>(first, first);
-        let value = value.into_owned().cholesky()?.solve(&score);
-        Some((score.dot(&value), value))
-    }
-
-    /// χ² and degrees of freedom of what an error term of its usual size explains.
-    pub fn of_term(&self, term: ErrorTerm) -> Option<(f64, f64)> {
+    /// χ² of a cause if it is none, its degrees of freedom and its components; none where the data do not show it, or
+    /// not all of what happened once. An error term is of its usual size, and without components.
+    pub fn explained_by(&self, cause: Cause) -> Option<(f64, f64, Vector3<f64>)> {
         let constants = self.constants.iter().enumerate();
-        let of = constants.filter(|(_, constant)| constant.error_term() == Some(term));
+        let of = constants.filter(|(_, constant)| Cause::of(constant) == Some(cause));
         let of: Vec<usize> = of.map(|(place, _)| place).collect();
-        let sigma = DMatrix::from_diagonal(&self.sigma.select_rows(&of));
+        let score = self.score.select_rows(&of);
         let information = self.information.select_rows(&of).select_columns(&of);
+        if let Cause::Disturbance(_) = cause {
+            let value = information.cholesky()?.solve(&score);
+            let components = Vector3::from_column_slice(value.as_slice());
+            return Some((score.dot(&value), of.len() as f64, components));
+        }
+        let sigma = DMatrix::from_diagonal(&self.sigma.select_rows(&of));
         let information = &sigma * information * &sigma + DMatrix::identity(of.len(), of.len());
-        let covariance = information.cholesky()?.inverse();
-        let score = &sigma * self.score.select_rows(&of);
+        let (covariance, score) = (information.cholesky()?.inverse(), &sigma * score);
         let gain = score.dot(&(&covariance * &score));
-        Evidence::new(gain, &covariance).chi_square()
+        let (square, degrees) = Evidence::new(gain, &covariance).chi_square()?;
+        Some((square, degrees, Vector3::zeros()))
     }
 }
