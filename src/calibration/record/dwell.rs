@@ -87,7 +87,7 @@ impl Rest {
     ) -> Self {
         let begin = navigator.state;
         let imu = &stretch.run.recording.imu;
-        let whole_part = samples_of(part);
+        let whole = samples_of(part);
         let part = part
             .iter()
             .filter_map(|step| Some((step, step.at_rest.as_ref()?)));
@@ -101,22 +101,18 @@ impl Rest {
         for (step, at_rest) in part {
             let referred = between(&navigator.state, &begin);
             navigator.state = begin;
-            let length = step.samples.len();
             let bridged = imu.bridged(&step.samples).next().is_some();
-            let whole = |of: &(usize, bool, Block)| !bridged && (of.0, of.1) == (length, false);
-            let model = models.iter().rposition(whole).unwrap_or_else(|| {
-                let like = models.iter().rfind(|of| bridged && of.0 == length);
-                let model = match like {
-                    // It differs by its interpolated samples alone.
-                    Some((.., model)) => navigator.standing_like(model, &step.samples),
+            let model = model_of(
+                &mut models,
+                (step.samples.len(), bridged),
+                |like| match like {
+                    Some(model) => navigator.standing_like(model, &step.samples),
                     None => {
-                        navigator.warm(&whole_part);
+                        navigator.warm(&whole);
                         navigator.standing(&begin.attitude, step.samples.clone())
                     }
-                };
-                models.push((length, bridged, model));
-                models.len() - 1
-            });
+                },
+            );
             navigator.warm(&step.samples);
             navigator.stand(&at_rest.sums);
             let first = seen.len();
@@ -172,6 +168,22 @@ impl Seen {
             readings,
         })
     }
+}
+
+/// The number of the model of a step of this many samples, some of which may be interpolated; `made` where no other step
+/// is like it: anew, or after one that differs by its interpolated samples alone.
+fn model_of(
+    models: &mut Vec<(usize, bool, Block)>,
+    (length, bridged): (usize, bool),
+    made: impl FnOnce(Option<&Block>) -> Block,
+) -> usize {
+    let known = |of: &(usize, bool, Block)| !bridged && (of.0, of.1) == (length, false);
+    models.iter().rposition(known).unwrap_or_else(|| {
+        let like = models.iter().rfind(|of| bridged && of.0 == length);
+        let model = made(like.map(|(.., model)| model));
+        models.push((length, bridged, model));
+        models.len() - 1
+    })
 }
 
 /// The samples of steps that follow one another.
