@@ -2,16 +2,11 @@
 
 use nalgebra::DVector;
 
-use super::constants::Prior;
-use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::linearisation::Linearisation;
-use super::parameters::PARAMETERS;
-use super::parameters::auxiliary::Auxiliary;
-use super::pass::open_pass;
-use super::problem::Problem;
-use super::reduction::{Epoch, Script};
 use crate::calibration::start::coarse::initial_attitudes;
+use crate::calibration::{
+    Auxiliary, CalibrationError, Epoch, Estimate, Gate, Linearisation, PARAMETERS, PassResult,
+    Prior, Problem, Script, pass,
+};
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
 /// What no estimator of a run can beat.
@@ -39,21 +34,28 @@ pub fn bound(
     truth: &PerSensor<Triad>,
     terms: &TermVector,
 ) -> Result<Bound, CalibrationError> {
-    let model = problem.model.in_form(problem.run(), truth.gyro.form);
-    let problem = problem.with_model(model);
-    let attitudes = initial_attitudes(&problem)?;
-    let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
-    let at = Linearisation::new(*truth, *terms, initial);
-    let result = open_pass(&problem, &Script::new(&problem, &attitudes, &at)?)?;
-    let prior = Prior::new(&result.reduction.constants, &problem.model, &at);
+    let problem = problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form));
+    let at = Linearisation::new(*truth, *terms, Vec::new());
+    let at_truth = pass_at(&problem, at)?;
+    let prior = Prior::new(&at_truth.reduction.constants, &problem.model, &at_truth.at);
     Ok(Bound {
         estimate: Estimate {
             triads: *truth,
-            covariance: result.posterior.parameter_covariance,
+            covariance: at_truth.posterior.parameter_covariance,
         },
-        auxiliary: result.auxiliary(&problem.model),
-        history: result.reduction.history(&prior, &at),
+        auxiliary: at_truth.auxiliary(&problem.model),
+        history: at_truth.reduction.history(&prior, &at_truth.at),
     })
+}
+
+/// A pass at the truth.
+fn pass_at(problem: &Problem, truth: Linearisation) -> Result<PassResult, CalibrationError> {
+    let attitudes = initial_attitudes(problem)?;
+    let at = Linearisation {
+        initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
+        ..truth
+    };
+    pass(problem, &Script::new(problem, &attitudes, &at)?, Gate::Open)
 }
 
 /// The variances that no estimator of recordings together can beat, at a truth with these coefficients of
@@ -66,22 +68,19 @@ pub fn thermal_bound(
     truth: &PerSensor<Triad>,
     coefficients: &PerSensor<ThermalCoefficients>,
 ) -> Result<DVector<f64>, CalibrationError> {
-    let attitudes = initial_attitudes(problem)?;
-    let initial = attitudes.iter().map(|attitude| attitude.mean).collect();
-    let at = Linearisation {
-        thermal: *coefficients,
-        ..Linearisation::new(*truth, TermVector::zeros(), initial)
-    };
-    let result = open_pass(problem, &Script::new(problem, &attitudes, &at)?)?;
-    let of_coefficients = result.thermal(&problem.model);
-    let of_coefficients = of_coefficients.map(|thermal| thermal.covariance.diagonal());
-    let of_coefficients = of_coefficients.unwrap_or_else(|| DVector::zeros(0));
-    let of_parameters = result.posterior.parameter_covariance.diagonal();
-    Ok(DVector::from_fn(
-        PARAMETERS + of_coefficients.len(),
-        |k, _| match k.checked_sub(PARAMETERS) {
-            None => of_parameters[k],
-            Some(k) => of_coefficients[k],
+    let at_truth = pass_at(
+        problem,
+        Linearisation {
+            thermal: *coefficients,
+            ..Linearisation::new(*truth, TermVector::zeros(), Vec::new())
         },
+    )?;
+    let of_parameters = at_truth.posterior.parameter_covariance.diagonal();
+    let of_coefficients = at_truth.thermal(&problem.model);
+    let of_coefficients = of_coefficients.map(|thermal| thermal.covariance.diagonal());
+    let all = of_parameters.iter().chain(of_coefficients.iter().flatten());
+    Ok(DVector::from_iterator(
+        PARAMETERS + of_coefficients.as_ref().map_or(0, DVector::len),
+        all.copied(),
     ))
 }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::calibration::start::mounting::Contradiction;
+use crate::calibration::Contradiction;
 use crate::imu::Sensor;
 use crate::run::LONG_ENOUGH;
 use crate::run::motion::LabelCheck;

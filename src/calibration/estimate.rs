@@ -1,6 +1,7 @@
 //! Both triads with the covariance of their parameters.
 
-use super::parameters::{ParameterMatrix, ParameterVector, parameter, to_vector};
+use crate::calibration::budget::curvature::curvature;
+use crate::calibration::{ParameterMatrix, ParameterVector, parameter, to_vector};
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::run::Run;
 
@@ -15,6 +16,17 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// With the covariance of a linear filter, to which second-order terms are added.
+    pub(in crate::calibration) fn with_curvature(
+        triads: PerSensor<Triad>,
+        linear: &ParameterMatrix,
+    ) -> Self {
+        Self {
+            covariance: linear + curvature(&triads, linear),
+            triads,
+        }
+    }
+
     /// The parameters of both triads.
     pub fn vector(&self) -> ParameterVector {
         to_vector(&self.triads)

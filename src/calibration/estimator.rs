@@ -1,35 +1,18 @@
 //! The estimator: coarse start, and Gauss–Newton iterations with the linearisation held until nothing moves.
 
-use std::collections::BTreeMap;
-
-use nalgebra::Vector3;
-
-use super::budget::BudgetSource;
-use super::constants::Prior;
-use super::error::CalibrationError;
-use super::gauss_newton::{Iterated, Progress};
-use super::linearisation::{UNKNOWN_HEADING, not_invertible};
-use super::model::Model;
-use super::outcome::Outcome;
-use super::parameters::ParameterMatrix;
-use super::problem::Problem;
-use super::several;
-use super::solved::Solved;
-use crate::calibration::checks;
-use crate::calibration::checks::cause::{Cause, FoundCause, likeliest};
-use crate::calibration::checks::dwell_scatter::{DwellScatter, DwellScores};
-use crate::calibration::checks::form::{FormTest, form_test};
-use crate::calibration::checks::innovation::consistency;
-use crate::calibration::checks::observability::Observability;
+use crate::calibration::checks::cause::{likeliest, settling};
+use crate::calibration::checks::form::form_test;
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::rounding::by_rounding;
-use crate::calibration::checks::settling;
 use crate::calibration::noise::learn;
 use crate::calibration::start::attempt::from_coarse_start;
-use crate::imu::Sensor;
+use crate::calibration::{
+    BudgetSource, CalibrationError, Cause, FormTest, Outcome, Problem, Progress, Solved, checks,
+    several,
+};
 use crate::run::Aiding;
 
-/// More than one cause in so many dwells explains noise.
+/// More than one cause in this many dwells explains noise.
 const DWELLS_OF_ONE: usize = 6;
 
 /// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
@@ -48,29 +31,34 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     };
     let solved = with_wide_prior(solved, progress)?;
     let form_test = form_test(&solved.problem, &solved.priors, &solved.iterated)?;
-    // Angles that are missing are neither a cause nor noise.
-    if form_test.as_ref().is_some_and(FormTest::rejects) {
-        return outcome(&as_stated(problem, &solved), solved, form_test);
-    }
     let solved = match problem.model.aiding {
+        // Angles that are missing are neither a cause nor noise.
+        _ if form_test.as_ref().is_some_and(FormTest::rejects) => solved,
         Aiding::Table => {
             let solved = settled(with_causes(solved, progress)?, progress)?;
-            with_noise(&as_stated(problem, &solved), solved, progress)?
+            with_noise(problem, solved, progress)?
         }
         // By hand only the record itself tells how much a move leaves.
-        Aiding::Velocity => {
-            let solved = with_noise(&as_stated(problem, &solved), solved, progress)?;
-            with_causes(solved, progress)?
-        }
+        Aiding::Velocity => with_causes(with_noise(problem, solved, progress)?, progress)?,
     };
-    outcome(&as_stated(problem, &solved), solved, form_test)
+    outcome(&solved.as_stated(problem), solved, form_test)
 }
 
-/// The problem that was solved with noise and prior as they are stated; recordings differ as they show.
-fn as_stated<'a>(stated: &Problem<'a>, solved: &Solved<'a>) -> Problem<'a> {
-    let mut model = solved.problem.model.with_noise_of(&stated.model);
-    model.prior_sigma = stated.model.prior_sigma;
-    solved.problem.with_model(model)
+/// What was found with its covariance, to which errors that no pass knows of are added.
+fn outcome(
+    as_stated: &Problem,
+    solved: Solved,
+    form_test: Option<FormTest>,
+) -> Result<Outcome, CalibrationError> {
+    let (problem, findings) = (solved.problem.clone(), solved.findings.clone());
+    let mut outcome = Outcome::by_noise(as_stated, solved, form_test)?;
+    let (run, triads) = (problem.run(), outcome.estimate.triads);
+    outcome.set_part(BudgetSource::Rounding, by_rounding(&problem, &triads));
+    if run.recording.imu.period_sigma > 0.0 {
+        outcome.set_part(BudgetSource::Period, outcome.estimate.by_period(run));
+    }
+    outcome.findings = checks::findings(as_stated, &outcome, findings);
+    Ok(outcome)
 }
 
 /// Without the time after each stop in which the attitude settles, as long as more of it shows; as it is where that lasts
@@ -98,20 +86,18 @@ fn with_causes<'a>(
 ) -> Result<Solved<'a>, CalibrationError> {
     let most = solved.problem.dwells().count() / DWELLS_OF_ONE;
     while solved.causes.len() < most {
-        let Some(found) = likeliest(&solved.problem, &solved.priors, &solved.iterated)? else {
+        let found = likeliest(&solved.problem, &solved.priors, &solved.iterated)?;
+        // Nothing else is to explain a term that is not asked for.
+        let asked = |cause| solved.problem.options.auto_terms || !matches!(cause, Cause::Term(_));
+        let Some(found) = found.filter(|found| asked(found.cause)) else {
             break;
         };
-        // Nothing else is to explain a term that is not asked for.
-        if matches!(found.cause, Cause::Term(_)) && !solved.problem.options.auto_terms {
-            break;
-        }
         let problem = found.taken_into(&solved.problem);
-        match solved.clone().again(problem, progress) {
-            Ok(again) if again.iterated.converged || !solved.iterated.converged => solved = again,
-            Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
-            // A cause with which nothing converges is none.
-            _ => break,
-        }
+        // A cause with which nothing converges is none.
+        let Some(again) = solved.better(solved.clone().again(problem, progress))? else {
+            break;
+        };
+        solved = again;
         solved.causes.push(found);
     }
     Ok(solved)
@@ -119,16 +105,13 @@ fn with_causes<'a>(
 
 /// With the noise that the data show, where they contradict what is stated.
 fn with_noise<'a>(
-    as_stated: &Problem<'a>,
+    problem: &Problem<'a>,
     solved: Solved<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
-    match learn(as_stated, solved.clone(), progress) {
-        Ok(learnt) if learnt.iterated.converged || !solved.iterated.converged => Ok(learnt),
-        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
-        // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
-        _ => Ok(solved),
-    }
+    let learnt = learn(&solved.as_stated(problem), solved.clone(), progress);
+    // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
+    Ok(solved.better(learnt)?.unwrap_or(solved))
 }
 
 /// Iterations with a prior that its estimate does not contradict: a wrong one would make outliers of correct
@@ -141,126 +124,22 @@ fn with_wide_prior<'a>(
     let Some(model) = widened(&solved.problem.model, &estimate) else {
         return Ok(solved);
     };
-    let problem = solved.problem.with_model(model);
-    match solved.clone().again(problem, progress) {
-        Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
-        // A prior that is too tight is better than none.
-        again => Ok(again.unwrap_or(solved)),
-    }
-}
-
-/// What was found with its covariance, to which errors that no pass knows of are added.
-fn outcome(
-    as_stated: &Problem,
-    solved: Solved,
-    form_test: Option<FormTest>,
-) -> Result<Outcome, CalibrationError> {
-    let (problem, mut iterated) = (solved.problem, solved.iterated);
-    let model = &problem.model;
-    let estimate = iterated.both_triads();
-    let (dwell_scatter, scattered) = scattered(&mut iterated, model);
-    let Iterated {
-        held, converged, ..
-    } = iterated;
-    if let Some(sensor) = not_invertible(&estimate.triads) {
-        return Err(CalibrationError::Singular { sensor });
-    }
-    let (attitude_sigma, attitude_covariance) = held.last_attitude();
-    let gravity = held.gravity();
-    let prior = Prior::new(&held.reduction.constants, model, &held.at);
-    let rounding = by_rounding(&problem, &estimate.triads);
-    let mut outcome = Outcome {
-        form_test,
-        dwell_scatter,
-        observability: Observability::new(
-            &estimate,
-            &as_stated.model.prior_sigma,
-            &attitude_covariance,
-        ),
-        covariance_by_noise: estimate.covariance,
-        estimate,
-        covariance_parts: BTreeMap::new(),
-        prior_sigma: as_stated.model.prior_sigma,
-        prior_mean: model.prior_mean,
-        attitude_sigma: match solved.priors.last() {
-            Some(prior) if prior.heading_is_unknown() => {
-                Vector3::new(attitude_sigma.x, attitude_sigma.y, UNKNOWN_HEADING)
-            }
-            _ => attitude_sigma,
-        },
-        prior_attitudes: solved.priors,
-        auxiliary: held.auxiliary(model),
-        thermal: held.thermal(model),
-        own: held.reduction.own(&held.at, &held.posterior),
-        warming: problem.warming(),
-        alone: solved.alone,
-        gravity: (problem.run().site.gravity + gravity.0, gravity.1),
-        converged,
-        log_determinant: held.log_determinant,
-        consistency: consistency(&held.innovations),
-        history: held.reduction.history(&prior, &held.at),
-        linearised_at: held.at,
-        innovations: held.innovations,
-        aiding: model.aiding,
-        velocity_sigma: problem.standstill_sigma(Sensor::Accel),
-        model: model.clone(),
-        settling: solved.settling,
-        causes: solved.causes,
-        noise: solved.noise,
-        passes: solved.passes,
-        findings: Vec::new(),
-    };
-    if let Some(scattered) = scattered {
-        outcome.set_part(BudgetSource::DwellScatter, scattered);
-    }
-    let growth = outcome.growth_by(BudgetSource::DwellScatter);
-    outcome.set_part(BudgetSource::Rounding, rounding);
-    if problem.run().recording.imu.period_sigma > 0.0 {
-        let by_period = outcome.estimate.by_period(problem.run());
-        outcome.set_part(BudgetSource::Period, by_period);
-    }
-    outcome.findings = checks::findings(as_stated, &outcome);
-    outcome
-        .findings
-        .extend(settling::finding(as_stated, outcome.settling));
-    let causes = outcome.causes.iter().map(FoundCause::finding);
-    outcome.findings.extend(causes.collect::<Vec<_>>());
-    outcome.findings.extend(solved.findings);
-    if let Some(scatter) = outcome.dwell_scatter.filter(|_| scattered.is_some()) {
-        outcome.findings.push(scatter.finding(growth));
-    }
-    Ok(outcome)
-}
-
-/// How much dwells scatter, none where there are too few; and what the covariance gains where that is beyond chance.
-fn scattered(
-    iterated: &mut Iterated,
-    model: &Model,
-) -> (Option<DwellScatter>, Option<ParameterMatrix>) {
-    let held = &iterated.held;
-    let prior = Prior::new(&held.reduction.constants, model, &held.at);
-    let Some(scores) = DwellScores::new(&held.reduction, &prior, &held.posterior) else {
-        return (None, None);
-    };
-    let gained = scores.widened().map(|widened| {
-        let by_noise = iterated.both_triads().covariance;
-        let posterior = &mut iterated.held.posterior;
-        *posterior = posterior.clone().with_covariance(widened);
-        iterated.both_triads().covariance - by_noise
-    });
-    (Some(scores.scatter), gained)
+    let again = solved
+        .clone()
+        .again(solved.problem.with_model(model), progress);
+    // A prior that is too tight is better than none.
+    Ok(solved.better(again)?.unwrap_or(solved))
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
-    use super::super::Options;
     use super::super::linearisation::Linearisation;
     use super::super::parameters::{from_vector, to_vector};
     use super::super::pass::{Gate, pass};
     use super::super::reduction::Script;
-    use super::*;
+    use super::super::{Options, Problem};
     use crate::attitude::exp;
     use crate::imu::TermVector;
     use crate::simulation::Scenario;

@@ -2,14 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::linearisation::{AttitudePrior, Linearisation, not_invertible};
-use super::pass::{Gate, PassResult, pass};
-use super::problem::Problem;
-use super::reduction::Script;
-use crate::calibration::budget::curvature::curvature;
-use crate::calibration::checks::innovation::Innovation;
+use crate::calibration::linearisation::not_invertible;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Estimate, Gate, Innovation, Linearisation, PassResult,
+    Problem, Script, pass,
+};
 
 /// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
 /// of its own linearised problem only, so a small rise means nothing.
@@ -75,12 +72,8 @@ impl Iterated {
 
     /// What it makes of both triads.
     pub fn both_triads(&self) -> Estimate {
-        let triads = self.estimate.triads;
-        let covariance = self.held.posterior.parameter_covariance;
-        Estimate {
-            covariance: covariance + curvature(&triads, &covariance),
-            triads,
-        }
+        let linear = &self.held.posterior.parameter_covariance;
+        Estimate::with_curvature(self.estimate.triads, linear)
     }
 }
 
@@ -113,7 +106,8 @@ pub fn iterate(
         let summary = summary(&result);
         tell(progress, &summary)?;
         passes.push(summary);
-        let same_data = before.as_ref().is_some_and(|last| same_data(last, &result));
+        let same_data = |last: &PassResult| last.accepted() == result.accepted();
+        let same_data = before.as_ref().is_some_and(same_data);
         let settled = summary.largest_step <= problem.options.converged_sigma
             && (decided || same_data || (before.is_none() && summary.rejected == 0));
         let doubtful = !given && beyond(&result, problem.gate_limit()) > MOST_OUTLIERS;
@@ -154,22 +148,14 @@ fn pass_towards(
 ) -> Result<PassResult, CalibrationError> {
     let made_at = |at: &Linearisation| pass(problem, &Script::new(problem, priors, at)?, gate);
     let mut made = made_at(at);
-    let Some(before) = before else {
-        return made;
-    };
     for _ in 0..MOST_SHORTENED {
-        if made.is_ok() {
+        let (Err(_), Some(before)) = (&made, before) else {
             break;
-        }
+        };
         *at = before.at.towards(at, 0.5);
         made = made_at(at);
     }
     made
-}
-
-/// Whether two passes let the same observations in.
-fn same_data(a: &PassResult, b: &PassResult) -> bool {
-    a.accepted() == b.accepted()
 }
 
 /// Part of all observations that are beyond the gate or were left out.
@@ -179,19 +165,14 @@ fn beyond(result: &PassResult, gate: f64) -> f64 {
 }
 
 fn summary(result: &PassResult) -> Pass {
-    let sigma = result
-        .posterior
-        .parameter_covariance
-        .diagonal()
-        .map(f64::sqrt);
-    let step = result.posterior.parameters;
+    let posterior = &result.posterior;
+    let variance = posterior.parameter_covariance.diagonal();
+    // What is not estimated has no σ; a step that is no number is no step to end with.
+    let steps = posterior.parameters.iter().zip(&variance);
+    let steps = steps.filter(|&(_, &variance)| variance != 0.0);
     Pass {
-        largest_step: step
-            .iter()
-            .zip(&sigma)
-            // What is not estimated has none; one that is no number is no step to end with.
-            .filter(|&(_, &sigma)| sigma != 0.0)
-            .map(|(step, sigma)| (step / sigma).abs())
+        largest_step: steps
+            .map(|(step, variance)| (step / variance.sqrt()).abs())
             .max_by(f64::total_cmp)
             .unwrap_or(0.0),
         cost: result.cost,

@@ -24,12 +24,9 @@
 //! | disturbances | 3 each | see [`super::constants::Disturbance`] |
 //! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
 
-use super::budget::source::BudgetSource;
-use super::constants::Constant;
-use super::model::Model;
-use super::parameters::PARAMETERS;
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::several::day_to_day::OwnState;
-use crate::calibration::several::thermal::Coefficient;
+use crate::calibration::{Coefficient, Constant, Model, PARAMETERS};
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor, TERM_PARAMETERS};
 use crate::run::Aiding;
 use crate::turntable::AXIS_ERRORS;
@@ -46,130 +43,68 @@ pub const NAVIGATION: usize = 9;
 /// Where each group of states is, and which constants there are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
-    /// Whether gravity's error is a state.
-    gravity: bool,
-    /// Whether Earth rate is.
-    earth_rate: bool,
-    /// Triad and axis of each bias that varies.
-    varying: Vec<(Sensor, usize)>,
-    /// What each state of the recording is.
-    own: Vec<OwnState>,
-    /// Whether the table's position error is a state.
-    table: bool,
-    /// Whether the turn at rest is.
-    turn: bool,
-    constants: Vec<Constant>,
+    /// Error of gravity, if it is a state.
+    pub gravity: Option<usize>,
+    /// Earth rate, if it is a state.
+    pub earth_rate: Option<usize>,
+    /// State, triad and index of the constant part among the triad's parameters of each varying bias.
+    pub varying_biases: Vec<(usize, Sensor, usize)>,
+    /// State of each thing that is not common to all recordings.
+    pub own: Vec<(usize, OwnState)>,
+    /// Error of the table's position, if it is a state.
+    pub table_position: Option<usize>,
+    /// What the attitude error has become more since the body came to rest, if it is a state.
+    pub turn_at_rest: Option<usize>,
+    /// Attitude error at the first sample of the stretch.
+    pub initial_attitude: usize,
+    /// What draws each state anew, or is known of it before.
+    pub sources: Vec<BudgetSource>,
+    /// The constants, in the order of their columns.
+    pub constants: Vec<Constant>,
 }
 
 impl Layout {
     /// Of a model, of recordings with `one_gravity` or with more.
     pub fn new(model: &Model, one_gravity: bool) -> Self {
+        let mut sources = vec![BudgetSource::InitialAttitude; VELOCITY];
+        sources.resize(NAVIGATION, BudgetSource::Place);
+        let mut added = |count: usize, source: BudgetSource| {
+            let first = sources.len();
+            sources.resize(first + count, source);
+            first
+        };
+        let (gravity, by_hand) = (model.gravity_sigma > 0.0, model.aiding == Aiding::Velocity);
         let varies = |sensor: &Sensor| model.noise.get(*sensor).gauss_markov.is_some();
         let triads = Sensor::ALL.into_iter().filter(varies);
+        let biases = triads.flat_map(|of| (PER_TRIAD - 3..PER_TRIAD).map(move |k| (of, k)));
         let estimated = (0..PARAMETERS).filter(|&i| model.prior_sigma[i] > 0.0);
         let own = estimated.map(OwnState::Parameter);
         let own = own.chain((0..3).map(OwnState::Mounting));
-        let gravity = model.gravity_sigma > 0.0;
+        let own = own.filter(|&own| model.day_to_day.of(own) > 0.0);
         Self {
-            gravity: gravity && !one_gravity,
-            earth_rate: model.aiding == Aiding::Velocity,
-            varying: triads
-                .flat_map(|sensor| (0..3).map(move |axis| (sensor, axis)))
+            gravity: (gravity && !one_gravity).then(|| added(1, BudgetSource::Gravity)),
+            earth_rate: by_hand.then(|| added(3, BudgetSource::Headings)),
+            varying_biases: biases
+                .map(|(sensor, k)| (added(1, BudgetSource::Wander(sensor)), sensor, k))
                 .collect(),
-            own: own.filter(|&own| model.day_to_day.of(own) > 0.0).collect(),
-            table: model.position_sigma > 0.0,
-            turn: model.aiding == Aiding::Velocity,
+            own: own
+                .map(|own| (added(1, BudgetSource::Recording), own))
+                .collect(),
+            table_position: (model.position_sigma > 0.0)
+                .then(|| added(3, BudgetSource::TablePosition)),
+            turn_at_rest: by_hand.then(|| added(3, BudgetSource::RotationAtRest)),
+            initial_attitude: added(3, BudgetSource::InitialAttitude),
             constants: constants(model, gravity && one_gravity),
+            sources,
         }
     }
 
-    /// The constants, in the order of their columns.
-    pub fn constants(&self) -> &[Constant] {
-        &self.constants
-    }
-
-    /// The parameters of the error terms among them.
+    /// The parameters of the error terms among the constants.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
         self.constants.iter().filter_map(|constant| match constant {
             Constant::Term(index) => Some(*index),
             _ => None,
         })
-    }
-
-    /// Number of states.
-    pub fn size(&self) -> usize {
-        self.initial_attitude() + 3
-    }
-
-    /// State of each thing that is not common to all recordings.
-    pub fn own(&self) -> impl Iterator<Item = (usize, OwnState)> + '_ {
-        placed(self.own_begin(), &self.own)
-    }
-
-    /// Error of gravity, if it is a state.
-    pub fn gravity(&self) -> Option<usize> {
-        self.gravity.then_some(NAVIGATION)
-    }
-
-    /// Earth rate, if it is a state.
-    pub fn earth_rate(&self) -> Option<usize> {
-        self.earth_rate.then(|| self.earth_rate_begin())
-    }
-
-    /// State, triad and index of the constant part among the triad's parameters of each varying bias.
-    pub fn varying_biases(&self) -> impl Iterator<Item = (usize, Sensor, usize)> + '_ {
-        let states = placed(self.varying_begin(), &self.varying);
-        states.map(|(state, (sensor, axis))| (state, sensor, PER_TRIAD - 3 + axis))
-    }
-
-    /// Error of the table's position, if it is a state.
-    pub fn table_position(&self) -> Option<usize> {
-        self.table.then(|| self.dwell_begin())
-    }
-
-    /// What the attitude error has become more since the body came to rest, if it is a state.
-    pub fn turn_at_rest(&self) -> Option<usize> {
-        self.turn.then(|| self.dwell_begin())
-    }
-
-    /// Attitude error at the first sample of the stretch.
-    pub fn initial_attitude(&self) -> usize {
-        self.dwell_begin() + 3 * usize::from(self.table || self.turn)
-    }
-
-    /// What draws a state anew, or is known of it before.
-    pub fn source(&self, state: usize) -> BudgetSource {
-        let within =
-            |first: Option<usize>| first.is_some_and(|first| (first..first + 3).contains(&state));
-        let mut varying = self.varying_biases();
-        if let Some((_, sensor, _)) = varying.find(|&(varying, ..)| varying == state) {
-            return BudgetSource::wander(sensor);
-        }
-        match state {
-            VELOCITY..NAVIGATION => BudgetSource::Place,
-            _ if within(self.earth_rate()) => BudgetSource::Headings,
-            _ if within(self.table_position()) => BudgetSource::TablePosition,
-            _ if within(self.turn_at_rest()) => BudgetSource::RotationAtRest,
-            _ if self.gravity() == Some(state) => BudgetSource::Gravity,
-            _ if self.own().any(|(own, _)| own == state) => BudgetSource::Recording,
-            _ => BudgetSource::InitialAttitude,
-        }
-    }
-
-    fn earth_rate_begin(&self) -> usize {
-        NAVIGATION + usize::from(self.gravity)
-    }
-
-    fn varying_begin(&self) -> usize {
-        self.earth_rate_begin() + 3 * usize::from(self.earth_rate)
-    }
-
-    fn own_begin(&self) -> usize {
-        self.varying_begin() + self.varying.len()
-    }
-
-    fn dwell_begin(&self) -> usize {
-        self.own_begin() + self.own.len()
     }
 }
 
@@ -194,10 +129,6 @@ fn constants(model: &Model, gravity: bool) -> Vec<Constant> {
         .collect()
 }
 
-fn placed<T: Copy>(begin: usize, members: &[T]) -> impl Iterator<Item = (usize, T)> + '_ {
-    (begin..).zip(members.iter().copied())
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
@@ -213,7 +144,7 @@ mod tests {
         let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
         let sizes = |run: &Run, options: Options| {
             let layout = Layout::new(&Model::new(run, &options), true);
-            (layout.size(), layout.constants().len())
+            (layout.sources.len(), layout.constants.len())
         };
         let with = |term| sizes(&run, Options::default().with(term));
         assert_eq!(sizes(&run, Options::default()), (9 + 3 + 3, 24));

@@ -5,11 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::error::CalibrationError;
-use super::model::Model;
-use super::parameters::{from_vector, parameter, to_vector};
 use crate::attitude::{exp, log};
-use crate::calibration::several::day_to_day::Difference;
+use crate::calibration::{CalibrationError, Difference, Model, from_vector, parameter, to_vector};
 use crate::earth::Site;
 use crate::imu::{
     PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, TermVector, ThermalCoefficients,

@@ -31,6 +31,7 @@ pub mod result;
 mod solution;
 mod solved;
 
+// What most of its files speak of is imported from here.
 pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::cause::{Cause, FoundCause};
@@ -42,12 +43,15 @@ pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_squ
 pub use checks::observability::{AttitudePart, Direction, Observability, Part};
 pub use checks::quality::{Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
+use constants::{Constant, Known, Posterior, Prior};
 pub use constants::{Disturbance, DisturbanceKind};
 pub use error::{CalibrationError, ComparisonError};
 pub use estimate::Estimate;
 pub use estimator::estimate;
 pub use gauss_newton::Pass;
+use gauss_newton::{Iterated, iterate};
 pub use gauss_newton::{Progress, UNWATCHED};
+use layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
@@ -62,8 +66,11 @@ pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
     parameter, parameter_index, parameter_name, sensor_and_parameter, to_vector,
 };
+use pass::{Gate, PassResult, pass};
 pub use problem::Problem;
+use problem::Stretch;
 pub use reduction::{Epoch, Own};
+use reduction::{Reduction, Script};
 pub use result::at_rest::{AtRest, AxisAtRest, Second};
 pub use result::comparison::{Comparison, Named, Side, compare};
 pub use result::correction::{Calibrated, Correction, CorrectionError};
@@ -82,6 +89,7 @@ pub use several::separate_estimate::SeparateEstimate;
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
+use solved::Solved;
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
 pub use start::mounting::{Contradiction, Mounting, Sensitivity};

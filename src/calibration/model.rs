@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::budget::source::BudgetSource;
-use super::constants::Disturbance;
-use super::options::Options;
-use super::parameters::error_term::ErrorTerm;
-use super::parameters::{ParameterVector, parameter, to_vector};
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::record::standstill::FLOOR;
-use crate::calibration::several::day_to_day::DayToDay;
+use crate::calibration::{
+    DayToDay, Disturbance, ErrorTerm, Options, ParameterVector, parameter, to_vector,
+};
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
     Term, TermVector, ThermalModel,
@@ -122,8 +120,8 @@ impl Model {
                 by_motion,
                 by_duration,
             } = *self.motion_noise.get(sensor);
-            let of_moves = self.weight(BudgetSource::moves(sensor)).sqrt();
-            let white = self.weight(BudgetSource::white(sensor)).sqrt();
+            let of_moves = self.weight(BudgetSource::Moves(sensor)).sqrt();
+            let white = self.weight(BudgetSource::White(sensor)).sqrt();
             ProcessNoise {
                 random_walk: white * self.noise.get(sensor).random_walk,
                 by_motion: of_moves * by_motion,
@@ -205,45 +203,35 @@ impl Model {
     /// Switches an error term on, with its usual σ unless the run states one. Nothing changes where the
     /// run cannot hold it.
     pub fn switch_on(&mut self, term: ErrorTerm) {
-        if self.has(term) || !self.can_have(term) {
-            return;
-        }
-        match term {
-            ErrorTerm::GaussMarkovBias => {
-                for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.gauss_markov = Some(usual_variation(noise));
-                }
-            }
-            ErrorTerm::TableBase => {
-                self.geometry.base = Vector3::new(USUAL_LEVEL, USUAL_LEVEL, USUAL_NORTH);
-            }
-            ErrorTerm::TableAxes(kind) => {
-                let sigma = usual_axis_error(kind, self.position_sigma);
-                self.geometry.axes += kind.of_table(self.table_axes, sigma);
-            }
-            ErrorTerm::Instrument(term) => {
-                for parameter in term.parameters() {
-                    self.term_sigma[parameter] = term.usual_sigma();
-                }
-            }
+        if !self.has(term) && self.can_have(term) {
+            self.set(term, 1.0);
         }
     }
 
     /// Switches an error term off.
     pub fn switch_off(&mut self, term: ErrorTerm) {
+        self.set(term, 0.0);
+    }
+
+    /// Sets an error term to its usual σ times this: one or zero.
+    fn set(&mut self, term: ErrorTerm, times: f64) {
         match term {
             ErrorTerm::GaussMarkovBias => {
                 for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.gauss_markov = None;
+                    noise.gauss_markov = (times > 0.0).then(|| usual_variation(noise));
                 }
             }
-            ErrorTerm::TableBase => self.geometry.base = Vector3::zeros(),
+            ErrorTerm::TableBase => {
+                self.geometry.base = times * Vector3::new(USUAL_LEVEL, USUAL_LEVEL, USUAL_NORTH);
+            }
             ErrorTerm::TableAxes(kind) => {
+                let sigma = times * usual_axis_error(kind, self.position_sigma);
                 self.geometry.axes.rows_range_mut(kind.range()).fill(0.0);
+                self.geometry.axes += kind.of_table(self.table_axes, sigma);
             }
             ErrorTerm::Instrument(term) => {
                 for parameter in term.parameters() {
-                    self.term_sigma[parameter] = 0.0;
+                    self.term_sigma[parameter] = times * term.usual_sigma();
                 }
             }
         }

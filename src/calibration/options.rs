@@ -1,7 +1,6 @@
 //! What is to be estimated, and how.
 
-use super::noise::NoisePolicy;
-use super::parameters::error_term::ErrorTerm;
+use crate::calibration::{ErrorTerm, NoisePolicy};
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
 use crate::statistics::FALSE_ALARM;

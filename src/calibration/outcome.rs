@@ -4,27 +4,17 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::budget::BudgetSource;
-use super::constants::{Posterior, Prior};
-use super::error::CalibrationError;
-use super::estimate::{Estimate, largest_growth};
-use super::gauss_newton::Pass;
-use super::linearisation::{AttitudePrior, Linearisation};
-use super::model::Model;
-use super::noise::NoiseReport;
-use super::parameters::auxiliary::Auxiliary;
-use super::parameters::{OBSERVED_BELOW, ParameterMatrix, ParameterVector};
-use super::problem::Problem;
-use super::reduction::{Epoch, Own, Reduction, Script};
-use crate::calibration::checks::cause::FoundCause;
-use crate::calibration::checks::dwell_scatter::DwellScatter;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::form::FormTest;
-use crate::calibration::checks::innovation::{Consistency, Innovation};
-use crate::calibration::checks::observability::Observability;
-use crate::calibration::several::separate_estimate::SeparateEstimate;
-use crate::calibration::several::thermal::Thermal;
-use crate::run::Aiding;
+use crate::calibration::checks::dwell_scatter::DwellScores;
+use crate::calibration::checks::innovation::consistency;
+use crate::calibration::estimate::largest_growth;
+use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
+use crate::calibration::{
+    AttitudePrior, Auxiliary, BudgetSource, CalibrationError, Consistency, DwellScatter, Epoch,
+    Estimate, Finding, FormTest, FoundCause, Innovation, Linearisation, Model, NoiseReport,
+    OBSERVED_BELOW, Observability, Own, ParameterMatrix, ParameterVector, Pass, Posterior, Prior,
+    Problem, Reduction, Script, SeparateEstimate, Solved, Thermal,
+};
+use crate::imu::Sensor;
 
 /// χ² by which opposite headings differ where a run observes the heading.
 const HEADING_SEEN: f64 = 6.0;
@@ -41,8 +31,6 @@ pub struct Outcome {
     pub covariance_parts: BTreeMap<BudgetSource, ParameterMatrix>,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
-    /// Mean of every parameter before the run.
-    pub prior_mean: ParameterVector,
     /// What was known of the initial attitude of each stretch before the run.
     pub prior_attitudes: Vec<AttitudePrior>,
     /// 1σ of the initial attitude of the last stretch after it, rad about East, North and Up; the last is that of the
@@ -70,14 +58,10 @@ pub struct Outcome {
     pub converged: bool,
     /// Estimate and σ against time in the last pass, as the instrument was turned.
     pub history: Vec<Epoch>,
-    /// What was observed at rest.
-    pub aiding: Aiding,
     /// White 1σ of the velocity at standstill that the filter used in the first stretch, m/s.
     pub velocity_sigma: f64,
     /// Innovations of the last pass.
     pub innovations: Vec<Innovation>,
-    /// Logarithm of the determinant of the covariance of all innovations let in.
-    pub log_determinant: f64,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
     /// How much dwells scatter over what the covariance says; none where there are too few.
@@ -97,6 +81,67 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// What was found, with what noise and the scatter of dwells make of it.
+    pub(in crate::calibration) fn by_noise(
+        as_stated: &Problem,
+        solved: Solved,
+        form_test: Option<FormTest>,
+    ) -> Result<Self, CalibrationError> {
+        let (problem, priors) = (solved.problem, solved.priors);
+        let (model, prior_sigma) = (&problem.model, as_stated.model.prior_sigma);
+        let estimate = solved.iterated.both_triads();
+        if let Some(sensor) = not_invertible(&estimate.triads) {
+            return Err(CalibrationError::Singular { sensor });
+        }
+        let (mut held, converged) = (solved.iterated.held, solved.iterated.converged);
+        let prior = Prior::new(&held.reduction.constants, model, &held.at);
+        let scores = DwellScores::new(&held.reduction, &prior, &held.posterior);
+        let widened = scores.as_ref().and_then(DwellScores::widened);
+        let scattered = widened.map(|widened| {
+            held.posterior = held.posterior.clone().with_covariance(widened);
+            let widened = &held.posterior.parameter_covariance;
+            Estimate::with_curvature(estimate.triads, widened).covariance - estimate.covariance
+        });
+        let (mut attitude_sigma, attitude_covariance) = held.last_attitude();
+        if priors.last().is_some_and(AttitudePrior::heading_is_unknown) {
+            attitude_sigma.z = UNKNOWN_HEADING;
+        }
+        let gravity = held.gravity();
+        let mut outcome = Self {
+            form_test,
+            dwell_scatter: scores.map(|scores| scores.scatter),
+            observability: Observability::new(&estimate, &prior_sigma, &attitude_covariance),
+            covariance_by_noise: estimate.covariance,
+            estimate,
+            covariance_parts: BTreeMap::new(),
+            prior_sigma,
+            attitude_sigma,
+            prior_attitudes: priors,
+            auxiliary: held.auxiliary(model),
+            thermal: held.thermal(model),
+            own: held.reduction.own(&held.at, &held.posterior),
+            warming: problem.warming(),
+            alone: solved.alone,
+            gravity: (problem.run().site.gravity + gravity.0, gravity.1),
+            converged,
+            consistency: consistency(&held.innovations),
+            history: held.reduction.history(&prior, &held.at),
+            linearised_at: held.at,
+            innovations: held.innovations,
+            velocity_sigma: problem.standstill_sigma(Sensor::Accel),
+            model: model.clone(),
+            settling: solved.settling,
+            causes: solved.causes,
+            noise: solved.noise,
+            passes: solved.passes,
+            findings: Vec::new(),
+        };
+        if let Some(scattered) = scattered {
+            outcome.set_part(BudgetSource::DwellScatter, scattered);
+        }
+        Ok(outcome)
+    }
+
     /// Whether it may be used: it converged, and noise explains what it leaves.
     pub fn is_usable(&self) -> bool {
         self.converged && !self.findings.iter().any(Finding::is_unexplained)
@@ -132,9 +177,7 @@ impl Outcome {
         let problem = causes.fold(problem.settled(self.settling), |problem, of| {
             of.taken_into(&problem)
         });
-        let mut model = problem.model.clone();
-        model.prior_sigma = self.model.prior_sigma;
-        problem.with_model(model)
+        problem.with(|model| model.prior_sigma = self.model.prior_sigma)
     }
 
     /// Which observations were let in.

@@ -4,14 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use super::budget::source::BudgetSource;
-use super::linearisation::{AttitudePrior, Start};
-use super::model::Model;
-use super::options::Options;
 use crate::attitude::{self, to_tilt_and_heading};
-use crate::calibration::checks::innovation::Observation;
+use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::linearisation::Start;
 use crate::calibration::record::schedule::{Step, first_reading, step_length, steps};
 use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
+use crate::calibration::{AttitudePrior, Model, Observation, Options};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
@@ -46,19 +44,8 @@ pub struct Stretch<'a> {
     pub recording: usize,
     pub dwells: Vec<Dwell>,
     pub steps: Vec<Step>,
-    pub variance: Variance,
     /// White 1σ at standstill as the run states or shows it: attitude in rad, velocity in m/s.
     pub standstill_sigma: PerSensor<f64>,
-}
-
-/// Variance of each observation per axis.
-#[derive(Debug, Clone, Copy)]
-pub struct Variance {
-    /// Of the computed velocity: a pulse's worth.
-    pub pulse: f64,
-    pub position: f64,
-    /// Of the computed attitude: a pulse's worth.
-    pub attitude: f64,
 }
 
 impl<'a> Problem<'a> {
@@ -79,37 +66,27 @@ impl<'a> Problem<'a> {
     /// beforehand stays that of the first; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
-        let mut others = self.others.clone();
-        others.push(run);
-        let mut model = self.model.clone();
-        model.gravity_sigma = model.gravity_sigma.max(run.site.gravity_sigma);
-        all.extend(stretches(run, others.len(), &self.model));
-        Self {
-            others,
-            model,
-            stretches: all.into(),
-            ..self.clone()
-        }
+        all.extend(stretches(run, self.others.len() + 1, &self.model));
+        let mut with = self.with_stretches(all.into());
+        with.others.push(run);
+        let gravity_sigma = &mut with.model.gravity_sigma;
+        *gravity_sigma = gravity_sigma.max(run.site.gravity_sigma);
+        with
     }
 
     /// Some of its recordings, at least one, told by number.
     pub(in crate::calibration) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
-        let mut runs = self.runs().enumerate().filter(|&(number, _)| which(number));
-        let first = runs.next();
-        let others = runs.map(|(_, run)| run).collect();
-        let stretches = self.stretches.iter().filter(|of| which(of.recording));
-        let renumbered = stretches.map(|stretch| Stretch {
-            recording: (0..stretch.recording)
-                .filter(|&before| which(before))
-                .count(),
+        let renumbered = self.stretches.iter().filter(|of| which(of.recording));
+        let renumbered = renumbered.map(|stretch| Stretch {
+            recording: (0..stretch.recording).filter(|&k| which(k)).count(),
             ..stretch.clone()
         });
-        Self {
-            run: first.map_or(self.run, |(_, run)| run),
-            others,
-            stretches: renumbered.collect(),
-            ..self.clone()
-        }
+        let runs = self.runs().enumerate().filter(|&(number, _)| which(number));
+        let mut runs = runs.map(|(_, run)| run);
+        let mut of = self.with_stretches(renumbered.collect());
+        of.run = runs.next().unwrap_or(self.run);
+        of.others = runs.collect();
+        of
     }
 
     /// Without the recordings that have no dwell, of which it says so; as it is where none has.
@@ -139,6 +116,20 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The same with a model that is changed.
+    pub fn with(&self, change: impl FnOnce(&mut Model)) -> Self {
+        let mut changed = self.clone();
+        change(&mut changed.model);
+        changed
+    }
+
+    fn with_stretches(&self, stretches: Arc<[Stretch<'a>]>) -> Self {
+        Self {
+            stretches,
+            ..self.clone()
+        }
+    }
+
     /// The same observed in some of its dwells only, told by number.
     pub(in crate::calibration) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
         self.with_dwells(|number, _, dwell| used(number).then(|| dwell.clone()))
@@ -149,37 +140,24 @@ impl<'a> Problem<'a> {
         &self,
         become_of: impl Fn(usize, &Stretch, &Dwell) -> Option<Dwell>,
     ) -> Self {
-        let mut number = 0;
+        let mut stays = Vec::new();
         let stretches = self.stretches.iter().map(|stretch| {
             let dwells = stretch.dwells.iter().filter_map(|dwell| {
-                number += 1;
-                become_of(number - 1, stretch, dwell)
+                let becomes = become_of(stays.len(), stretch, dwell);
+                stays.push(becomes.is_some());
+                becomes
             });
-            let dwells: Vec<Dwell> = dwells.collect();
-            let Stretch {
-                run,
-                table,
-                recording,
-                standstill_sigma,
-                ..
-            } = *stretch;
-            Stretch::new(run, table, recording, dwells, standstill_sigma)
+            let (dwells, sigma) = (dwells.collect(), stretch.standstill_sigma);
+            Stretch::new(stretch.run, stretch.table, stretch.recording, dwells, sigma)
         });
         let stretches = stretches.collect();
-        let mut model = self.model.clone();
-        let of_stretches = self.stretches.iter();
-        let all: Vec<(&Stretch, &Dwell)> = of_stretches
-            .flat_map(|stretch| stretch.dwells.iter().map(move |dwell| (stretch, dwell)))
-            .collect();
-        for disturbance in &mut model.disturbances {
-            let kept = |&k: &usize| become_of(k, all[k].0, all[k].1).is_some();
-            disturbance.dwell = (0..disturbance.dwell).filter(kept).count();
-        }
-        Self {
-            stretches,
-            model,
-            ..self.clone()
-        }
+        self.with(|model| {
+            for disturbance in &mut model.disturbances {
+                let before = stays.iter().take(disturbance.dwell);
+                disturbance.dwell = before.filter(|stays| **stays).count();
+            }
+        })
+        .with_stretches(stretches)
     }
 
     /// The same without the first steps of each dwell after a move; a dwell keeps half of itself.
@@ -220,10 +198,7 @@ impl<'a> Problem<'a> {
             steps: steps(stretch.run, stretch.table, &stretch.dwells, steps_of_dwell),
             ..stretch.clone()
         });
-        Self {
-            stretches: stretches.collect(),
-            ..self.clone()
-        }
+        self.with_stretches(stretches.collect())
     }
 
     pub(in crate::calibration) fn stretches(&self) -> &[Stretch<'a>] {
@@ -262,18 +237,17 @@ impl<'a> Problem<'a> {
     pub(in crate::calibration) fn notes(&self) -> Vec<String> {
         let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
         for run in self.runs() {
-            let name = run.recording.name.as_str();
             for note in &run.recording.notes {
                 match found.iter_mut().find(|(other, _)| *other == note) {
-                    Some((_, names)) => names.push(name),
-                    None => found.push((note, vec![name])),
+                    Some((_, names)) => names.push(&run.recording.name),
+                    None => found.push((note, vec![&run.recording.name])),
                 }
             }
         }
-        let of_all = self.runs().count();
+        let count = self.runs().count();
         let found = found
             .into_iter()
-            .map(|(note, names)| match names.len() == of_all {
+            .map(|(note, names)| match names.len() == count {
                 true => note.clone(),
                 false => format!("{}: {note}", names.join(", ")),
             });
@@ -330,15 +304,8 @@ impl<'a> Stretch<'a> {
         dwells: Vec<Dwell>,
         standstill_sigma: PerSensor<f64>,
     ) -> Self {
-        let quantisation = |pulse: f64| pulse.powi(2) / 12.0;
-        let PerSensor { gyro, accel } = run.recording.imu.pulse;
         Self {
             steps: steps(run, table, &dwells, 1),
-            variance: Variance {
-                pulse: quantisation(accel),
-                position: run.standstill.position_sigma.powi(2),
-                attitude: quantisation(gyro),
-            },
             run,
             table,
             recording,
@@ -347,40 +314,30 @@ impl<'a> Stretch<'a> {
         }
     }
 
-    /// Variance of an observation per axis, rad² or m²/s²; of a table's attitude that of the mean of so many
-    /// readings.
+    /// Variance of an observation per axis, rad² or m²/s², with that of a whole pulse; of a table's attitude that of the
+    /// mean of this many readings.
     pub fn observation_variance(&self, model: &Model, kind: Observation, readings: usize) -> f64 {
-        match kind {
-            Observation::Velocity => self.velocity_variance(model),
-            Observation::Attitude => self.attitude_variance(model),
+        let sensor = match kind {
+            Observation::Velocity => Sensor::Accel,
+            Observation::Table | Observation::Attitude => Sensor::Gyro,
+        };
+        let own = match kind {
             Observation::Table => {
-                let reading =
-                    model.reading_sigma.powi(2) * model.weight(BudgetSource::TableReading);
-                let pulses = self.variance.attitude * model.weight(BudgetSource::Pulses);
-                reading / readings as f64 + pulses
+                let reading = model.reading_sigma.powi(2);
+                reading * model.weight(BudgetSource::TableReading) / readings as f64
             }
-        }
-    }
-
-    /// Variance of an observation of velocity per axis, m²/s².
-    pub fn velocity_variance(&self, model: &Model) -> f64 {
-        self.at_rest(model, Sensor::Accel, self.variance.pulse)
-    }
-
-    /// Variance per axis of an observation of the attitude that a dwell without a table holds, rad².
-    pub fn attitude_variance(&self, model: &Model) -> f64 {
-        self.at_rest(model, Sensor::Gyro, self.variance.attitude)
-    }
-
-    fn at_rest(&self, model: &Model, sensor: Sensor, pulses: f64) -> f64 {
-        let still = self.standstill_sigma(model, sensor).powi(2);
-        still * model.weight(BudgetSource::at_rest(sensor))
-            + pulses * model.weight(BudgetSource::Pulses)
+            _ => {
+                let still = self.standstill_sigma(model, sensor).powi(2);
+                still * model.weight(BudgetSource::at_rest(sensor))
+            }
+        };
+        let pulse = self.run.recording.imu.pulse.get(sensor).powi(2) / 12.0;
+        own + pulse * model.weight(BudgetSource::Pulses)
     }
 
     /// Variance of the position per axis at the begin of a dwell, m².
     pub fn position_variance(&self, model: &Model) -> f64 {
-        self.variance.position * model.weight(BudgetSource::Place)
+        self.run.standstill.position_sigma.powi(2) * model.weight(BudgetSource::Place)
     }
 
     /// White 1σ at standstill that the filter uses, of attitude in rad (gyros) or velocity in m/s.

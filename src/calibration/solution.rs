@@ -1,20 +1,12 @@
 //! From a problem to a calibration, by either method, with all that can be said of it.
 
-use super::budget::{Budget, BudgetSource};
-use super::error::CalibrationError;
-use super::estimate::Estimate;
-use super::estimator::estimate;
-use super::gauss_newton::Progress;
-use super::outcome::Outcome;
-use super::problem::Problem;
-use super::result::{Calibration, Method, Provenance};
-use crate::calibration::checks::error_term_test::{
-    ErrorTermTest, bias_variation, test_error_terms,
+use crate::calibration::checks::error_term_test::bias_variation;
+use crate::calibration::result::Provenance;
+use crate::calibration::{
+    Budget, BudgetSource, Calibration, CalibrationError, ClosedForm, Contradiction, ErrorTermTest,
+    Estimate, Finding, Method, Outcome, Problem, Progress, Quality, estimate, six_position,
+    test_error_terms,
 };
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::quality::Quality;
-use crate::calibration::start::closed_form::{ClosedForm, six_position};
-use crate::calibration::start::mounting::Contradiction;
 use crate::imu::PerSensor;
 use crate::room;
 use crate::run::Run;
@@ -53,7 +45,6 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] where the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
-        let samples: usize = self.runs().map(|run| run.recording.imu.len()).sum();
         let bytes_of = |run: &Run| {
             let imu = &run.recording.imu;
             let each = match imu.is_packed() {
@@ -62,11 +53,14 @@ impl Problem<'_> {
             };
             imu.len().saturating_mul(each)
         };
-        let bytes = self.runs().map(bytes_of).fold(0, usize::saturating_add);
-        if !room::is_there(bytes.saturating_add(BYTES_BESIDE)) {
+        let bytes = self
+            .runs()
+            .map(bytes_of)
+            .fold(BYTES_BESIDE, usize::saturating_add);
+        if !room::is_there(bytes) {
             return Err(CalibrationError::NoMemory {
-                samples,
-                megabytes: (bytes + BYTES_BESIDE) >> 20,
+                samples: self.runs().map(|run| run.recording.imu.len()).sum(),
+                megabytes: bytes >> 20,
             });
         }
         if let Some((run, contradiction)) = Contradiction::of(self) {
@@ -80,10 +74,8 @@ impl Problem<'_> {
             Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),
         })
     }
-}
 
-impl Problem<'_> {
-    /// What a calibration of it is made of, but for the files.
+    /// What a calibration of it is made of, except the files.
     pub fn provenance(&self) -> Provenance {
         let run = self.run();
         let imu = &run.recording.imu;
@@ -145,40 +137,41 @@ impl Solution {
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the solution.
     pub fn assess(&mut self, problem: &Problem) -> Result<Assessment, CalibrationError> {
-        match self {
-            Self::Filter(outcome) => {
-                let (error_terms, (quality, budget)) = rayon::join(
-                    || test_error_terms(problem, outcome),
-                    || (outcome.quality(problem), Budget::new(problem, outcome)),
-                );
-                let (error_terms, left_off) = match error_terms {
-                    // Where the iterations ended without convergence there may be nothing to test.
-                    Err(_) if !outcome.converged => (Vec::new(), None),
-                    tests => tests?,
-                };
-                // A calibration is one without its budget, too.
-                let mut budget = budget.ok();
-                let variation = bias_variation(problem, outcome, &error_terms)?;
-                for (source, part) in [
-                    (BudgetSource::ErrorTermsLeftOff, left_off),
-                    (BudgetSource::UnseenVariation, variation),
-                ] {
-                    let Some(part) = part else { continue };
-                    outcome.set_part(source, part);
-                    budget = budget.map(|budget| budget.and(source, part));
-                }
-                Ok(Assessment {
-                    error_terms,
-                    quality: quality?,
-                    budget,
-                })
+        let outcome = match self {
+            Self::Filter(outcome) => outcome,
+            Self::ClosedForm(closed_form) => {
+                return Ok(Assessment {
+                    error_terms: Vec::new(),
+                    quality: closed_form.quality(problem)?,
+                    budget: None,
+                });
             }
-            Self::ClosedForm(closed_form) => Ok(Assessment {
-                error_terms: Vec::new(),
-                quality: closed_form.quality(problem)?,
-                budget: None,
-            }),
+        };
+        let (error_terms, (quality, budget)) = rayon::join(
+            || test_error_terms(problem, outcome),
+            || (outcome.quality(problem), Budget::new(problem, outcome)),
+        );
+        let (error_terms, left_off) = match error_terms {
+            // Where the iterations ended without convergence there may be nothing to test.
+            Err(_) if !outcome.converged => (Vec::new(), None),
+            tests => tests?,
+        };
+        // A calibration is one without its budget, too.
+        let mut budget = budget.ok();
+        let variation = bias_variation(problem, outcome, &error_terms)?;
+        for (source, part) in [
+            (BudgetSource::ErrorTermsLeftOff, left_off),
+            (BudgetSource::UnseenVariation, variation),
+        ] {
+            let Some(part) = part else { continue };
+            outcome.set_part(source, part);
+            budget = budget.map(|budget| budget.and(source, part));
         }
+        Ok(Assessment {
+            error_terms,
+            quality: quality?,
+            budget,
+        })
     }
 
     /// What must be known before using the figures.
@@ -193,14 +186,10 @@ impl Solution {
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {
-                let Assessment {
-                    error_terms,
-                    quality,
-                    budget,
-                } = assessment;
-                let mut record = outcome.record(problem, error_terms, quality);
-                if let Some(budget) = budget {
-                    record.take_budget(problem.run(), outcome, budget, error_terms);
+                let tests = &assessment.error_terms;
+                let mut record = outcome.record(problem, tests, &assessment.quality);
+                if let Some(budget) = &assessment.budget {
+                    record.take_budget(problem.run(), outcome, budget, tests);
                 }
                 record
             }

@@ -1,14 +1,9 @@
 //! What iterations found, and with what they were made.
 
-use super::error::CalibrationError;
-use super::gauss_newton::{Iterated, Pass, Progress, iterate};
-use super::linearisation::AttitudePrior;
-use super::pass::Gate;
-use super::problem::Problem;
-use crate::calibration::checks::cause::FoundCause;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::noise::NoiseReport;
-use crate::calibration::several::separate_estimate::SeparateEstimate;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Finding, FoundCause, Gate, Iterated, NoiseReport, Pass,
+    Problem, Progress, SeparateEstimate, iterate,
+};
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]
@@ -46,6 +41,27 @@ impl<'a> Solved<'a> {
             settling: 0,
             causes: Vec::new(),
             findings: Vec::new(),
+        }
+    }
+
+    /// The problem that was solved with noise and prior as they are stated; recordings differ as they show.
+    pub fn as_stated(&self, stated: &Problem<'a>) -> Problem<'a> {
+        self.problem.with(|model| {
+            *model = model.with_noise_of(&stated.model);
+            model.prior_sigma = stated.model.prior_sigma;
+        })
+    }
+
+    /// What iterating again led to, unless it failed or converged less than this did.
+    pub fn better(
+        &self,
+        again: Result<Self, CalibrationError>,
+    ) -> Result<Option<Self>, CalibrationError> {
+        match again {
+            Err(CalibrationError::Stopped) => Err(CalibrationError::Stopped),
+            again => Ok(again
+                .ok()
+                .filter(|again| again.iterated.converged || !self.iterated.converged)),
         }
     }
 

@@ -37,7 +37,7 @@ pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 pub const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// Which of the two triads of an IMU.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Sensor {
     /// Angular rate in rad/s.
     Gyro,

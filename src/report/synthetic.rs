@@ -115,6 +115,7 @@ fn innovations(dwells: &[Range<f64>], rng: &mut ChaCha8Rng) -> Vec<Innovation> {
                 time,
                 observation,
                 whitened,
+                sigma: [1.0; 3],
                 accepted: k % 19 != 0,
                 dwell: number,
                 after_move: number > 0,
@@ -200,7 +201,6 @@ fn outcome(
     let form = truth.gyro.form;
     let length = run.recording.imu.duration();
     let history = |gain: f64| history(&to_vector(&truth), &final_sigma, &drawn, length, gain);
-    let prior_mean = PerSensor::from_fn(|s| run.instrument.prior.get(s).mean(form));
     Outcome {
         form_test: None,
         dwell_scatter: None,
@@ -217,14 +217,12 @@ fn outcome(
         },
         estimate: estimate(&truth, &final_sigma, &drawn),
         prior_sigma,
-        prior_mean: to_vector(&prior_mean),
         auxiliary: Default::default(),
         thermal: None,
         own: Vec::new(),
         alone: Vec::new(),
         warming: Vec::new(),
         gravity: (run.site.gravity, 0.0),
-        aiding: run.aiding(),
         prior_attitudes: vec![AttitudePrior {
             mean: Matrix3::identity(),
             sigma: Vector3::repeat(60.0 * ARCSEC),
@@ -235,7 +233,6 @@ fn outcome(
         linearised_at: Linearisation::new(truth, TermVector::zeros(), vec![Matrix3::identity()]),
         passes: passes(),
         converged: true,
-        log_determinant: 0.0,
         history: history(0.3),
         innovations,
         consistency: consistency(),

@@ -74,7 +74,7 @@ fn about_one_axis(runs: u64) {
     } in &trials
     {
         let sigma = outcome.estimate.sigma();
-        let moved = outcome.estimate.vector() - outcome.prior_mean;
+        let moved = outcome.estimate.vector() - outcome.model.prior_mean;
         for i in 0..PARAMETERS {
             // What was learnt is how far the estimate may have left the prior's mean.
             let prior = outcome.prior_sigma[i];

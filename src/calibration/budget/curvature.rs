@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::calibration::parameters::{ParameterMatrix, parameter};
+use crate::calibration::{ParameterMatrix, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 
 /// Step of the second differences; the forms' third derivatives are of order one at most.

@@ -7,21 +7,19 @@
 
 pub mod curvature;
 
-mod freedom;
 mod record;
 pub mod source;
 
 use std::collections::BTreeSet;
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::constants::{Prior, of_parameters};
-use super::error::CalibrationError;
-use super::outcome::Outcome;
-use super::parameters::{PARAMETERS, ParameterMatrix};
-use super::problem::Problem;
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::layout::Layout;
+use crate::calibration::constants::of_parameters;
+use crate::calibration::{
+    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem, Source,
+};
 use crate::imu::{MotionNoise, Sensor};
 use crate::run::{Aiding, Run};
 use crate::statistics::student_limit;
@@ -30,6 +28,8 @@ pub use source::BudgetSource;
 
 /// Two-sided probability that a coverage factor is for: k = 2 with a normal distribution.
 const COVERAGE: f64 = 0.954_499_736_103_642;
+/// The end of a 95 % interval, in σ.
+const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;
 /// A part of less than this share of every variance is nothing.
 const NOTHING: f64 = 1e-12;
 
@@ -64,37 +64,30 @@ impl Budget {
         let problem = &outcome.as_calibrated(problem);
         let (script, accepted) = (outcome.script(problem)?, outcome.accepted());
         let reduction = |varied| {
-            let mut model = problem.model.clone();
-            model.varied = varied;
-            script.reduce(&problem.with_model(model), &accepted)
+            let problem = problem.with(|model| model.varied = varied);
+            script.reduce(&problem, &accepted)
         };
         let own = reduction(None)?;
         let prior = Prior::new(&own.constants, &problem.model, &outcome.linearised_at);
         let posterior = own.posterior(&prior);
+        let of_constants = |part: &DMatrix<f64>| of_parameters(&own.constants, part);
         let of_noise = |source: BudgetSource| {
-            let [less, more] = [1.0 - STEP, 1.0 + STEP].map(|factor| {
-                let reduction = reduction(Some((source, factor)))?;
-                Ok::<_, CalibrationError>(reduction.information())
-            });
-            let fall = (less? - more?) / (2.0 * STEP);
-            let part = &posterior.covariance * fall * &posterior.covariance;
-            Ok::<_, CalibrationError>((source, of_parameters(&own.constants, &part)))
+            let information = |factor| Ok(reduction(Some((source, factor)))?.information());
+            let fall = information(1.0 - STEP)? - information(1.0 + STEP)?;
+            let part = &posterior.covariance * (fall / (2.0 * STEP)) * &posterior.covariance;
+            Ok::<_, CalibrationError>((source, of_constants(&part)))
         };
         let sources = problem.sources().into_par_iter();
         let mut by_source = sources.map(of_noise).collect::<Result<Vec<_>, _>>()?;
-        for (source, part) in prior.parts(&posterior) {
-            by_source.push((source, of_parameters(&own.constants, &part)));
-        }
+        let of_prior = prior.parts(&posterior).into_iter();
+        by_source.extend(of_prior.map(|(source, part)| (source, of_constants(&part))));
         let filter: ParameterMatrix = by_source.iter().map(|(_, part)| part).sum();
         let bent = curvature(&outcome.estimate.triads, &filter);
-        let beside = outcome
-            .covariance_parts
-            .iter()
-            .map(|(&source, &part)| (source, part));
+        let beside = outcome.covariance_parts.iter();
         let parts = by_source
             .into_iter()
             .chain([(BudgetSource::Curvature, bent)])
-            .chain(beside);
+            .chain(beside.map(|(&source, &part)| (source, part)));
         let variance = outcome.estimate.covariance.diagonal();
         let counts = |part: &ParameterMatrix| {
             let own = part.diagonal();
@@ -155,14 +148,12 @@ impl Problem<'_> {
     fn sources(&self) -> BTreeSet<BudgetSource> {
         let model = &self.model;
         let layout = Layout::new(model, self.one_gravity());
-        let mut all: BTreeSet<_> = (0..layout.size())
-            .map(|state| layout.source(state))
-            .collect();
+        let mut all: BTreeSet<_> = layout.sources.into_iter().collect();
         all.insert(BudgetSource::Pulses);
         for sensor in Sensor::ALL {
-            all.insert(BudgetSource::white(sensor));
+            all.insert(BudgetSource::White(sensor));
             if *model.motion_noise.get(sensor) != MotionNoise::default() {
-                all.insert(BudgetSource::moves(sensor));
+                all.insert(BudgetSource::Moves(sensor));
             }
         }
         all.insert(BudgetSource::VelocityAtRest);
@@ -184,7 +175,46 @@ impl Problem<'_> {
     }
 }
 
-/// Coverage factor for 95.45 % and so many degrees of freedom.
+impl BudgetSource {
+    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2), Δu from the upper
+    /// end of the interval of what was learnt, for the lower one may be nothing at all; of several the
+    /// least, and not less than one.
+    fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
+        if self == Self::DwellScatter {
+            let parameters = outcome.estimate.estimated().count().max(1);
+            let scores = outcome.dwell_scatter.map_or(0, |scatter| scatter.count);
+            return (scores as f64 / parameters as f64).max(1.0);
+        }
+        let learnt = outcome.noise.sources.iter();
+        let of_own = learnt.filter(|figures| self.learnt().contains(&figures.source));
+        let freedoms = of_own.filter_map(|figures| {
+            let [_, high] = figures.interval?;
+            let relative = (high / figures.used).ln() / END_OF_INTERVAL;
+            (figures.used > 0.0 && relative > 0.0).then(|| (0.5 / relative.powi(2)).max(1.0))
+        });
+        freedoms.fold(f64::INFINITY, f64::min)
+    }
+
+    /// What is learnt of it from a record, if anything is.
+    fn learnt(self) -> &'static [Source] {
+        match self {
+            Self::White(Sensor::Gyro) => &[Source::AngleRandomWalk],
+            Self::White(Sensor::Accel) => &[Source::VelocityRandomWalk],
+            Self::Moves(Sensor::Gyro) => &[Source::GyroMotion, Source::GyroMoving],
+            Self::Moves(Sensor::Accel) => &[Source::AccelMotion, Source::AccelMoving],
+            Self::Wander(Sensor::Gyro) => &[Source::GyroGaussMarkov],
+            Self::Wander(Sensor::Accel) => &[Source::AccelGaussMarkov],
+            Self::VelocityAtRest => &[Source::Velocity],
+            Self::AttitudeAtRest => &[Source::Attitude],
+            Self::RotationAtRest => &[Source::RotationAtRest],
+            Self::TablePosition => &[Source::TablePosition],
+            Self::TableReading => &[Source::TableReading],
+            _ => &[],
+        }
+    }
+}
+
+/// Coverage factor for 95.45 % and this many degrees of freedom.
 fn coverage_factor(degrees_of_freedom: f64) -> f64 {
     match degrees_of_freedom.is_finite() {
         true => student_limit(degrees_of_freedom, 0.5 * (1.0 - COVERAGE)),

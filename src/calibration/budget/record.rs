@@ -2,9 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Budget;
-use crate::calibration::checks::error_term_test::ErrorTermTest;
-use crate::calibration::parameters::ParameterVector;
+use crate::calibration::{Budget, ErrorTermTest, ParameterVector};
 
 /// Standard uncertainties of the estimated parameters by source, in their order and units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

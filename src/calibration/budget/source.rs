@@ -5,18 +5,12 @@ use crate::imu::{Sensor, Term};
 /// A source of uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BudgetSource {
-    /// Angle random walk.
-    GyroNoise,
-    /// Velocity random walk.
-    AccelNoise,
-    /// Attitude noise of moves.
-    GyroMoves,
-    /// Velocity noise of moves.
-    AccelMoves,
-    /// Gauss–Markov biases of the gyros.
-    GyroWander,
-    /// Gauss–Markov biases of the accelerometers.
-    AccelWander,
+    /// Random walk of a triad's output.
+    White(Sensor),
+    /// What moves add to it.
+    Moves(Sensor),
+    /// Its Gauss–Markov biases.
+    Wander(Sensor),
     /// Samples that were missing and are interpolated.
     Interpolated,
     /// Whole pulses, of both triads.
@@ -73,31 +67,7 @@ pub enum BudgetSource {
 }
 
 impl BudgetSource {
-    /// Random walk of a triad.
-    pub fn white(sensor: Sensor) -> Self {
-        match sensor {
-            Sensor::Gyro => Self::GyroNoise,
-            Sensor::Accel => Self::AccelNoise,
-        }
-    }
-
-    /// What moves add to it.
-    pub fn moves(sensor: Sensor) -> Self {
-        match sensor {
-            Sensor::Gyro => Self::GyroMoves,
-            Sensor::Accel => Self::AccelMoves,
-        }
-    }
-
-    /// Its biases that vary.
-    pub fn wander(sensor: Sensor) -> Self {
-        match sensor {
-            Sensor::Gyro => Self::GyroWander,
-            Sensor::Accel => Self::AccelWander,
-        }
-    }
-
-    /// What its outputs add up to at standstill.
+    /// What outputs of a triad add up to at standstill.
     pub fn at_rest(sensor: Sensor) -> Self {
         match sensor {
             Sensor::Gyro => Self::AttitudeAtRest,
@@ -108,12 +78,9 @@ impl BudgetSource {
     /// What an engineer calls it.
     pub fn name(self) -> String {
         let name = match self {
-            Self::GyroNoise => "gyro white noise",
-            Self::AccelNoise => "accel white noise",
-            Self::GyroMoves => "gyro noise of moves",
-            Self::AccelMoves => "accel noise of moves",
-            Self::GyroWander => "gyro bias variation",
-            Self::AccelWander => "accel bias variation",
+            Self::White(sensor) => return format!("{} white noise", sensor.name()),
+            Self::Moves(sensor) => return format!("{} noise of moves", sensor.name()),
+            Self::Wander(sensor) => return format!("{} bias variation", sensor.name()),
             Self::Interpolated => "interpolated samples",
             Self::Pulses => "pulses",
             Self::VelocityAtRest => "velocity at standstill",

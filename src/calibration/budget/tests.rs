@@ -54,19 +54,19 @@ type Change = fn(&mut Model, f64);
 
 /// Factors on what states the size of a source.
 const CHANGES: [(BudgetSource, Change); 11] = [
-    (BudgetSource::GyroNoise, |m, f| {
+    (BudgetSource::White(Sensor::Gyro), |m, f| {
         m.noise.gyro.random_walk *= f
     }),
-    (BudgetSource::AccelNoise, |m, f| {
+    (BudgetSource::White(Sensor::Accel), |m, f| {
         m.noise.accel.random_walk *= f;
     }),
     (BudgetSource::TablePosition, |m, f| m.position_sigma *= f),
     (BudgetSource::TableReading, |m, f| m.reading_sigma *= f),
     (BudgetSource::Prior, |m, f| m.prior_sigma *= f),
-    (BudgetSource::GyroWander, |m, f| {
+    (BudgetSource::Wander(Sensor::Gyro), |m, f| {
         m.noise.gyro.gauss_markov.as_mut().unwrap().sigma *= f;
     }),
-    (BudgetSource::AccelWander, |m, f| {
+    (BudgetSource::Wander(Sensor::Accel), |m, f| {
         m.noise.accel.gauss_markov.as_mut().unwrap().sigma *= f;
     }),
     (BudgetSource::VelocityAtRest, |m, f| {

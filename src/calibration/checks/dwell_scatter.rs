@@ -11,10 +11,8 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::finding::{Finding, widened_by};
-use super::innovation::mean_square_interval;
-use crate::calibration::constants::{Posterior, Prior};
-use crate::calibration::reduction::Reduction;
+use super::finding::widened_by;
+use crate::calibration::{Finding, Posterior, Prior, Reduction, mean_square_interval};
 use crate::statistics::FALSE_ALARM;
 
 /// A direction of which a dwell has less than this part of all information says nothing of the dwell but

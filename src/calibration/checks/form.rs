@@ -3,14 +3,10 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::finding::Finding;
-use crate::calibration::constants::Prior;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::gauss_newton::Iterated;
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::parameters::in_general_form;
-use crate::calibration::problem::Problem;
-use crate::calibration::reduction::Script;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Finding, Iterated, Linearisation, Prior, Problem, Script,
+    in_general_form,
+};
 use crate::imu::InstallationForm;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::finding::Finding;
+use crate::calibration::Finding;
 use crate::statistics::FALSE_ALARM;
 
 /// What was observed.
@@ -42,6 +42,8 @@ pub struct Innovation {
     pub observation: Observation,
     /// East, North and Up in units of their own σ, independent of each other.
     pub whitened: [f64; 3],
+    /// These σ, rad or m/s.
+    pub sigma: [f64; 3],
     /// Whether the gate let it in.
     pub accepted: bool,
     /// Number of the dwell in which it was made.
@@ -54,6 +56,11 @@ impl Innovation {
     /// Squared Mahalanobis distance, χ² with three degrees of freedom.
     pub fn distance(&self) -> f64 {
         self.whitened.iter().map(|w| w * w).sum()
+    }
+
+    /// −2 ln of its likelihood, except a constant.
+    pub fn deviance(&self) -> f64 {
+        self.distance() + 2.0 * self.sigma.map(f64::ln).iter().sum::<f64>()
     }
 }
 
@@ -112,11 +119,8 @@ fn of_all(innovations: &[&Innovation]) -> Vec<f64> {
 /// The first of each dwell after a move, let in or not: it shows the errors that the move made.
 fn after_moves(innovations: &[&Innovation]) -> Vec<f64> {
     let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
-    let first = dwells.filter_map(|dwell| dwell.first());
-    first
-        .filter(|innovation| innovation.after_move)
-        .flat_map(|i| i.whitened.map(|w| w * w))
-        .collect()
+    let first = dwells.filter_map(|dwell| dwell.first().filter(|i| i.after_move));
+    first.flat_map(|i| i.whitened.map(|w| w * w)).collect()
 }
 
 /// Sums over each dwell of those that were let in, each over its σ: they show errors that last.
@@ -124,11 +128,11 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
     let summed = dwells.flat_map(|dwell| {
         let accepted: Vec<_> = dwell.iter().filter(|i| i.accepted).collect();
-        let sum = |axis: usize| accepted.iter().map(|i| i.whitened[axis]).sum::<f64>();
-        match accepted.len() {
-            0 => Vec::new(),
-            n => (0..3).map(|axis| sum(axis).powi(2) / n as f64).collect(),
-        }
+        let axes = 0..if accepted.is_empty() { 0 } else { 3 };
+        axes.map(move |axis| {
+            let sum: f64 = accepted.iter().map(|i| i.whitened[axis]).sum();
+            sum.powi(2) / accepted.len() as f64
+        })
     });
     summed.collect()
 }
@@ -147,11 +151,8 @@ pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
 
 /// Innovations that are larger or smaller than their covariance makes them, if there are any.
 pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
-    let of = |kind| -> Vec<&Innovation> {
-        let of_kind = innovations.iter().filter(|i| i.observation == kind);
-        of_kind.collect()
-    };
-    let kinds = Observation::ALL.map(|kind| (kind, of(kind)));
+    let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
+    let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
     let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
     let chance = FALSE_ALARM / (kinds.clone().count() * LOOKS.len()) as f64;
     let (mut each, mut looks) = (Vec::new(), Vec::new());
@@ -162,11 +163,10 @@ pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
             let nis = squares.iter().sum::<f64>() / count as f64;
             // The distance of the IMU from the table's centre is stated by a bound, which makes the velocity after
             // a move uncertain: smaller innovations do not contradict the model.
-            let (low, high) = match (look, observation) {
-                (AFTER_MOVES, Observation::Velocity) => {
-                    (0.0, mean_square_interval(count, 2.0 * chance).1)
-                }
-                _ => mean_square_interval(count, chance),
+            let one_sided = (look, *observation) == (AFTER_MOVES, Observation::Velocity);
+            let (low, high) = match one_sided {
+                true => (0.0, mean_square_interval(count, 2.0 * chance).1),
+                false => mean_square_interval(count, chance),
             };
             if nis < low || nis > high {
                 let name = observation.name();
@@ -191,29 +191,25 @@ const OUTSIDE: f64 = 0.05;
 
 /// Consistency of a pass: velocity and table apart.
 pub fn consistency(innovations: &[Innovation]) -> Consistency {
-    let of = |kinds: &[Observation]| {
-        nis(innovations
-            .iter()
-            .filter(|i| kinds.contains(&i.observation) && i.accepted)
-            .map(|i| i.whitened))
-    };
+    let accepted = innovations.iter().filter(|i| i.accepted);
+    let of = |kind| nis(accepted.clone().filter(move |i| i.observation == kind));
     Consistency {
-        all: of(&Observation::ALL),
-        velocity: of(&[Observation::Velocity]),
-        table: of(&[Observation::Table]),
-        attitude: of(&[Observation::Attitude]),
+        all: nis(accepted.clone()),
+        velocity: of(Observation::Velocity),
+        table: of(Observation::Table),
+        attitude: of(Observation::Attitude),
     }
 }
 
-fn nis(whitened: impl Iterator<Item = [f64; 3]>) -> Nis {
+fn nis<'a>(innovations: impl Iterator<Item = &'a Innovation>) -> Nis {
     let (mut squares, mut products, mut count) = (0.0, 0.0, 0usize);
     let mut last = [0.0; 3];
-    for w in whitened {
-        for axis in 0..3 {
-            squares += w[axis].powi(2);
-            products += w[axis] * last[axis];
+    for innovation in innovations {
+        for (w, last) in innovation.whitened.iter().zip(&mut last) {
+            squares += w * w;
+            products += w * *last;
+            *last = *w;
         }
-        last = w;
         count += 3;
     }
     Nis {
@@ -259,6 +255,7 @@ mod tests {
                 time: 0.0,
                 observation,
                 whitened: [whitened; 3],
+                sigma: [1.0; 3],
                 accepted: true,
                 dwell,
                 after_move: dwell > 0,

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::finding::Finding;
+use crate::calibration::Finding;
 use crate::run::motion::LabelCheck;
 
 /// Sections whose labels the record contradicts, if there are any.

@@ -4,12 +4,10 @@ pub mod cause;
 pub mod drift;
 pub mod dwell_scatter;
 pub mod error_term_test;
-pub mod evidence;
 pub mod finding;
 pub mod form;
 pub mod innovation;
 pub mod labels;
-pub mod noise_learnt;
 pub mod observability;
 pub mod prior_distance;
 pub mod quality;
@@ -17,24 +15,27 @@ pub mod recordings;
 pub mod residuals;
 pub mod rest_scatter;
 pub mod rounding;
-pub mod settling;
 pub mod unexplained;
 
-use super::budget::BudgetSource;
-use super::outcome::Outcome;
-use super::problem::Problem;
+use crate::calibration::{BudgetSource, Outcome, Problem};
+use cause::{FoundCause, settling};
 use error_term_test::{ErrorTermTest, biases_may_vary};
 use finding::Finding;
 
-/// What the checks find of a filter's outcome, in the order in which findings are read. The problem is the one with
-/// what is stated.
-pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
+/// What the checks find of a filter's outcome, and what was found on the way to it, in the order in which findings are
+/// read. The problem is the one with what is stated.
+pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = outcome.part(BudgetSource::Rounding);
     let notes = problem.notes().into_iter().map(Finding::of_recording);
     let form = outcome
         .form_test
         .and_then(|test| test.finding(estimate.form()));
+    let widened = outcome
+        .covariance_parts
+        .contains_key(&BudgetSource::DwellScatter);
+    let scattered = outcome.dwell_scatter.filter(|_| widened);
+    let scattered = scattered.map(|of| of.finding(outcome.growth_by(BudgetSource::DwellScatter)));
     // Angles that the form lacks are a cause that is found.
     let unexplained = match form {
         Some(_) => None,
@@ -42,7 +43,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     };
     notes
         .chain(unexplained::not_converged(outcome))
-        .chain(noise_learnt::of_report(problem, &outcome.noise))
+        .chain(outcome.noise.finding(problem))
         .chain(rest_scatter::scatter_at_rest(problem, &estimate.triads))
         .chain(rounding::rounded(problem, &rounding, &estimate.covariance))
         .chain(prior_distance::far_from_prior(&problem.model, estimate))
@@ -51,6 +52,10 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         .chain(innovation::outliers(innovations))
         .chain(unexplained)
         .chain(innovation::inconsistent(innovations))
+        .chain(settling::finding(problem, outcome.settling))
+        .chain(outcome.causes.iter().map(FoundCause::finding))
+        .chain(others)
+        .chain(scattered)
         .collect()
 }
 

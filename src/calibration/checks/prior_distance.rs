@@ -3,11 +3,9 @@
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-use super::finding::Finding;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{
-    ParameterMatrix, from_vector, parameter, parameter_name, sensor_and_parameter,
+use crate::calibration::{
+    Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
+    sensor_and_parameter,
 };
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
@@ -122,29 +120,29 @@ fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
         (count > 0).then(|| of_scales(sensor, &triads.get(sensor).scale, far, count))
     });
     let angles = PerSensor::from_fn(|sensor| count(sensor, ParameterKind::Installation) > 0);
-    let biases = Sensor::ALL.into_iter().filter_map(|sensor| {
-        let (count, sensor) = (count(sensor, ParameterKind::Bias), sensor.name());
+    let biases = Sensor::ALL
+        .into_iter()
+        .filter(|&of| count(of, ParameterKind::Bias) > 0);
+    let biases = biases.map(|sensor| {
+        let sensor = sensor.name();
         let words = format!(
             "{sensor} bias or bias_sigma as stated does not fit the instrument; an offset of the register belongs in \
              bias"
         );
-        (count > 0).then(|| (words, json!({ "cause": "bias", "sensor": sensor })))
+        (words, json!({ "cause": "bias", "sensor": sensor }))
     });
     let installation = of_installation(triads, angles);
     scales.chain(installation).chain(biases).collect()
 }
 
 /// Of scale factors of a triad, this count of which are far from their prior.
-fn of_scales(sensor: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> Cause {
-    let is_reversed = |&axis: &usize| scale[axis] < 0.0 && far.contains(&parameter(sensor, axis));
-    let reversed = (0..3).filter(is_reversed);
-    let reversed: Vec<String> = reversed.map(|axis| AXES[axis].to_string()).collect();
-    let off = scale.add_scalar(-1.0);
-    let other = match sensor {
-        Sensor::Gyro => "sample period",
-        Sensor::Accel => "gravity",
-    };
-    let sensor = sensor.name();
+fn of_scales(of: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> Cause {
+    let is_reversed = |&axis: &usize| scale[axis] < 0.0 && far.contains(&parameter(of, axis));
+    let reversed: Vec<String> = (0..3)
+        .filter(is_reversed)
+        .map(|k| AXES[k].to_string())
+        .collect();
+    let (off, sensor) = (scale.add_scalar(-1.0), of.name());
     if !reversed.is_empty() {
         let axes = reversed.join(", ");
         let words =
@@ -154,6 +152,10 @@ fn of_scales(sensor: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) 
     }
     if count == 3 && alike(&off, &Vector3::repeat(off.mean())) {
         let off_ppm = off.mean() / PPM;
+        let other = match of {
+            Sensor::Gyro => "sample period",
+            Sensor::Accel => "gravity",
+        };
         let words = format!(
             "all three {sensor} scale factors off alike, by {off_ppm:+.0} ppm: {sensor}_unit, scale or {other}"
         );
@@ -172,16 +174,14 @@ fn alike(one: &Vector3<f64>, other: &Vector3<f64>) -> bool {
 /// Of installation angles of the triads in which some are far from their prior.
 fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause> {
     // To first order the antisymmetric half of installation is a rotation, the symmetric half a skew.
-    let halves = |sensor: Sensor| {
+    let half = |sensor: Sensor, sign: f64| {
         let c = triads.get(sensor).installation();
-        let half = |sign: f64| {
-            let of = |i, j| 0.5 * (c[(i, j)] + sign * c[(j, i)]);
-            Vector3::new(of(2, 1), of(0, 2), of(1, 0))
-        };
-        (half(-1.0), half(1.0))
+        let of = |i, j| 0.5 * (c[(i, j)] + sign * c[(j, i)]);
+        Vector3::new(of(2, 1), of(0, 2), of(1, 0))
     };
-    let common = (halves(Sensor::Gyro).0 + halves(Sensor::Accel).0) * 0.5;
-    if far.gyro && far.accel && alike(&halves(Sensor::Gyro).0, &common) {
+    let turn = |sensor| half(sensor, -1.0);
+    let common = (turn(Sensor::Gyro) + turn(Sensor::Accel)) * 0.5;
+    if far.gyro && far.accel && alike(&turn(Sensor::Gyro), &common) {
         let angle_deg = common.norm() / DEGREE;
         let words = format!(
             "both triads turned alike, by {angle_deg:.3}°: the instrument's mount, the table's zero, level or north, \
@@ -189,16 +189,16 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
         );
         return vec![(words, json!({ "cause": "mount", "angle_deg": angle_deg }))];
     }
-    let of_triad = |sensor: Sensor| {
-        let ((turn, skew), sensor) = (halves(sensor), sensor.name());
-        if skew.norm() >= ALIKE * turn.norm() {
+    let of_triad = |of: Sensor| {
+        let (turn, sensor) = (turn(of).norm(), of.name());
+        if half(of, 1.0).norm() >= ALIKE * turn {
             let words = format!(
                 "{sensor} axes not at right angles: positions or labels that are not as stated, or an \
                  installation_sigma_arcsec too small"
             );
             return (words, json!({ "cause": "skewed", "sensor": sensor }));
         }
-        let angle_deg = turn.norm() / DEGREE;
+        let angle_deg = turn / DEGREE;
         let words = format!(
             "the {sensor} triad turned by {angle_deg:.3}°: its mount in the instrument, or a time offset if it is the \
              gyros"
@@ -206,11 +206,8 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
         let figures = json!({ "cause": "turned", "sensor": sensor, "angle_deg": angle_deg });
         (words, figures)
     };
-    let triads = Sensor::ALL.into_iter();
-    triads
-        .filter(|&sensor| *far.get(sensor))
-        .map(of_triad)
-        .collect()
+    let triads = Sensor::ALL.into_iter().filter(|&sensor| *far.get(sensor));
+    triads.map(of_triad).collect()
 }
 
 #[cfg(test)]

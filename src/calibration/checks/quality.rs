@@ -6,16 +6,15 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::attitude::{exp, level, log, tilt};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::linearisation::{Linearisation, singular};
-use crate::calibration::outcome::Outcome;
-use crate::calibration::pass::{Gate, pass};
-use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::reduction::Script;
-use crate::calibration::start::closed_form::{ClosedForm, Reference, six_position_by};
+use crate::calibration::linearisation::singular;
+use crate::calibration::start::closed_form::six_position_by;
+use crate::calibration::{
+    CalibrationError, ClosedForm, Gate, Linearisation, Outcome, Problem, Reference, Script,
+    Stretch, pass,
+};
 use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
-use crate::recording::{LabelledMotion, Segment};
+use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
 
 /// What a calibration leaves of gravity and of turns.
@@ -118,20 +117,19 @@ impl ClosedForm {
             measures(problem, &at, judged)
         };
         let all = of(&self.estimate.triads, &|_| true)?;
+        let dwells: Vec<&Dwell> = problem.dwells().collect();
         let held_out = match self.reference {
             Reference::Labels if run.recording.imu.continuous => {
-                let dwells: Vec<&Dwell> = problem.dwells().collect();
-                let unlabelled = |k: usize| !labelled(run, dwells[k]);
-                let measures = of(&self.estimate.triads, &unlabelled)?;
+                let measures = of(&self.estimate.triads, &|k| !labelled(run, dwells[k]))?;
                 // Every labelled turn was used.
                 let turns = Spread::default();
                 Some(Measures { turns, ..measures })
             }
             Reference::Labels => None,
             reference => {
+                let half = every_other(problem);
                 // Half the positions may be too few.
-                let half = every_other(problem).map(|half| six_position_by(reference, &half));
-                let half = half.and_then(Result::ok);
+                let half = half.and_then(|half| six_position_by(reference, &half).ok());
                 let half = half.map(|half| of(&half.estimate.triads, &|k| k % 2 == 1));
                 half.transpose()?
             }
@@ -147,19 +145,14 @@ impl ClosedForm {
 /// two, or a stretch with none.
 fn every_other<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     let half = problem.observed_in(|k| k % 2 == 0);
-    let left = half
-        .stretches()
-        .iter()
-        .all(|stretch| !stretch.dwells.is_empty());
-    (left && half.dwells().count() >= 2).then_some(half)
+    let empty = half.stretches().iter().any(|of| of.dwells.is_empty());
+    (!empty && half.dwells().count() >= 2).then_some(half)
 }
 
-fn labelled(run: &Run, dwell: &Dwell) -> bool {
-    let Dwell { samples, .. } = dwell;
+fn labelled(run: &Run, Dwell { samples, .. }: &Dwell) -> bool {
     run.recording.segments.iter().any(|segment| {
-        segment.motion.is_some()
-            && segment.samples.start < samples.end
-            && samples.start < segment.samples.end
+        let of = &segment.samples;
+        segment.motion.is_some() && of.start < samples.end && samples.start < of.end
     })
 }
 
@@ -233,27 +226,26 @@ fn labelled_turns(
     at: &Linearisation,
     judged: impl Fn(usize) -> bool,
 ) -> Result<Vec<f64>, CalibrationError> {
-    let (run, mut turns) = (problem.run(), Vec::new());
+    let run = problem.run();
     let imu = &run.recording.imu;
     let dwells: Vec<&Dwell> = problem.dwells().collect();
-    for Segment {
-        samples, motion, ..
-    } in &run.recording.segments
-    {
+    let turns = run.recording.segments.iter().filter_map(|segment| {
+        let Some(LabelledMotion::Turns { axis, angle }) = segment.motion else {
+            return None;
+        };
+        let samples = &segment.samples;
         let last = samples.end.saturating_sub(1);
         let ends = |dwell: &&Dwell| dwell.samples.contains(&last);
         let of_judged = dwells.iter().position(ends).is_none_or(&judged);
-        if let Some(LabelledMotion::Turns { axis, angle }) = motion
-            && of_judged
-            && !imu.is_lost(samples)
-        {
-            let triads = at.instrument(&problem.model, (run, 0), samples);
-            let correction = triads.gyro.correction().ok_or_else(|| singular(&triads))?;
-            let bias = triads.gyro.bias * (samples.len() as f64 * imu.period);
-            turns.push(axis.dot(&(correction * (imu.gyro.sum(samples.clone()) - bias))) - angle);
-        }
-    }
-    Ok(turns)
+        (of_judged && !imu.is_lost(samples)).then_some((axis, angle, samples))
+    });
+    let each = turns.map(|(axis, angle, samples)| {
+        let triads = at.instrument(&problem.model, (run, 0), samples);
+        let correction = triads.gyro.correction().ok_or_else(|| singular(&triads))?;
+        let bias = triads.gyro.bias * (samples.len() as f64 * imu.period);
+        Ok(axis.dot(&(correction * (imu.gyro.sum(samples.clone()) - bias))) - angle)
+    });
+    each.collect()
 }
 
 /// Attitude after these samples, navigated from this one before.

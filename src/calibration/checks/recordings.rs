@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::finding::Finding;
+use crate::calibration::Finding;
 
 /// By how much recordings differ in a group of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde_json::json;
 
-use super::finding::{Finding, widened_by};
+use super::finding::widened_by;
+use crate::calibration::Finding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::ARCSEC;
 

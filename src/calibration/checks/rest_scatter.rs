@@ -3,10 +3,9 @@
 use nalgebra::Matrix3;
 use serde_json::json;
 
-use super::finding::{Finding, triad_name};
-use super::innovation::mean_square_interval;
-use crate::calibration::problem::Problem;
+use super::finding::triad_name;
 use crate::calibration::record::schedule::step_length;
+use crate::calibration::{Finding, Problem, mean_square_interval};
 use crate::imu::{AXES, NoiseKeys, PerSensor, Sensor, Triad};
 use crate::run::{Dwell, Run};
 use crate::statistics::FALSE_ALARM;

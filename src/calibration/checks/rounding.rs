@@ -11,10 +11,9 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde_json::json;
 
-use super::finding::{Finding, triad_name, widened_by};
+use super::finding::{triad_name, widened_by};
 use crate::calibration::estimate::largest_growth;
-use crate::calibration::parameters::{ParameterMatrix, parameter};
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, ParameterMatrix, Problem, parameter};
 use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
@@ -46,11 +45,11 @@ pub fn rounded(
 ) -> Vec<Finding> {
     let of = |sensor: Sensor| {
         let first = parameter(sensor, 0);
-        let of_triad =
-            |m: &ParameterMatrix| m.diagonal().fixed_rows::<PER_TRIAD>(first).into_owned();
-        let with = of_triad(covariance);
-        let without = with - of_triad(by_rounding);
-        let growth = largest_growth(without.as_slice(), with.as_slice());
+        let of_triad = first..first + PER_TRIAD;
+        let [with, part] = [covariance, by_rounding].map(|m| m.diagonal());
+        let without = with - part;
+        let [without, with] = [&without, &with].map(|m| &m.as_slice()[of_triad.clone()]);
+        let growth = largest_growth(without, with);
         let steps = problem.runs().map(|run| steps(run, sensor).max());
         let (value, unit) = match sensor {
             Sensor::Gyro => (DEGREE, "°/s"),
@@ -84,11 +83,8 @@ fn of_triad(
     let means: Vec<Mean> = recordings
         .flat_map(|(recording, run)| of_recording(problem, recording, run, sensor))
         .collect();
-    let variance: f64 = means.iter().map(|mean| mean.variance.mean()).sum();
-    if variance == 0.0 {
-        return None;
-    }
-    let variance = variance / means.len() as f64;
+    let variance = means.iter().map(|mean| mean.variance.mean()).sum::<f64>();
+    let variance = Some(variance / means.len() as f64).filter(|variance| *variance > 0.0)?;
     let along_gravity = sensor == Sensor::Accel && problem.model.aiding == Aiding::Velocity;
     let mut information = SMatrix::<f64, PER_TRIAD, PER_TRIAD>::identity();
     let mut of_steps = BTreeMap::<(usize, i64), TriadVector>::new();
@@ -102,22 +98,19 @@ fn of_triad(
             false => Matrix3::identity(),
         };
         let input = input.push(1.0);
-        let columns: Vec<Vector3<f64>> = (0..PER_TRIAD)
-            .map(|p| seen * response[p] * input * sigma[p])
-            .collect();
+        let columns: [_; PER_TRIAD] =
+            std::array::from_fn(|p| seen * response[p] * input * sigma[p]);
         let design = SMatrix::<f64, 3, PER_TRIAD>::from_columns(&columns);
         information += design.transpose() * design / variance;
         for axis in 0..3 {
             let error = design.row(axis).transpose() * mean.variance[axis].sqrt() / variance;
-            *of_steps
-                .entry((axis, mean.step[axis]))
-                .or_insert_with(TriadVector::zeros) += error;
+            *of_steps.entry((axis, mean.step[axis])).or_default() += error;
         }
     }
     let information = information.cholesky()?;
     let errors = of_steps
         .values()
-        .map(|error| information.solve(error).component_mul(&sigma));
+        .map(|of| information.solve(of).component_mul(&sigma));
     Some(errors.map(|error| error * error.transpose()).sum())
 }
 
@@ -128,11 +121,10 @@ fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
     let Some(log) = imu.log.as_ref().filter(|log| log.output == Output::Rate) else {
         return Vector3::zeros();
     };
-    let step = |axis: usize| {
+    Vector3::from_fn(|axis, _| {
         let facts = &log.columns.get(sensor)[axis];
         facts.step.unwrap_or(0.0) * facts.unit.abs() / imu.period
-    };
-    Vector3::from_fn(|axis, _| step(axis))
+    })
 }
 
 /// The mean of a triad's rows over a dwell.
@@ -154,20 +146,21 @@ fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) 
     let imu = &run.recording.imu;
     let mut squares = Vector3::zeros();
     let (mut means, mut count) = (Vec::new(), 0.0f64);
-    let stretches = problem.stretches().iter();
-    for stretch in stretches.filter(|stretch| stretch.recording == recording) {
-        for dwell in &stretch.dwells {
-            // Pairs that have no row in common, so that each is new.
-            let mut rows = imu.of(sensor).sums(dwell.samples.clone(), 1);
-            let (mut sum, mut summed) = (Vector3::zeros(), 0.0f64);
-            while let (Some(before), Some(after)) = (rows.next(), rows.next()) {
-                squares += (after - before).map(|change| change * change);
-                sum += before + after;
-                summed += 2.0;
-            }
-            count += summed;
-            means.push(sum / (summed.max(1.0) * imu.period));
+    let stretches = problem
+        .stretches()
+        .iter()
+        .filter(|of| of.recording == recording);
+    for dwell in stretches.flat_map(|stretch| &stretch.dwells) {
+        // Pairs that have no row in common, so that each is new.
+        let mut rows = imu.of(sensor).sums(dwell.samples.clone(), 1);
+        let (mut sum, mut summed) = (Vector3::zeros(), 0.0f64);
+        while let (Some(before), Some(after)) = (rows.next(), rows.next()) {
+            squares += (after - before).map(|change| change * change);
+            sum += before + after;
+            summed += 2.0;
         }
+        count += summed;
+        means.push(sum / (summed.max(1.0) * imu.period));
     }
     let scatter = squares / (count.max(1.0) * imu.period.powi(2));
     let stated = run.instrument.noise.get(sensor).random_walk.powi(2) / imu.period;

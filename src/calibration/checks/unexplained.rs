@@ -2,11 +2,9 @@
 
 use serde_json::json;
 
-use super::finding::Finding;
-use super::innovation::{Innovation, Nis};
 use super::residuals::LARGE;
 use crate::calibration::noise::LOG_SIGMA;
-use crate::calibration::outcome::Outcome;
+use crate::calibration::{Finding, Innovation, Nis, Outcome};
 use crate::statistics::chi_square_limit;
 
 /// Part of stated figures that are wrong by more than what is still taken for a wrong figure.
@@ -79,6 +77,7 @@ mod tests {
                 time: f64::from(k),
                 observation: Observation::Velocity,
                 whitened: [factor; 3],
+                sigma: [1.0; 3],
                 accepted: true,
                 dwell: 0,
                 after_move: false,

@@ -3,7 +3,7 @@
 use faer::MatRef;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Posterior, Prior};
+use crate::calibration::{Posterior, Prior};
 
 /// What is known of constants so far.
 #[derive(Debug, Clone)]
@@ -36,12 +36,11 @@ impl Known {
     }
 
     /// Takes in rows of all constants.
-    ///
-    /// Householder's reflections of the triangle with the rows below it, of which those of the triangle stay as they
-    /// are (Bierman 1977, *Factorization Methods for Discrete Sequential Estimation*, §IV.2).
     pub fn learn(&mut self, rows: &DMatrix<f64>) {
         let (n, all) = (self.open.len(), self.prior.sigma.len());
-        let mut below = DMatrix::zeros(rows.nrows(), n + 1);
+        let mut with = DMatrix::zeros(n + 1 + rows.nrows(), n + 1);
+        with.rows_mut(0, n + 1).copy_from(&self.root);
+        let mut below = with.rows_mut(n + 1, rows.nrows());
         for (column, &k) in self.open.iter().enumerate() {
             below.set_column(column, &rows.column(k));
         }
@@ -50,22 +49,7 @@ impl Known {
             observed.axpy(-self.prior.mean[k], &rows.column(k), 1.0);
         }
         below.set_column(n, &observed);
-        for k in 0..=n {
-            let (mut reflector, mut right) = below.columns_range_pair_mut(k, k + 1..);
-            let (own, length) = (self.root[(k, k)], reflector.norm());
-            if length == 0.0 {
-                continue;
-            }
-            let reflected = -own.hypot(length).copysign(own);
-            reflector /= own - reflected;
-            let weight = (reflected - own) / reflected;
-            for (j, mut column) in (k + 1..).zip(right.column_iter_mut()) {
-                let along = weight * (self.root[(k, j)] + reflector.dot(&column));
-                self.root[(k, j)] -= along;
-                column.axpy(-along, &reflector, 1.0);
-            }
-            self.root[(k, k)] = reflected;
-        }
+        self.root = triangle(&with);
     }
 
     /// What is known of combinations of the constants, a row of weights each: mean, and a root of the covariance.

@@ -5,10 +5,9 @@ mod known;
 mod posterior;
 mod prior;
 
-use super::budget::source::BudgetSource;
-use super::parameters::auxiliary::OF_AXES;
-use super::parameters::error_term::ErrorTerm;
-use crate::calibration::several::thermal::Coefficient;
+use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::parameters::auxiliary::OF_AXES;
+use crate::calibration::{Coefficient, ErrorTerm};
 use crate::imu::Term;
 use crate::turntable::{AxisError, TABLE_GEOMETRY};
 pub use disturbance::{Disturbance, DisturbanceKind};

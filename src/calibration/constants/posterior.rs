@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Constant, parameters};
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
+use super::parameters;
+use crate::calibration::{Constant, ParameterMatrix, ParameterVector};
 
 /// What is known of constants with the data.
 #[derive(Debug, Clone)]

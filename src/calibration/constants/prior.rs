@@ -4,11 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Constant, Posterior};
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{parameter, to_vector};
+use crate::calibration::{Constant, Linearisation, Model, Posterior, parameter, to_vector};
 use crate::imu::PARAMETERS as PER_TRIAD;
 
 /// What is known of constants beforehand, as errors of the point of linearisation.

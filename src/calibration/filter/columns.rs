@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::linear::Linear;
+use super::update::Linear;
 use crate::calibration::constants::triangle;
 
 /// What constants do to a filter.
@@ -36,35 +36,6 @@ impl Columns {
             squares: 0.0,
             log_determinant: 0.0,
         }
-    }
-
-    /// A state is drawn anew, whatever the constants are.
-    pub fn redraw(&mut self, state: usize) {
-        self.of_states.column_mut(state).fill(0.0);
-    }
-
-    /// A state forgets.
-    pub fn scale(&mut self, state: usize, keep: f64) {
-        self.of_states.column_mut(state).scale_mut(keep);
-    }
-
-    /// The states that move become what `transition` makes of the first states, plus what each constant adds to
-    /// them (rows, by constant).
-    pub fn propagate(&mut self, moving: &[usize], transition: &DMatrix<f64>, added: &DMatrix<f64>) {
-        let first = self.of_states.columns(0, transition.ncols());
-        let moved = first * transition.transpose() + added;
-        for (&state, column) in moving.iter().zip(moved.column_iter()) {
-            self.of_states.column_mut(state).copy_from(&column);
-        }
-    }
-
-    /// A state becomes itself plus others by these weights.
-    pub fn add(&mut self, state: usize, others: impl Iterator<Item = (usize, f64)>) {
-        let mut sum = self.of_states.column(state).into_owned();
-        for (other, weight) in others {
-            sum.axpy(weight, &self.of_states.column(other), 1.0);
-        }
-        self.of_states.column_mut(state).copy_from(&sum);
     }
 
     /// Measurements H are taken in by a gain: what whitens their innovations, and the whitened innovations.

@@ -10,13 +10,16 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::gain_cache::{Gain, GainCache};
-use super::input_prior::{InputPrior, Unexpected};
-use super::measurement::ScalarInnovation;
+use super::gain_cache::GainCache;
+use super::gate::{Judge, Verdict};
+use super::input_prior::InputPrior;
 use super::rows::{add, factor};
+use crate::calibration::Observation;
 
 /// An observation of three components: navigation errors from `state` on.
 pub struct Observed {
+    pub time: f64,
+    pub kind: Observation,
     pub state: usize,
     pub residual: Vector3<f64>,
     /// Of each component.
@@ -40,19 +43,8 @@ pub struct DwellFilter<'a, const M: usize, const G: usize> {
     given: Option<InputPrior<G>>,
 }
 
-/// An innovation, and what taking it in needs.
-pub(in crate::calibration) struct Prediction<const G: usize> {
-    /// Where taking it in leads.
-    pub to: usize,
-    /// Of each component, the components before it taken in.
-    pub scalars: [ScalarInnovation; 3],
-    /// Given `g`, whitened.
-    residual: Vector3<f64>,
-    unexpected: Unexpected<G>,
-}
-
 /// What a part of a dwell comes to.
-pub(in crate::calibration) struct Outcome {
+pub struct Summary {
     /// Rows of `g` …
     pub measured: DMatrix<f64>,
     /// … and what each measures, of σ 1.
@@ -79,11 +71,6 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
         }
     }
 
-    /// Whether innovations are worked out.
-    pub fn has_innovations(&self) -> bool {
-        self.given.is_some()
-    }
-
     /// Errors of a state become more by a known amount.
     pub fn refer(&mut self, state: usize, by: f64) {
         self.mean[state] += by;
@@ -92,83 +79,53 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
     pub fn propagate(&mut self, model: usize) {
         self.at = self.gains.step(self.at, model);
         let mut mean = [0.0; M];
-        for &(row, column, phi) in &self.gains.model(model).transition {
+        for &(row, column, phi) in &self.gains.models[model].transition {
             mean[row] += phi * self.mean[column];
         }
         self.mean = mean;
     }
 
-    /// The innovation of an observation; `None` if it is not finite or its covariance not positive definite.
-    // A prediction is half a kilobyte, which would be copied on its way out.
-    #[inline(always)]
-    pub fn predict(&mut self, observed: &Observed) -> Option<Prediction<G>> {
-        let (to, residual) = self.whitened(observed)?;
-        let Gain { root, rows, .. } = self.gains.gain(to)?;
-        let unexpected = self.given.as_ref()?.predict(rows, &residual)?;
-        let scalars = [0, 1, 2].map(|k| {
-            let sigma = root[(k, k)] * unexpected.root[(k, k)];
-            ScalarInnovation {
-                innovation: unexpected.whitened[k] * sigma,
-                variance: sigma.powi(2),
-            }
-        });
-        Some(Prediction {
-            to,
-            scalars,
-            residual,
-            unexpected,
-        })
-    }
-
-    /// Where it leads to take an observation in, and the observation, whitened, given `g = 0`.
-    #[inline(always)]
-    fn whitened(&mut self, observed: &Observed) -> Option<(usize, Vector3<f64>)> {
-        let Observed {
+    /// Takes an observation in if the judge lets it; `None` if it is not finite or its covariance not positive
+    /// definite.
+    pub fn observe(&mut self, observed: &Observed, judge: &mut Judge) -> Option<Verdict> {
+        if self.given.is_none() && !judge.lets_in() {
+            return Some(Verdict::Rejected);
+        }
+        let &Observed {
             state,
             residual,
             variance,
-        } = *observed;
+            ..
+        } = observed;
         let to = self.gains.observe(self.at, state, variance)?;
+        let gain = self.gains.course[to].gain.as_ref()?;
         let expected = Vector3::from_fn(|axis, _| self.mean[state + axis]);
-        let root = &self.gains.gain(to)?.root;
-        Some((to, root.solve_lower_triangular(&(residual - expected))?))
-    }
-
-    /// Takes an innovation in.
-    #[inline]
-    pub fn update(&mut self, prediction: &Prediction<G>) {
-        self.add(prediction.to, &prediction.residual);
+        let whitened = gain.root.solve_lower_triangular(&(residual - expected))?;
         if let Some(given) = &mut self.given {
-            given.update(&prediction.unexpected);
-        }
-    }
-
-    /// Takes an observation in without asking for its innovation; `None` as of [`Self::predict`].
-    pub fn update_unjudged(&mut self, observed: &Observed) -> Option<()> {
-        let (to, residual) = self.whitened(observed)?;
-        self.add(to, &residual);
-        Some(())
-    }
-
-    #[inline]
-    fn add(&mut self, to: usize, residual: &Vector3<f64>) {
-        self.at = to;
-        self.squares += residual.norm_squared();
-        if let Some(gain) = self.gains.gain(to) {
-            self.log_determinant += gain.log_determinant;
-            for k in 0..3 {
-                add(&mut self.mean, residual[k], &gain.of_errors[k]);
-                add(&mut self.vector, residual[k], &gain.rows[k]);
+            let unexpected = given.predict(&gain.rows, &whitened)?;
+            let sigma = [0, 1, 2].map(|k| gain.root[(k, k)] * unexpected.root[(k, k)]);
+            let (time, kind) = (observed.time, observed.kind);
+            match judge.judge((time, kind), unexpected.whitened, sigma) {
+                Verdict::Accepted => given.update(&unexpected),
+                other => return Some(other),
             }
         }
+        self.at = to;
+        self.squares += whitened.norm_squared();
+        self.log_determinant += gain.log_determinant;
+        for k in 0..3 {
+            add(&mut self.mean, whitened[k], &gain.of_errors[k]);
+            add(&mut self.vector, whitened[k], &gain.rows[k]);
+        }
+        Some(Verdict::Accepted)
     }
 
-    pub fn outcome(self) -> Outcome {
-        let known = self.gains.known(self.at);
+    pub fn summary(self) -> Summary {
+        let known = &self.gains.course[self.at].known;
         let rows = factor(known.information, self.vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         let values = DVector::from_vec(values);
-        Outcome {
+        Summary {
             measured: matrix(&rows),
             squares: self.squares - values.norm_squared(),
             log_determinant: self.log_determinant,

@@ -1,9 +1,9 @@
-//! What filters of parts of dwells do, whatever they are told.
+//! Cache of covariances and gains of filters of parts of dwells: they do not depend on the data.
 //!
 //! Covariance and gain of a Kalman filter depend on which steps and observations follow one another, not on
 //! what is observed, and may be had beforehand (Gelb, *Applied Optimal Estimation*, §4.2). At rest they do not depend
-//! on the attitude either: East, North and Up, gravity and the Earth's rate are where they always are. So one
-//! dwell after the other goes the same course, and what belongs to it is worked out once.
+//! on the attitude either: East, North and Up, gravity and the Earth's rate are where they always are. So most
+//! dwells repeat the course of the one before.
 
 use nalgebra::Matrix3;
 
@@ -20,24 +20,19 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// Courses that parts of dwells have taken: a tree, from where all begin.
+/// The course that a part of a dwell has taken, as far as the next one repeats it.
 pub struct GainCache<const M: usize, const G: usize> {
-    models: Vec<StepModel<M>>,
-    points: Vec<Point>,
-    gains: Vec<Gain<M, G>>,
-    /// At each point. Kept apart: on a course that is known only its last one is read.
-    known: Vec<Known<M, G>>,
+    pub models: Vec<StepModel<M>>,
+    pub course: Vec<Point<M, G>>,
 }
 
 /// A point of a course.
-struct Point {
-    /// What happened since the point before it.
+pub struct Point<const M: usize, const G: usize> {
+    /// What led to it.
     event: Event,
-    /// A point that follows it, and another one that follows the point before it.
-    next: Option<usize>,
-    beside: Option<usize>,
-    /// How an observation was taken in, if that is what happened.
-    gain: Option<usize>,
+    pub known: Known<M, G>,
+    /// How an observation was taken in, if that led to it.
+    pub gain: Option<Gain<M, G>>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -72,118 +67,71 @@ pub struct Known<const M: usize, const G: usize> {
     pub information: [[f64; G]; G],
 }
 
-/// Points of a usual course: of a hundred steps with two observations each.
-const POINTS: usize = 300;
-/// So many bytes are kept before a part begins: those of some ten courses.
-const MOST: usize = 1 << 23;
-
 impl<const M: usize, const G: usize> GainCache<M, G> {
-    /// Where all begin: component `begins[k]` of `g` is the navigation error of state `k`, if any is.
+    /// Where all begin.
     pub const BEGIN: usize = 0;
 
-    pub fn new(begins: [Option<usize>; M]) -> Self {
-        let mut of_given = [[0.0; G]; M];
-        for (row, begin) in of_given.iter_mut().zip(begins) {
-            if let Some(component) = begin {
-                row[component] = 1.0;
-            }
-        }
-        let begin = Point {
-            event: Event::Begin,
-            next: None,
-            beside: None,
-            gain: None,
-        };
-        let mut known = Vec::with_capacity(POINTS);
-        known.push(Known {
-            of_given,
+    /// Component `k` of `g` is the error of the moving state `begins[k]` where a part begins.
+    pub fn new(begins: impl Iterator<Item = usize>) -> Self {
+        let mut known = Known {
+            of_given: [[0.0; G]; M],
             covariance: [[0.0; M]; M],
             information: [[0.0; G]; G],
-        });
+        };
+        for (component, state) in begins.enumerate() {
+            known.of_given[state][component] = 1.0;
+        }
         Self {
             models: Vec::new(),
-            points: vec![begin],
-            gains: Vec::with_capacity(POINTS),
-            known,
+            course: vec![Point {
+                event: Event::Begin,
+                known,
+                gain: None,
+            }],
         }
     }
 
-    /// Forgets everything where that is too much.
-    pub fn tidy(&mut self) {
-        if size_of_val(&*self.known) + size_of_val(&*self.gains) > MOST {
-            self.models.clear();
-            self.gains.clear();
-            self.points.truncate(1);
-            self.points[Self::BEGIN].next = None;
-            self.known.truncate(1);
-        }
-    }
-
-    /// The number of a model.
-    pub fn number(&mut self, model: StepModel<M>) -> usize {
-        let known = self.models.iter().position(|known| *known == model);
-        known.unwrap_or_else(|| {
-            self.models.push(model);
-            self.models.len() - 1
-        })
-    }
-
-    pub fn model(&self, number: usize) -> &StepModel<M> {
-        &self.models[number]
-    }
-
-    /// What is known at a point.
-    pub fn known(&self, point: usize) -> &Known<M, G> {
-        &self.known[point]
-    }
-
-    /// How the observation of a point was taken in.
-    pub fn gain(&self, point: usize) -> Option<&Gain<M, G>> {
-        self.points[point].gain.map(|gain| &self.gains[gain])
+    /// A part of these models begins: what was worked out with others is forgotten.
+    pub fn begin(&mut self, models: Vec<StepModel<M>>) {
+        let pairs = self.models.iter().zip(&models);
+        let alike = pairs.take_while(|(one, other)| one == other).count();
+        let other = |of: &Point<M, G>| matches!(of.event, Event::Step(model) if model >= alike);
+        let first = self.course.iter().position(other);
+        self.course.truncate(first.unwrap_or(self.course.len()));
+        self.models = models;
     }
 
     /// Where a step leads.
     pub fn step(&mut self, from: usize, model: usize) -> usize {
         let event = Event::Step(model);
-        self.reached(from, event).unwrap_or_else(|| {
-            let known = self.known[from].propagated(&self.models[model]);
-            self.known.push(known);
-            self.lead(from, event, None)
-        })
+        if !self.is_next(from, event) {
+            let known = self.course[from].known.propagated(&self.models[model]);
+            self.lead(from, event, known, None);
+        }
+        from + 1
     }
 
     /// Where it leads to take in three navigation errors from a state on, observed with this variance each; `None`
     /// where their covariance is not positive definite.
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);
-        self.reached(from, event).or_else(|| {
-            let gain = self.known[from].gain(state, variance)?;
-            self.known.extend_from_within(from..=from);
-            if let Some(known) = self.known.last_mut() {
-                known.tell(&gain);
-            }
-            self.gains.push(gain);
-            Some(self.lead(from, event, Some(self.gains.len() - 1)))
-        })
+        if !self.is_next(from, event) {
+            let mut known = self.course[from].known.clone();
+            let gain = known.gain(state, variance)?;
+            known.tell(&gain);
+            self.lead(from, event, known, Some(gain));
+        }
+        Some(from + 1)
     }
 
-    /// Where an event led before.
-    fn reached(&self, from: usize, event: Event) -> Option<usize> {
-        let beside = |&point: &usize| self.points[point].beside;
-        let mut followers = std::iter::successors(self.points[from].next, beside);
-        followers.find(|&point| self.points[point].event == event)
+    fn is_next(&self, from: usize, event: Event) -> bool {
+        let next = self.course.get(from + 1);
+        next.is_some_and(|point| point.event == event)
     }
 
-    fn lead(&mut self, from: usize, event: Event, gain: Option<usize>) -> usize {
-        let number = self.points.len();
-        let beside = self.points[from].next.replace(number);
-        self.points.push(Point {
-            event,
-            next: None,
-            beside,
-            gain,
-        });
-        number
+    fn lead(&mut self, from: usize, event: Event, known: Known<M, G>, gain: Option<Gain<M, G>>) {
+        self.course.truncate(from + 1);
+        self.course.push(Point { event, known, gain });
     }
 }
 
@@ -246,37 +194,34 @@ impl<const M: usize, const G: usize> Known<M, G> {
 mod tests {
     use super::*;
 
-    fn gains() -> GainCache<9, 12> {
-        let begins = [0, 1, 2, 3, 4, 5].map(Some);
-        let mut gains = GainCache::new(std::array::from_fn(|k| begins.get(k).copied().flatten()));
+    fn model() -> StepModel<9> {
         let mut noise = [[0.0; 9]; 9];
         (0..9).for_each(|k| noise[k][k] = 1.0 + k as f64);
         let mut transition: Vec<_> = (0..9).map(|k| (k, k, 1.0)).collect();
         transition.extend([(3, 1, -0.98), (4, 0, 0.98)]);
-        gains.number(StepModel {
+        StepModel {
             noise,
             transition,
             driven: vec![(0, 6, 0.1), (3, 9, 0.1)],
-        });
-        gains
+        }
     }
 
-    /// Through a step and an observation so many times; where each observation leads.
-    fn go(gains: &mut GainCache<9, 12>, mut at: usize, times: usize, variance: f64) -> Vec<usize> {
-        let each = (0..times).map(|_| {
+    fn gains() -> GainCache<9, 12> {
+        GainCache::new(0..6)
+    }
+
+    /// Through a step and an observation this many times; where the last one leads.
+    fn go(gains: &mut GainCache<9, 12>, from: usize, times: usize, variance: f64) -> usize {
+        (0..times).fold(from, |at, _| {
             let stepped = gains.step(at, 0);
-            at = gains
-                .observe(stepped, 3, variance)
-                .expect("it is positive definite");
-            at
-        });
-        each.collect()
+            let observed = gains.observe(stepped, 3, variance);
+            observed.expect("it is positive definite")
+        })
     }
 
     #[test]
     fn what_is_known_is_the_same_whichever_course_came_before() {
         let mut shared = gains();
-        let begin = GainCache::<9, 12>::BEGIN;
         // One course, one that branches off it, and the first again.
         for variances in [
             [(10, 0.5), (5, 0.5)],
@@ -284,13 +229,16 @@ mod tests {
             [(15, 0.5), (0, 0.0)],
         ] {
             let along = |gains: &mut GainCache<9, 12>| {
-                variances.iter().fold(begin, |at, &(times, variance)| {
-                    go(gains, at, times, variance).last().copied().unwrap_or(at)
+                gains.begin(vec![model()]);
+                let begin = GainCache::<9, 12>::BEGIN;
+                let each = variances.iter();
+                each.fold(begin, |at, &(times, variance)| {
+                    go(gains, at, times, variance)
                 })
             };
             let mut alone = gains();
             let (point, at) = (along(&mut shared), along(&mut alone));
-            let (shared, alone) = (shared.known(point), alone.known(at));
+            let (shared, alone) = (&shared.course[point].known, &alone.course[at].known);
             assert_eq!(shared.of_given, alone.of_given);
             assert_eq!(shared.covariance, alone.covariance);
             assert_eq!(shared.information, alone.information);

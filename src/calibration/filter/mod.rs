@@ -1,32 +1,28 @@
 //! The Kalman filter over what moves or is drawn anew. What constants do to it are columns that it carries.
 
-pub mod columns;
-pub mod dwell_filter;
-pub mod gain_cache;
-pub mod input_prior;
-pub mod linear;
-pub mod measurement;
-pub mod rows;
-
-mod dwell_filters;
-mod dwell_update;
+mod at_rest;
+mod columns;
+mod dwell;
+mod dwell_filter;
+mod gain_cache;
+mod gate;
+mod input_prior;
 mod propagation;
-mod step_at_rest;
+mod rows;
 mod update;
 
-pub use dwell_filters::DwellFilters;
-pub use dwell_update::{Innovations, ObservationJudge, Taken, Verdict};
+pub use dwell::{DwellFilters, Taken, dwell_filters};
+pub use gate::{Gate, Judge};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::attitude::skew;
-use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::constants::{Constant, DisturbanceKind};
-use crate::calibration::layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::Start;
-use crate::calibration::model::Model;
-use crate::calibration::record::segment::between;
-use crate::calibration::several::day_to_day::{DayToDay, Difference, Turned};
+use crate::calibration::record::between;
+use crate::calibration::several::day_to_day::Turned;
+use crate::calibration::{
+    ATTITUDE, Constant, Difference, DisturbanceKind, Layout, Model, NAVIGATION, POSITION, VELOCITY,
+};
 use crate::imu::PerSensor;
 use crate::navigation::{ProcessNoise, State};
 use columns::Columns;
@@ -35,22 +31,18 @@ use columns::Columns;
 #[derive(Debug, Clone)]
 pub struct Filter {
     pub layout: Layout,
-    x: DVector<f64>,
-    p: DMatrix<f64>,
+    pub x: DVector<f64>,
+    pub p: DMatrix<f64>,
+    model: Model,
     noise: PerSensor<ProcessNoise>,
-    /// Of the turn at rest alone, rad/√s.
-    rotation_at_rest: f64,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-    day_to_day: DayToDay,
     /// What the mounting of the recording does to the parameters, where it has its own.
     turned: Option<Turned>,
     /// What constants do.
     pub columns: Columns,
     /// Number of dwells that have begun.
     dwells: usize,
-    /// The source whose variance is multiplied, and by what, see [`Model::weight`].
-    varied: Option<(BudgetSource, f64)>,
 }
 
 /// What a stretch begins after.
@@ -66,24 +58,24 @@ impl Filter {
     /// Before the first stretch begins, of recordings with one gravity or with more.
     pub fn new(model: &Model, one_gravity: bool) -> Self {
         let layout = Layout::new(model, one_gravity);
-        let n = layout.size();
-        let varying = layout.varying_biases().filter_map(|(state, sensor, _)| {
-            let variation = model.noise.get(sensor).gauss_markov?;
-            Some((state, variation.sigma, variation.correlation_time))
-        });
+        let n = layout.sources.len();
+        let varying = layout
+            .varying_biases
+            .iter()
+            .filter_map(|&(state, sensor, _)| {
+                let variation = model.noise.get(sensor).gauss_markov?;
+                Some((state, variation.sigma, variation.correlation_time))
+            });
         Self {
             varying: varying.collect(),
-            columns: Columns::new(layout.constants().len(), n),
+            columns: Columns::new(layout.constants.len(), n),
             layout,
             x: DVector::zeros(n),
             p: DMatrix::zeros(n, n),
-            rotation_at_rest: model.turning_at_rest
-                * model.weight(BudgetSource::RotationAtRest).sqrt(),
             noise: model.process_noise(),
-            day_to_day: model.day_to_day,
+            model: model.clone(),
             turned: None,
             dwells: 0,
-            varied: model.varied,
         }
     }
 
@@ -91,32 +83,24 @@ impl Filter {
     /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
     /// 4th ed., §3.8) does, too, and what is of the recording; in the same one it has gone on meanwhile. `gravity` is
     /// its 1σ at another site.
-    pub fn begin(&mut self, start: &Start, table_sigma: f64, since: Since, gravity: Option<f64>) {
-        let initial = self.layout.initial_attitude();
-        for axis in 0..3 {
-            for (first, mean, sigma) in [
-                (ATTITUDE, start.attitude[axis], start.attitude_sigma[axis]),
-                (VELOCITY, 0.0, start.velocity_sigma),
-                (POSITION, 0.0, start.position_sigma),
-                (initial, start.attitude[axis], start.attitude_sigma[axis]),
-            ] {
-                self.redraw(first + axis, mean, sigma);
-            }
-        }
+    pub fn begin(&mut self, start: &Start, since: Since, gravity: Option<f64>) {
+        let initial = self.layout.initial_attitude;
+        let (still, level) = (Vector3::zeros(), (&start.attitude, &start.attitude_sigma));
+        self.redraw_three(ATTITUDE, level);
+        self.redraw_three(VELOCITY, (&still, &Vector3::repeat(start.velocity_sigma)));
+        self.redraw_three(POSITION, (&still, &Vector3::repeat(start.position_sigma)));
+        self.redraw_three(initial, level);
         for axis in 0..3 {
             // φ starts as φ₀: fully correlated.
             let variance = self.p[(initial + axis, initial + axis)];
             self.p[(ATTITUDE + axis, initial + axis)] = variance;
             self.p[(initial + axis, ATTITUDE + axis)] = variance;
         }
-        self.redraw_table(table_sigma);
-        if let Some(first) = self.layout.earth_rate() {
-            for axis in 0..3 {
-                let (mean, sigma) = (start.earth_rate[axis], start.earth_rate_sigma[axis]);
-                self.redraw(first + axis, mean, sigma);
-            }
+        self.redraw_table();
+        if let Some(first) = self.layout.earth_rate {
+            self.redraw_three(first, (&start.earth_rate, &start.earth_rate_sigma));
         }
-        if let Some((state, sigma)) = self.layout.gravity().zip(gravity) {
+        if let Some((state, sigma)) = self.layout.gravity.zip(gravity) {
             self.redraw(state, 0.0, sigma);
         }
         match since {
@@ -127,17 +111,22 @@ impl Filter {
                     let (state, sigma, _) = self.varying[k];
                     self.redraw(state, 0.0, sigma);
                 }
-                for (state, own) in self.layout.own().collect::<Vec<_>>() {
-                    self.redraw(state, -at.get(own), self.day_to_day.of(own));
+                for (state, own) in self.layout.own.clone() {
+                    self.redraw(state, -at.get(own), self.model.day_to_day.of(own));
                 }
             }
         }
     }
 
+    /// Forgets three states, given means and 1σ of their errors.
+    fn redraw_three(&mut self, first: usize, (mean, sigma): (&Vector3<f64>, &Vector3<f64>)) {
+        (0..3).for_each(|axis| self.redraw(first + axis, mean[axis], sigma[axis]));
+    }
+
     /// Forgets a state: its error is drawn anew, independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
-        self.columns.redraw(state);
+        self.columns.of_states.column_mut(state).fill(0.0);
         self.p.row_mut(state).fill(0.0);
         self.p.column_mut(state).fill(0.0);
         self.p[(state, state)] = sigma.powi(2) * self.weight_of(state);
@@ -145,15 +134,13 @@ impl Filter {
 
     /// What the variance of the source that draws a state is multiplied by.
     fn weight_of(&self, state: usize) -> f64 {
-        let varied = self
-            .varied
-            .filter(|&(varied, _)| varied == self.layout.source(state));
-        varied.map_or(1.0, |(_, factor)| factor)
+        self.model.weight(self.layout.sources[state])
     }
 
     /// The table has left its position: its error is drawn anew.
-    pub fn redraw_table(&mut self, sigma: f64) {
-        if let Some(table) = self.layout.table_position() {
+    pub fn redraw_table(&mut self) {
+        if let Some(table) = self.layout.table_position {
+            let sigma = self.model.position_sigma;
             (table..table + 3).for_each(|state| self.redraw(state, 0.0, sigma));
         }
     }
@@ -165,7 +152,7 @@ impl Filter {
 
     /// A dwell begins.
     pub fn begin_dwell(&mut self) {
-        for (k, constant) in self.layout.constants().iter().enumerate() {
+        for (k, constant) in self.layout.constants.iter().enumerate() {
             if let Constant::Disturbance(of, component) = constant
                 && (of.kind, of.dwell) == (DisturbanceKind::Slip, self.dwells)
             {
@@ -182,7 +169,7 @@ impl Filter {
 
     /// The body does not turn from now on: what the computed attitude does is an error.
     pub fn begin_to_hold(&mut self) {
-        if let Some(turn) = self.layout.turn_at_rest() {
+        if let Some(turn) = self.layout.turn_at_rest {
             (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));
         }
     }
@@ -201,10 +188,10 @@ impl Filter {
             let x = turn * self.x.fixed_rows::<3>(ATTITUDE);
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += x;
-            for row in 0..3 {
-                let turned = (0..3).map(|k| (ATTITUDE + k, turn[(row, k)]));
-                self.columns.add(first + row, turned);
-            }
+            let by_attitude = self.columns.of_states.fixed_columns::<3>(ATTITUDE);
+            let columns = by_attitude * turn.transpose();
+            let mut of_error = self.columns.of_states.fixed_columns_mut::<3>(first);
+            of_error += columns;
             let rows = turn * self.p.fixed_rows::<3>(ATTITUDE);
             let mut of_error = self.p.fixed_rows_mut::<3>(first);
             of_error += rows;
@@ -217,22 +204,12 @@ impl Filter {
     /// Refers the navigation errors to another computed state of the same moment.
     pub fn refer(&mut self, from: &State, to: &State) {
         let by = between(from, to);
-        let turn = self.layout.turn_at_rest();
+        let turn = self.layout.turn_at_rest;
         let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
         for (first, by) in firsts.chain(turn.map(|turn| (turn, by[0]))) {
             let mut error = self.x.fixed_rows_mut::<3>(first);
             error += by;
         }
-    }
-
-    /// Mean of a state's error.
-    pub fn mean(&self, state: usize) -> f64 {
-        self.x[state]
-    }
-
-    /// Covariance of two states' errors.
-    pub fn covariance(&self, one: usize, other: usize) -> f64 {
-        self.p[(one, other)]
     }
 }
 

@@ -4,46 +4,44 @@ use nalgebra::DMatrix;
 
 use super::Filter;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::constants::{Constant, DisturbanceKind};
-use crate::calibration::layout::{ATTITUDE, NAVIGATION, VELOCITY};
-use crate::calibration::parameters::{ParameterVector, parameter, sensor_and_parameter};
 use crate::calibration::several::day_to_day::OwnState;
+use crate::calibration::{
+    ATTITUDE, Constant, DisturbanceKind, NAVIGATION, ParameterVector, VELOCITY, parameter,
+    sensor_and_parameter,
+};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix};
 
 impl Filter {
-    /// Carries mean and covariance over a block.
+    /// Carries mean and covariance over a block of a move.
     pub fn propagate(&mut self, block: &Block) {
-        match self.layout.turn_at_rest() {
-            Some(_) => self.propagate_with::<{ NAVIGATION + 3 }>(block),
-            None => self.propagate_with::<NAVIGATION>(block),
-        }
+        let moving = self.moving_in_moves();
+        let count = moving.len();
+        let of_block = (&self.noise_of(block), block.duration);
+        let noise = DMatrix::from_fn(count, count, |row, column| {
+            self.noise_of_moving(of_block, row, column)
+        });
+        let driving = self.driving_columns(block);
+        let transition =
+            DMatrix::from_fn(
+                count,
+                driving.len() + count - NAVIGATION,
+                |row, k| match driving.get(k) {
+                    Some(column) => of_moving(column, row, k),
+                    None => f64::from(moving[row] == k),
+                },
+            );
+        let constants: Vec<_> = self.constant_effects(block).collect();
+        let added = DMatrix::from_fn(constants.len(), count, |k, place| constants[k][own(place)]);
+        self.carry(&moving, transition, &noise, &added);
         self.vary(block.duration);
     }
 
-    /// Navigation errors move and, where there is one, the turn at rest.
-    fn propagate_with<const MOVING: usize>(&mut self, block: &Block) {
-        let turn = self.layout.turn_at_rest();
+    /// The states that a move drives: navigation errors and, where there is one, the turn at rest.
+    pub fn moving_in_moves(&self) -> Vec<usize> {
+        let turn = self.layout.turn_at_rest;
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
-        let moving: Vec<usize> = (0..NAVIGATION).chain(turn).collect();
-        // The turn does what the attitude does.
-        let own = |place: usize| match place.checked_sub(NAVIGATION) {
-            Some(axis) => ATTITUDE + axis,
-            None => place,
-        };
-        let noise = self.noise_of_move::<MOVING>(block);
-        let driving = self.driving_columns(block);
-        let transition = DMatrix::from_fn(MOVING, driving.len() + MOVING - NAVIGATION, |row, k| {
-            match (driving.get(k), row < NAVIGATION) {
-                (Some(column), true) => column[row],
-                // By as much as the attitude error has changed.
-                (Some(column), false) => column[own(row)] - f64::from(own(row) == k),
-                (None, _) => f64::from(moving[row] == k),
-            }
-        });
-        let constants: Vec<_> = self.constant_effects(block).collect();
-        let added = DMatrix::from_fn(constants.len(), MOVING, |k, place| constants[k][own(place)]);
-        self.carry(&moving, transition, &noise, &added);
+        (0..NAVIGATION).chain(turn).collect()
     }
 
     /// Only the rows of Φ of the states that move differ from identity. Of `Φ P Φᵀ + Q` only their rows and
@@ -70,33 +68,35 @@ impl Filter {
                 self.p[(at_row, at_column)] = corner[(row, column)];
             }
         }
-        self.columns.propagate(moving, &transition, added);
+        let u = &mut self.columns.of_states;
+        let moved = u.columns(0, first) * transition.transpose() + added;
+        for (&state, column) in moving.iter().zip(moved.column_iter()) {
+            u.column_mut(state).copy_from(&column);
+        }
     }
 
     /// Covariance that a block adds to the navigation errors.
     pub fn noise_of(&self, block: &Block) -> ErrorMatrix {
         let mut noise = block.noise.covariance(&self.noise);
         // Of interpolated samples alone, which no density scales.
-        if let Some((BudgetSource::Interpolated, factor)) = self.varied {
+        if let Some((BudgetSource::Interpolated, factor)) = self.model.varied {
             noise += block.noise.covariance(&PerSensor::default()) * (factor - 1.0);
         }
         noise
     }
 
-    /// Covariance that a block of a move adds to the states that move: navigation errors and, where there is
-    /// one, the turn at rest.
-    fn noise_of_move<const MOVING: usize>(&self, block: &Block) -> DMatrix<f64> {
-        // The turn has the noise of the attitude, and its own.
-        let own = |place: usize| match place.checked_sub(NAVIGATION) {
-            Some(axis) => ATTITUDE + axis,
-            None => place,
-        };
-        let of_navigation = self.noise_of(block);
-        DMatrix::from_fn(MOVING, MOVING, |row, column| {
-            let alone = row == column && row >= NAVIGATION;
-            let turning = self.rotation_at_rest.powi(2) * block.duration;
-            of_navigation[(own(row), own(column))] + if alone { turning } else { 0.0 }
-        })
+    /// Covariance that a block adds to two of the states that move, given what it adds to navigation errors and its
+    /// duration: the turn has the noise of the attitude, and its own.
+    pub fn noise_of_moving(
+        &self,
+        (of_navigation, duration): (&ErrorMatrix, f64),
+        row: usize,
+        column: usize,
+    ) -> f64 {
+        let alone = f64::from(row == column && row >= NAVIGATION);
+        let weight = self.model.weight(BudgetSource::RotationAtRest);
+        let turning = self.model.turning_at_rest.powi(2) * weight * duration;
+        of_navigation[(own(row), own(column))] + alone * turning
     }
 
     /// What navigation errors, and each state that drives them, make of the navigation errors.
@@ -104,16 +104,14 @@ impl Filter {
         let layout = &self.layout;
         let navigation = block.navigation.column_iter();
         let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
-        let gravity = layout.gravity().map(|_| Constant::Gravity);
+        let gravity = layout.gravity.map(|_| Constant::Gravity);
         let gravity = gravity.map(|gravity| self.effect(block, gravity));
-        let earth_rate = layout.earth_rate().into_iter().flat_map(|_| 0..3);
+        let earth_rate = layout.earth_rate.into_iter().flat_map(|_| 0..3);
         let earth_rate = earth_rate.map(|axis| of_earth_rate(block, axis));
         // A bias does the same whether it varies or stays.
-        let varying = layout.varying_biases().map(|(_, sensor, constant)| {
-            let columns = block.parameters.get(sensor);
-            std::array::from_fn(|row| columns[(row, constant)])
-        });
-        let own = layout.own().map(|(_, own)| match own {
+        let varying = layout.varying_biases.iter();
+        let varying = varying.map(|&(_, sensor, constant)| effect_of(block, sensor, constant));
+        let own = layout.own.iter().map(|&(_, own)| match own {
             OwnState::Parameter(index) => self.effect(block, Constant::Parameter(index)),
             OwnState::Mounting(axis) => {
                 let turned = self.turned.as_ref();
@@ -134,7 +132,7 @@ impl Filter {
         &'a self,
         block: &'a Block,
     ) -> impl Iterator<Item = [f64; NAVIGATION]> + 'a {
-        let constants = self.layout.constants().iter();
+        let constants = self.layout.constants.iter();
         constants.map(|&constant| self.effect(block, constant))
     }
 
@@ -147,8 +145,7 @@ impl Filter {
                 }
                 None => {
                     let (sensor, parameter) = sensor_and_parameter(index);
-                    let columns = block.parameters.get(sensor);
-                    std::array::from_fn(|row| columns[(row, parameter)])
+                    effect_of(block, sensor, parameter)
                 }
             },
             Constant::Term(index) => {
@@ -160,8 +157,7 @@ impl Filter {
             Constant::Thermal(coefficient) => {
                 let weight = block.thermal.as_ref();
                 let weight = weight.map_or(0.0, |state| coefficient.weight(state));
-                let columns = block.parameters.get(coefficient.sensor);
-                std::array::from_fn(|row| columns[(row, coefficient.parameter)] * weight)
+                effect_of(block, coefficient.sensor, coefficient.parameter).map(|by| by * weight)
             }
             Constant::Gravity => std::array::from_fn(|row| block.gravity[row]),
             Constant::Disturbance(of, component) => match of.kind {
@@ -184,13 +180,33 @@ impl Filter {
             let (state, sigma, correlation_time) = self.varying[k];
             let keep = (-duration / correlation_time).exp();
             self.x[state] *= keep;
-            self.columns.scale(state, keep);
+            self.columns.of_states.column_mut(state).scale_mut(keep);
             self.p.row_mut(state).scale_mut(keep);
             self.p.column_mut(state).scale_mut(keep);
             let driven = sigma.powi(2) * self.weight_of(state);
             self.p[(state, state)] += driven * (1.0 - keep * keep);
         }
     }
+}
+
+/// Which navigation error a state that moves follows: the turn at rest does what the attitude does.
+pub fn own(place: usize) -> usize {
+    match place.checked_sub(NAVIGATION) {
+        Some(axis) => ATTITUDE + axis,
+        None => place,
+    }
+}
+
+/// What a state `k` with this column of effects on the navigation errors makes of a state that moves; of the turn at
+/// rest as much as the attitude error has changed.
+pub fn of_moving(column: &[f64; NAVIGATION], row: usize, k: usize) -> f64 {
+    column[own(row)] - f64::from(row >= NAVIGATION && own(row) == k)
+}
+
+/// What a parameter of a triad makes of the navigation errors.
+pub fn effect_of(block: &Block, sensor: Sensor, parameter: usize) -> [f64; NAVIGATION] {
+    let columns = block.parameters.get(sensor);
+    std::array::from_fn(|row| columns[(row, parameter)])
 }
 
 /// What a change of Earth rate along East, North or Up makes of the navigation errors.

@@ -1,28 +1,53 @@
-//! Measurements.
+//! Measurements, linear in the errors.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::Filter;
-use super::linear::Linear;
-use super::measurement::Measurement;
+use crate::calibration::POSITION;
+use crate::navigation::State;
 
-impl Filter {
-    /// So many quantities that no error does anything to.
-    pub fn none(&self, rows: usize) -> Linear {
-        Linear::zeros(rows, self.x.len(), self.layout.constants().len())
+/// Quantities that are linear in the errors, a row each: by state, and by constant that is no state.
+#[derive(Debug)]
+pub struct Linear {
+    pub states: DMatrix<f64>,
+    pub columns: DMatrix<f64>,
+}
+
+impl Linear {
+    /// Combinations of them, a row of weights each.
+    pub fn combined(&self, weights: &DMatrix<f64>) -> Self {
+        Self {
+            states: weights * &self.states,
+            columns: weights * &self.columns,
+        }
     }
 
-    /// Takes in a measurement.
-    pub fn update(&mut self, measurement: &Measurement) {
-        let mut h = self.none(measurement.rows.len());
-        for (row, of_row) in measurement.rows.iter().enumerate() {
-            for &(state, weight) in of_row {
-                h.states[(row, state)] = weight;
-            }
+    /// The rows from a first on become more by others.
+    pub fn add(&mut self, first: usize, others: &Self) {
+        let count = others.states.nrows();
+        let mut rows = self.states.rows_mut(first, count);
+        rows += &others.states;
+        let mut rows = self.columns.rows_mut(first, count);
+        rows += &others.columns;
+    }
+}
+
+impl Filter {
+    /// This many quantities that no error does anything to.
+    pub fn none(&self, rows: usize) -> Linear {
+        Linear {
+            states: DMatrix::zeros(rows, self.x.len()),
+            columns: DMatrix::zeros(rows, self.layout.constants.len()),
         }
-        let z = DVector::from_column_slice(measurement.residual.as_slice());
+    }
+
+    /// Takes in the site's position, `z = δp`, known to this variance per axis.
+    pub fn update_position(&mut self, computed: &State, variance: f64) {
+        let mut h = self.none(3);
+        (0..3).for_each(|axis| h.states[(axis, POSITION + axis)] = 1.0);
         let across = &h.states * &self.p;
-        self.take((&h, across), &z, measurement.variance);
+        let z = DVector::from_column_slice(computed.position.as_slice());
+        self.take((&h, across), &z, variance);
     }
 
     /// Takes in measurements `z = H x + v`, v white of variance R each, given H and H P, in Joseph's form, which

@@ -3,12 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::likelihood_ratio::{INTERVAL, limit};
-use super::report::{NoiseReport, SourceFigures};
+use super::report::{NoiseReport, SourceFigures, noise_learnt};
 use super::source::Source;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::noise_learnt::noise_learnt;
-use crate::calibration::model::Model;
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, Model, Problem};
 use crate::statistics::FALSE_ALARM;
 
 /// Longest step of ln of a variance.
@@ -132,20 +129,13 @@ impl ByHand {
     /// What became of the noise of a problem with it.
     pub fn report(&self, problem: &Problem) -> NoiseReport {
         let figures = |one: &Found| {
-            let source = BY_HAND[one.place];
-            let (unit, value) = source.unit();
-            let stated = source.sigma(problem);
-            let used = stated.hypot(one.variance.sqrt()) / value;
+            let stated = BY_HAND[one.place].sigma(problem);
+            let used = stated.hypot(one.variance.sqrt());
             // Of σ, half as wide as of its square.
             let off = 0.5 * INTERVAL * one.spread;
-            SourceFigures {
-                source,
-                name: source.name().to_owned(),
-                unit: unit.to_owned(),
-                stated: (stated > 0.0).then_some(stated / value),
-                used,
-                interval: Some([-off, off].map(|off| used * off.exp())),
-            }
+            let interval = [-off, off].map(|off| used * off.exp());
+            let stated = (stated > 0.0).then_some(stated);
+            SourceFigures::new(BY_HAND[one.place], stated, used, Some(interval))
         };
         NoiseReport {
             policy: problem.options.noise,

@@ -10,9 +10,7 @@ use rayon::prelude::*;
 
 use super::factors::{Factors, SOURCES, Scale};
 use super::likelihood_ratio::limit;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::problem::Problem;
-use crate::calibration::reduction::{Replay, Script};
+use crate::calibration::{CalibrationError, Gate, Innovation, PassResult, Problem, Script, pass};
 
 /// 1σ of ln σ of a stated figure before the data: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
@@ -46,7 +44,7 @@ pub struct Likelihood<'a> {
 /// A point with gradient and expected information of −½ of the deviance, by ln σ of a factor that is
 /// above zero, else by its variance over its reference.
 pub struct Slope {
-    pub here: Replay,
+    pub here: PassResult,
     pub score: DVector<f64>,
     pub information: DMatrix<f64>,
 }
@@ -62,21 +60,16 @@ pub struct Fit {
 }
 
 impl Likelihood<'_> {
-    pub fn replay(&self, factors: &Factors) -> Result<Replay, CalibrationError> {
+    pub fn replay(&self, factors: &Factors) -> Result<PassResult, CalibrationError> {
         let model = self.scale.apply(factors, &self.problem.model);
         let problem = self.problem.with_model(model);
-        self.script.replay(&problem, &self.accepted)
+        pass(&problem, self.script, Gate::As(&self.accepted))
     }
 
-    /// Score and information by these sources, from one replay more than there are.
-    pub fn slope(&self, factors: &Factors, sources: &[usize]) -> Result<Slope, CalibrationError> {
-        self.slope_from(self.replay(factors)?, factors, sources)
-    }
-
-    /// The same where the replay at the point is known.
-    fn slope_from(
+    /// Score and information by these sources from a replay at a point, from as many replays more as there are sources.
+    pub fn slope(
         &self,
-        here: Replay,
+        here: PassResult,
         factors: &Factors,
         sources: &[usize],
     ) -> Result<Slope, CalibrationError> {
@@ -87,26 +80,18 @@ impl Likelihood<'_> {
                 v => v * (2.0 * DIFFERENCE).exp(),
             };
             let there = self.replay(&moved)?;
-            let pairs = here.scalars.iter().zip(&there.scalars);
-            // Of ln of the variance, and of the innovation over σ.
-            Ok(pairs
-                .map(|(here, there)| {
-                    let variance = (there.variance / here.variance).ln() / DIFFERENCE;
-                    let change = there.innovation - here.innovation;
-                    (variance, change / (DIFFERENCE * here.variance.sqrt()))
-                })
-                .collect())
+            Ok(differences(&here, &there))
         });
         let differences: Vec<Vec<(f64, f64)>> =
             differences.collect::<Result<_, CalibrationError>>()?;
         let n = sources.len();
         let score = DVector::from_fn(n, |i, _| {
-            let each = here.scalars.iter().zip(&differences[i]);
-            each.map(|(scalar, (variance, innovation))| {
-                let whitened = scalar.innovation / scalar.variance.sqrt();
-                0.5 * variance * (whitened.powi(2) - 1.0) - whitened * innovation
-            })
-            .sum()
+            let each = here.let_in().flat_map(|of| of.whitened);
+            each.zip(&differences[i])
+                .map(|(whitened, (variance, innovation))| {
+                    0.5 * variance * (whitened.powi(2) - 1.0) - whitened * innovation
+                })
+                .sum()
         });
         let information = DMatrix::from_fn(n, n, |i, j| {
             let each = differences[i].iter().zip(&differences[j]);
@@ -121,7 +106,7 @@ impl Likelihood<'_> {
 
     /// Twice what the prior of stated figures takes off ln of the likelihood.
     fn penalty(&self, factors: &Factors) -> f64 {
-        let stated = (0..SOURCES).filter(|&k| self.scale.is_stated(k));
+        let stated = (0..SOURCES).filter(|&k| self.scale.stated[k]);
         stated
             .map(|k| (0.5 * factors.0[k].ln() / LOG_SIGMA).powi(2))
             .sum()
@@ -131,11 +116,11 @@ impl Likelihood<'_> {
     /// stated where the score of no source is beyond chance.
     pub fn fit(&self, before: Option<&Fit>) -> Result<Fit, CalibrationError> {
         let present = self.scale.present();
-        let stated = self.scale.initial();
+        let stated = self.scale.initial;
         let start = match before {
             Some(before) => before.factors,
             None => {
-                let slope = self.slope(&stated, &present)?;
+                let slope = self.slope(self.replay(&stated)?, &stated, &present)?;
                 if !self.is_called_for(&slope, &stated, &present) {
                     return Ok(Fit {
                         factors: stated,
@@ -174,13 +159,13 @@ impl Likelihood<'_> {
         let at = *factors;
         let above_zero = sources.iter().copied().filter(|&k| at.0[k] > 0.0);
         let mut left: Vec<usize> = above_zero.collect();
-        let slope = self.slope(&at, &left)?;
-        let (_, information) = self.posterior(&slope, &at, &left);
-        let Some(inverse) = information.cholesky().map(|root| root.inverse()) else {
+        let slope = self.slope(self.replay(&at)?, &at, &left)?;
+        let slope = slope.with_prior(self.scale, &at, &left);
+        let Some(inverse) = slope.information.cholesky().map(|root| root.inverse()) else {
             return Ok(left);
         };
         // How far each variance is from what is stated, in itself; 1σ of one is twice that of ln σ.
-        let stated = |k: usize| self.scale.is_stated(k);
+        let stated = |k: usize| self.scale.stated[k];
         let mut values = DVector::from_fn(left.len(), |i, _| match stated(left[i]) {
             true => at.0[left[i]].ln(),
             false => 1.0,
@@ -191,10 +176,10 @@ impl Likelihood<'_> {
             // Over its limit.
             let part = |i: &usize| {
                 let stated = stated(left[*i]);
-                let value = if stated {
+                let value = if stated || values[*i] > 0.0 {
                     values[*i]
                 } else {
-                    values[*i].max(0.0)
+                    0.0
                 };
                 value.powi(2) / covariance[(*i, *i)] / limits[usize::from(stated)]
             };
@@ -214,14 +199,15 @@ impl Likelihood<'_> {
         }
     }
 
-    /// Whether the score of any source is beyond chance.
+    /// Whether the score of any source is beyond chance; where a variance is zero and would fall it is not.
     fn is_called_for(&self, slope: &Slope, stated: &Factors, present: &[usize]) -> bool {
-        let beyond = (0..present.len()).filter(|&i| {
-            let one_sided = usize::from(stated.0[present[i]] == 0.0);
+        present.iter().enumerate().any(|(i, &k)| {
+            let one_sided = usize::from(stated.0[k] == 0.0);
             let limit = limit(1 - one_sided, one_sided, SCREEN / present.len() as f64);
-            slope.statistic(i, one_sided == 1) > limit
-        });
-        beyond.count() > 0
+            let (score, information) = (slope.score[i], slope.information[(i, i)]);
+            let rises = score > 0.0 || one_sided == 0;
+            rises && information > 0.0 && score.powi(2) / information > limit
+        })
     }
 
     /// The factors of largest posterior density of these sources, the others held, and −2 ln of the likelihood there.
@@ -241,16 +227,14 @@ impl Likelihood<'_> {
         for _ in 0..STEPS {
             let moving = sources.iter().filter(|k| !resting.contains(k));
             let moving: Vec<usize> = moving.copied().collect();
-            let slope = self.slope_from(here, &at, &moving)?;
+            let slope = self.slope(here, &at, &moving)?;
+            let slope = slope.with_prior(self.scale, &at, &moving);
             let cost = deviance + self.penalty(&at);
-            let (gradient, information) = self.posterior(&slope, &at, &moving);
             let (free, rests): (Vec<usize>, Vec<usize>) =
-                (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || gradient[i] > 0.0);
+                (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || slope.score[i] > 0.0);
             resting.extend(rests.iter().map(|&i| moving[i]));
-            let of_free = DVector::from_fn(free.len(), |i, _| gradient[free[i]]);
-            let information = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-                information[(free[i], free[j])]
-            });
+            let of_free = slope.score.select_rows(&free);
+            let information = slope.information.select_rows(&free).select_columns(&free);
             let Some(step) = solve(information, &of_free) else {
                 break;
             };
@@ -273,23 +257,6 @@ impl Likelihood<'_> {
         Ok((at, deviance))
     }
 
-    /// Score and information with those of the prior.
-    fn posterior(
-        &self,
-        slope: &Slope,
-        at: &Factors,
-        sources: &[usize],
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let (mut score, mut information) = (slope.score.clone(), slope.information.clone());
-        for (i, &k) in sources.iter().enumerate() {
-            if self.scale.is_stated(k) {
-                score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
-                information[(i, i)] += LOG_SIGMA.powi(-2);
-            }
-        }
-        (score, information)
-    }
-
     /// The point at the longest fraction of a step that lowers the cost; none if none does.
     fn shortened(
         &self,
@@ -297,7 +264,7 @@ impl Likelihood<'_> {
         free: &[usize],
         step: &DVector<f64>,
         cost: f64,
-    ) -> Option<(Factors, Replay)> {
+    ) -> Option<(Factors, PassResult)> {
         let mut fraction = 1.0;
         while fraction > SHORTEST {
             let mut there = *at;
@@ -305,7 +272,7 @@ impl Likelihood<'_> {
                 let v = &mut there.0[k];
                 if *v > 0.0 {
                     *v *= (2.0 * (fraction * step).clamp(-LONGEST, LONGEST)).exp();
-                    if *v < NOTHING && !self.scale.is_stated(k) {
+                    if *v < NOTHING && !self.scale.stated[k] {
                         *v = 0.0;
                     }
                 } else if *step > 0.0 {
@@ -330,14 +297,26 @@ impl Likelihood<'_> {
         factors: &Factors,
         sources: &[usize],
     ) -> Result<Vec<Option<f64>>, CalibrationError> {
-        let slope = self.slope(factors, sources)?;
-        let (_, information) = self.posterior(&slope, factors, sources);
+        let slope = self.slope(self.replay(factors)?, factors, sources)?;
+        let slope = slope.with_prior(self.scale, factors, sources);
         // None where the data do not show all of them.
-        let covariance = information.cholesky().map(|factor| factor.inverse());
-        Ok((0..sources.len())
-            .map(|i| Some(covariance.as_ref()?[(i, i)].sqrt()))
-            .collect())
+        let covariance = slope.information.cholesky().map(|root| root.inverse());
+        let sigma = |i: usize| covariance.as_ref().map(|of| of[(i, i)].sqrt());
+        Ok((0..sources.len()).map(sigma).collect())
     }
+}
+
+/// Of each scalar that was let in, what changes between two passes over the step of a factor: ln of its variance, and
+/// the innovation over its σ.
+fn differences(here: &PassResult, there: &PassResult) -> Vec<(f64, f64)> {
+    let scalars = |of: &Innovation| [0, 1, 2].map(|k| (of.whitened[k], of.sigma[k]));
+    let here = here.let_in().flat_map(scalars);
+    let pairs = here.zip(there.let_in().flat_map(scalars));
+    let each = pairs.map(|((one, sigma), (other, there))| {
+        let change = other * (there / sigma) - one;
+        (2.0 * (there / sigma).ln() / DIFFERENCE, change / DIFFERENCE)
+    });
+    each.collect()
 }
 
 /// The solution of `information · step = score`; a direction of no information takes no step.
@@ -349,12 +328,16 @@ fn solve(mut information: DMatrix<f64>, score: &DVector<f64>) -> Option<DVector<
 }
 
 impl Slope {
-    /// Score statistic of one factor; zero where a variance at zero would fall.
-    fn statistic(&self, factor: usize, bounded: bool) -> f64 {
-        let (score, information) = (self.score[factor], self.information[(factor, factor)]);
-        match information > 0.0 && (score > 0.0 || !bounded) {
-            true => score.powi(2) / information,
-            false => 0.0,
+    /// With the prior of what is stated.
+    fn with_prior(mut self, scale: &Scale, at: &Factors, sources: &[usize]) -> Self {
+        for (i, &k) in sources
+            .iter()
+            .enumerate()
+            .filter(|(_, k)| scale.stated[**k])
+        {
+            self.score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
+            self.information[(i, i)] += LOG_SIGMA.powi(-2);
         }
+        self
     }
 }

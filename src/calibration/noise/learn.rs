@@ -6,14 +6,10 @@ use super::likelihood_ratio::{INTERVAL, limit};
 use super::policy::NoisePolicy;
 use super::report::{NoiseReport, NoiseTest, SourceFigures};
 use super::source::Source;
-use crate::calibration::checks::innovation::Observation;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::gauss_newton::{Progress, iterate};
-use crate::calibration::pass::Gate;
-use crate::calibration::problem::Problem;
-use crate::calibration::record::schedule::Step;
-use crate::calibration::reduction::Script;
-use crate::calibration::solved::Solved;
+use crate::calibration::{
+    CalibrationError, Gate, Innovation, Observation, Problem, Progress, Script, Solved, iterate,
+    pass,
+};
 use crate::statistics::FALSE_ALARM;
 
 /// Points of linearisation at most.
@@ -38,23 +34,31 @@ pub fn learn<'a>(
     if policy == NoisePolicy::Stated {
         return Ok(solved);
     }
-    let model = solved.problem.model.with_noise_of(&as_stated.model);
-    let as_stated = solved.problem.with_model(model);
+    let as_stated = solved
+        .problem
+        .with(|model| *model = model.with_noise_of(&as_stated.model));
     let accepted = solved.iterated.held.accepted();
-    let thinned = Thinned::new(&as_stated, (accepted.len() / ENOUGH).clamp(1, LONGEST));
-    let script = Script::new(&thinned.problem, &solved.priors, &solved.iterated.estimate)?;
+    // Few observations tell whether noise is called for at all; the first after each move is among them.
+    let steps = (accepted.len() / ENOUGH).clamp(1, LONGEST);
+    let thinned = as_stated.observed_every(steps);
+    let script = Script::new(&thinned, &solved.priors, &solved.iterated.estimate)?;
     let scale = Scale::new(&as_stated, &script.moves());
-    let likelihood = thinned.likelihood(&script, &scale, &accepted);
+    let likelihood = Likelihood {
+        problem: &thinned,
+        script: &script,
+        scale: &scale,
+        accepted: taken_together(&as_stated, &accepted, steps),
+    };
     let fit = likelihood.fit(None)?;
     let test = likelihood.test(&fit)?;
     if test.rejected || policy == NoisePolicy::Learnt {
         return with_noise(&as_stated, solved.clone(), (fit, test), &scale, progress);
     }
+    let solved = match solved.problem.model == as_stated.model {
+        true => solved,
+        false => solved.again(as_stated, progress)?,
+    };
     let noise = NoiseReport::stated(policy, Some(test));
-    if solved.problem.model == as_stated.model {
-        return Ok(Solved { noise, ..solved });
-    }
-    let solved = solved.again(as_stated, progress)?;
     Ok(Solved { noise, ..solved })
 }
 
@@ -70,20 +74,24 @@ fn with_noise<'a>(
     let mut accepted = solved.iterated.held.accepted();
     // Other noise may have thrown the gate open; the estimated one decides once.
     let mut open = accepted.iter().all(|&accepted| accepted);
-    // Near the end all observations count: few cannot tell white noise from random walk.
-    let whole = Thinned::new(as_stated, 1);
     for round in 1.. {
         solved.problem = as_stated.with_model(scale.apply(&fit.factors, &as_stated.model));
         let (problem, priors) = (&solved.problem, &solved.priors);
         let at = solved.iterated.estimate;
         let script = Script::new(problem, priors, &at)?;
-        let distances = script.replay(problem, &accepted)?.distances;
-        regate(&mut accepted, &distances, problem.gate_limit(), open);
+        let replay = pass(problem, &script, Gate::As(&accepted))?;
+        let distances = replay.innovations.iter().map(Innovation::distance);
+        regate(&mut accepted, distances, problem.gate_limit(), open);
         open = false;
         let (gate, passes) = (Gate::As(&accepted), &mut solved.passes);
         solved.iterated = iterate(problem, priors, at.clone(), gate, passes, progress)?;
-        let script = Script::new(&whole.problem, priors, &solved.iterated.estimate)?;
-        let likelihood = whole.likelihood(&script, scale, &accepted);
+        // Near the end all observations count: few cannot tell white noise from random walk.
+        let likelihood = Likelihood {
+            problem: as_stated,
+            script: &Script::new(as_stated, priors, &solved.iterated.estimate)?,
+            scale,
+            accepted: accepted.clone(),
+        };
         let before = likelihood.replay(&fit.factors)?.deviance();
         let now = likelihood.fit(Some(&fit))?;
         let settled = (now.deviance - before).abs() < SETTLED;
@@ -96,66 +104,33 @@ fn with_noise<'a>(
     Ok(solved)
 }
 
-/// A problem of which only so many observations are looked at as noise needs: those of a dwell are thinned
-/// out, the first after each move stays.
-struct Thinned<'a> {
-    problem: Problem<'a>,
-    /// Observations of three components that one of each kind stands for, in their order.
-    groups: Vec<Vec<usize>>,
-}
-
-impl<'a> Thinned<'a> {
-    fn new(problem: &Problem<'a>, steps_of_dwell: usize) -> Self {
-        let thinned = problem.observed_every(steps_of_dwell);
-        let mut groups = Vec::new();
-        let mut next = 0;
-        for (all, few) in problem.stretches().iter().zip(thinned.stretches()) {
-            let mut all = all
-                .steps
-                .iter()
-                .filter(|step| step.at_rest.is_some())
-                .peekable();
-            for step in few.steps.iter().filter(|step| step.at_rest.is_some()) {
-                let mut of_kinds: [Vec<usize>; Observation::ALL.len()] = Default::default();
-                let within = |one: &&Step| one.samples.end <= step.samples.end;
-                while let Some(one) = all.next_if(within) {
-                    for kind in problem.observed(one) {
-                        of_kinds[kind as usize].push(next);
-                        next += 1;
-                    }
-                }
-                let kinds = problem.observed(step);
-                groups.extend(kinds.map(|kind| std::mem::take(&mut of_kinds[kind as usize])));
+/// Of each observation where this many steps of a dwell are taken together, whether all that it stands for are let in.
+fn taken_together(problem: &Problem, accepted: &[bool], steps: usize) -> Vec<bool> {
+    let (mut accepted, mut together) = (accepted.iter(), Vec::new());
+    for stretch in problem.stretches() {
+        let at_rest = stretch
+            .steps
+            .iter()
+            .filter_map(|step| Some((step, step.at_rest.as_ref()?)));
+        let at_rest: Vec<_> = at_rest.collect();
+        let dwells = at_rest.chunk_by(|_, (_, next)| !next.first);
+        for part in dwells.flat_map(|dwell| dwell.chunks(steps)) {
+            let mut of_kinds = [None; Observation::ALL.len()];
+            for kind in part.iter().flat_map(|(step, _)| problem.observed(step)) {
+                let let_in = accepted.next().is_none_or(|&accepted| accepted);
+                let of_kind = &mut of_kinds[kind as usize];
+                *of_kind = Some(of_kind.unwrap_or(true) && let_in);
             }
-        }
-        Self {
-            problem: thinned,
-            groups,
+            together.extend(of_kinds.into_iter().flatten());
         }
     }
-
-    /// The likelihood of noise where these of all observations are let in.
-    fn likelihood<'b>(
-        &'b self,
-        script: &'b Script<'b>,
-        scale: &'b Scale,
-        accepted: &[bool],
-    ) -> Likelihood<'b> {
-        let let_in = |index: &usize| accepted.get(*index).copied().unwrap_or(true);
-        let group = |group: &Vec<usize>| group.iter().all(let_in);
-        Likelihood {
-            problem: &self.problem,
-            script,
-            scale,
-            accepted: self.groups.iter().map(group).collect(),
-        }
-    }
+    together
 }
 
 /// Lets in what the gate allows; leaves out what it does not where that is still `open`. Otherwise the set
 /// only grows, so it cannot toggle.
-fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) {
-    for (accepted, &distance) in accepted.iter_mut().zip(distances) {
+fn regate(accepted: &mut [bool], distances: impl Iterator<Item = f64>, gate: f64, open: bool) {
+    for (accepted, distance) in accepted.iter_mut().zip(distances) {
         let sound = distance <= gate;
         if sound || open {
             *accepted = sound;
@@ -166,7 +141,7 @@ fn regate(accepted: &mut [bool], distances: &[f64], gate: f64, open: bool) {
 impl Likelihood<'_> {
     /// The test of what is stated against a fit.
     fn test(&self, fit: &Fit) -> Result<NoiseTest, CalibrationError> {
-        let stated = self.scale.initial();
+        let stated = self.scale.initial;
         let free = fit.sources.iter();
         let (bounded, free): (Vec<usize>, Vec<usize>) = free.partition(|&&k| stated.0[k] == 0.0);
         let ratio = match fit.sources.is_empty() {
@@ -189,27 +164,19 @@ impl Likelihood<'_> {
     ) -> Result<NoiseReport, CalibrationError> {
         let sources = self.scale.present();
         let sigmas = self.sigma(factors, &sources)?;
-        let stated = self.scale.initial();
+        let stated = self.scale.initial;
         let of = |(&k, sigma): (&usize, &Option<f64>)| {
-            let source = Source::ALL[k];
-            let (unit, value) = source.unit();
-            let used = self.scale.sigma(factors, k) / value;
+            let used = self.scale.sigma(factors, k);
             let interval = sigma.map(|sigma| match factors.0[k] {
                 0.0 => {
                     let mut upper = *factors;
                     upper.0[k] = ONE_SIDED * sigma;
-                    [0.0, self.scale.sigma(&upper, k) / value]
+                    [0.0, self.scale.sigma(&upper, k)]
                 }
                 _ => [-1.0, 1.0].map(|side| used * (side * INTERVAL * sigma).exp()),
             });
-            SourceFigures {
-                source,
-                name: source.name().to_owned(),
-                unit: unit.to_owned(),
-                stated: (stated.0[k] > 0.0).then(|| self.scale.sigma(&stated, k) / value),
-                used,
-                interval,
-            }
+            let stated = (stated.0[k] > 0.0).then(|| self.scale.sigma(&stated, k));
+            SourceFigures::new(Source::ALL[k], stated, used, interval)
         };
         Ok(NoiseReport {
             policy,

@@ -3,9 +3,11 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::policy::NoisePolicy;
 use super::source::Source;
+use crate::calibration::{Finding, Problem};
 
 /// What noise a calibration used, and how it came to that.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +57,12 @@ pub struct SourceFigures {
 }
 
 impl NoiseReport {
+    /// The finding where noise was learnt because the data contradict what is stated.
+    pub(in crate::calibration) fn finding(&self, problem: &Problem) -> Option<Finding> {
+        let test = self.test.filter(|test| self.learnt && test.rejected)?;
+        noise_learnt(problem, (test.ratio, test.limit), &self.sources)
+    }
+
     /// Noise as stated, not tested.
     pub(in crate::calibration) fn stated(policy: NoisePolicy, test: Option<NoiseTest>) -> Self {
         Self {
@@ -84,6 +92,24 @@ impl fmt::Display for NoiseReport {
 }
 
 impl SourceFigures {
+    /// Of σ in SI and radians.
+    pub(in crate::calibration) fn new(
+        source: Source,
+        stated: Option<f64>,
+        used: f64,
+        interval: Option<[f64; 2]>,
+    ) -> Self {
+        let (unit, value) = source.unit();
+        Self {
+            source,
+            name: source.name().to_owned(),
+            unit: unit.to_owned(),
+            stated: stated.map(|sigma| sigma / value),
+            used: used / value,
+            interval: interval.map(|ends| ends.map(|sigma| sigma / value)),
+        }
+    }
+
     /// Whether it is there at all, stated or learnt.
     pub fn counts(&self) -> bool {
         self.used > 0.0 || self.stated.is_some()
@@ -105,4 +131,27 @@ impl fmt::Display for SourceFigures {
         }
         Ok(())
     }
+}
+
+/// Noise that was learnt: −2 ln of the likelihood ratio of stated to learnt noise, its limit, and the sources.
+/// None where none was stated.
+pub fn noise_learnt(
+    problem: &Problem,
+    (ratio, limit): (f64, f64),
+    sources: &[SourceFigures],
+) -> Option<Finding> {
+    let stated = problem.run().instrument.noise_is_stated;
+    if !(stated.gyro || stated.accel) {
+        return None;
+    }
+    let used = sources.iter().filter(|figures| figures.counts());
+    let used: Vec<String> = used.map(SourceFigures::to_string).collect();
+    let text = format!(
+        "The noise you stated does not fit this record (likelihood-ratio statistic {ratio:.0}; expected below \
+         {limit:.0}). turncal used the noise it estimated from the record \
+         instead; all σ include it: {}. To keep it, paste noise.run_toml of calibration.json into [imu.noise].",
+        used.join("; ")
+    );
+    let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources });
+    Some(Finding::new("noise-learnt", text, figures))
 }

@@ -2,7 +2,7 @@
 
 use super::report::NoiseReport;
 use super::source::Source;
-use crate::imu::{NoiseKeys, PerSensor, Sensor};
+use crate::imu::{NoiseKeys, PerSensor};
 use crate::units::{ARCSEC, DEGREE};
 
 /// Tables of `run.toml` that state noise.
@@ -40,36 +40,24 @@ impl Source {
         correlation_time: PerSensor<Option<f64>>,
     ) -> Vec<(&'static str, String)> {
         let [imu, standstill, turntable] = TABLES;
-        let keys = |sensor| NoiseKeys::of(sensor);
-        let line = |table, (name, unit): (&str, f64)| {
-            (table, format!("{name} = {}", rounded(sigma / unit)))
+        let keys = NoiseKeys::of(self.triad());
+        let (table, (name, unit)) = match self {
+            Self::AngleRandomWalk | Self::VelocityRandomWalk => (imu, keys.random_walk),
+            Self::GyroMotion | Self::AccelMotion => (imu, (keys.by_motion, 1.0)),
+            Self::GyroMoving | Self::AccelMoving => (imu, keys.by_duration),
+            Self::GyroGaussMarkov | Self::AccelGaussMarkov => (imu, keys.gauss_markov),
+            Self::Velocity => (standstill, ("velocity_sigma_m_s", 1.0)),
+            Self::Attitude => (standstill, ("attitude_sigma_arcsec", ARCSEC)),
+            Self::RotationAtRest => (standstill, ("turning_deg_per_sqrt_s", DEGREE)),
+            Self::TablePosition => (turntable, ("position_sigma_arcsec", ARCSEC)),
+            Self::TableReading => (turntable, ("reading_sigma_arcsec", ARCSEC)),
         };
-        match self {
-            Self::AngleRandomWalk => vec![line(imu, keys(Sensor::Gyro).random_walk)],
-            Self::VelocityRandomWalk => vec![line(imu, keys(Sensor::Accel).random_walk)],
-            Self::GyroMotion => vec![line(imu, (keys(Sensor::Gyro).by_motion, 1.0))],
-            Self::AccelMotion => vec![line(imu, (keys(Sensor::Accel).by_motion, 1.0))],
-            Self::GyroMoving => vec![line(imu, keys(Sensor::Gyro).by_duration)],
-            Self::AccelMoving => vec![line(imu, keys(Sensor::Accel).by_duration)],
-            Self::Velocity => vec![line(standstill, ("velocity_sigma_m_s", 1.0))],
-            Self::Attitude => vec![line(standstill, ("attitude_sigma_arcsec", ARCSEC))],
-            Self::RotationAtRest => vec![line(standstill, ("turning_deg_per_sqrt_s", DEGREE))],
-            Self::TablePosition => vec![line(turntable, ("position_sigma_arcsec", ARCSEC))],
-            Self::TableReading => vec![line(turntable, ("reading_sigma_arcsec", ARCSEC))],
-            Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
-                let sensor = match self {
-                    Self::GyroGaussMarkov => Sensor::Gyro,
-                    _ => Sensor::Accel,
-                };
-                let keys = keys(sensor);
-                let time = correlation_time.get(sensor);
-                let time =
-                    time.map(|t| (imu, format!("{} = {}", keys.correlation_time, rounded(t))));
-                let mut lines = vec![line(imu, keys.gauss_markov)];
-                lines.extend(time);
-                lines
-            }
-        }
+        let varies = matches!(self, Self::GyroGaussMarkov | Self::AccelGaussMarkov);
+        let time = correlation_time.get(self.triad()).filter(|_| varies);
+        let time = time.map(|time| (keys.correlation_time, time));
+        let lines = [(name, sigma / unit)].into_iter().chain(time);
+        let lines = lines.map(|(name, value)| (table, format!("{name} = {}", rounded(value))));
+        lines.collect()
     }
 }
 

@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::model::Model;
-use crate::calibration::problem::Problem;
+use crate::calibration::{Model, Problem};
 use crate::imu::{GaussMarkov, PerSensor, Sensor};
 use crate::navigation::ProcessNoise;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};
@@ -105,71 +104,63 @@ impl Source {
         noise
     }
 
+    /// The triad that it is of, or whose random walk it is counted in.
+    pub(in crate::calibration) fn triad(self) -> Sensor {
+        match self {
+            Self::VelocityRandomWalk
+            | Self::AccelMotion
+            | Self::AccelMoving
+            | Self::Velocity
+            | Self::AccelGaussMarkov => Sensor::Accel,
+            _ => Sensor::Gyro,
+        }
+    }
+
     /// Whether the run states a figure of it that is not zero.
     pub(in crate::calibration) fn stated(self, problem: &Problem) -> bool {
-        match self {
-            Self::Velocity | Self::Attitude => {
-                let sensor = match self {
-                    Self::Velocity => Sensor::Accel,
-                    _ => Sensor::Gyro,
-                };
-                let stated = problem.run().standstill.sigma.get(sensor);
-                stated.is_some_and(|_| self.sigma(problem) > 0.0)
-            }
-            _ => self.sigma(problem) > 0.0,
-        }
+        let of_dwells = problem.run().standstill.sigma.get(self.triad());
+        let seen = matches!(self, Self::Velocity | Self::Attitude) && of_dwells.is_none();
+        !seen && self.sigma(problem) > 0.0
     }
 
     /// Its σ in the model of a problem, in SI and radians; the smallest unrest that is ever taken counts
     /// as none.
     pub(in crate::calibration) fn sigma(self, problem: &Problem) -> f64 {
-        let model = &problem.model;
-        let gauss_markov = |sensor| {
-            model
-                .noise
-                .get(sensor)
-                .gauss_markov
-                .map_or(0.0, |g| g.sigma)
-        };
+        let (model, sensor) = (&problem.model, self.triad());
+        let (noise, of_moves) = (model.noise.get(sensor), model.motion_noise.get(sensor));
         match self {
-            Self::AngleRandomWalk => model.noise.gyro.random_walk,
-            Self::VelocityRandomWalk => model.noise.accel.random_walk,
-            Self::GyroMotion => model.motion_noise.gyro.by_motion,
-            Self::AccelMotion => model.motion_noise.accel.by_motion,
-            Self::GyroMoving => model.motion_noise.gyro.by_duration,
-            Self::AccelMoving => model.motion_noise.accel.by_duration,
-            Self::Velocity => problem.standstill_variance(Sensor::Accel).sqrt(),
-            Self::Attitude => problem.standstill_variance(Sensor::Gyro).sqrt(),
+            Self::AngleRandomWalk | Self::VelocityRandomWalk => noise.random_walk,
+            Self::GyroMotion | Self::AccelMotion => of_moves.by_motion,
+            Self::GyroMoving | Self::AccelMoving => of_moves.by_duration,
+            Self::Velocity | Self::Attitude => problem.standstill_variance(sensor).sqrt(),
             Self::RotationAtRest => model.turning_at_rest,
             Self::TablePosition => model.position_sigma,
             Self::TableReading => model.reading_sigma,
-            Self::GyroGaussMarkov => gauss_markov(Sensor::Gyro),
-            Self::AccelGaussMarkov => gauss_markov(Sensor::Accel),
+            Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
+                noise.gauss_markov.map_or(0.0, |bias| bias.sigma)
+            }
         }
     }
 
     /// Sets its σ, in SI and radians. A bias that is not stated to vary gets the given correlation time.
     pub(in crate::calibration) fn set(self, model: &mut Model, sigma: f64, correlation_time: f64) {
+        let sensor = self.triad();
+        let of_moves = model.motion_noise.get_mut(sensor);
+        let noise = model.noise.get_mut(sensor);
         match self {
-            Self::AngleRandomWalk => model.noise.gyro.random_walk = sigma,
-            Self::VelocityRandomWalk => model.noise.accel.random_walk = sigma,
-            Self::GyroMotion => model.motion_noise.gyro.by_motion = sigma,
-            Self::AccelMotion => model.motion_noise.accel.by_motion = sigma,
-            Self::GyroMoving => model.motion_noise.gyro.by_duration = sigma,
-            Self::AccelMoving => model.motion_noise.accel.by_duration = sigma,
-            Self::Velocity => model.set_standstill_variance(Sensor::Accel, sigma.powi(2)),
-            Self::Attitude => model.set_standstill_variance(Sensor::Gyro, sigma.powi(2)),
+            Self::AngleRandomWalk | Self::VelocityRandomWalk => noise.random_walk = sigma,
+            Self::GyroMotion | Self::AccelMotion => of_moves.by_motion = sigma,
+            Self::GyroMoving | Self::AccelMoving => of_moves.by_duration = sigma,
+            Self::Velocity | Self::Attitude => {
+                model.set_standstill_variance(sensor, sigma.powi(2));
+            }
             Self::RotationAtRest => model.turning_at_rest = sigma,
             Self::TablePosition => model.position_sigma = sigma,
             Self::TableReading => model.reading_sigma = sigma,
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
-                let sensor = match self {
-                    Self::GyroGaussMarkov => Sensor::Gyro,
-                    _ => Sensor::Accel,
-                };
-                let stated = &mut model.noise.get_mut(sensor).gauss_markov;
+                let stated = noise.gauss_markov;
                 let correlation_time = stated.map_or(correlation_time, |g| g.correlation_time);
-                *stated = (sigma > 0.0).then_some(GaussMarkov {
+                noise.gauss_markov = (sigma > 0.0).then_some(GaussMarkov {
                     sigma,
                     correlation_time,
                 });

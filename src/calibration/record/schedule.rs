@@ -59,8 +59,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
         true => STEPS_OF_PACKED * length,
         false => length,
     };
-    let lengths = (length, longest);
-    let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), lengths, together);
+    let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), (length, longest), together);
     // There may be so many that room to grow would be too much.
     let count = dwells.iter().map(|dwell| 1 + of_dwell(dwell).count());
     let mut steps = Vec::with_capacity(count.sum());
@@ -73,39 +72,41 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
                 at_rest: None,
             });
         }
+        at = dwell.samples.end;
         let position = dwell.position.as_ref();
-        let mut unread = position.map(|p| p.readings.clone());
-        // The first reading of all is the initial attitude.
-        if let Some(unread) = unread.as_mut().filter(|_| number == 0) {
-            unread.start += 1;
-        }
-        let axes = table.zip(position);
-        let axes = axes.and_then(|(table, p)| table.axes.get(p.readings.start));
+        let readings = table
+            .zip(position)
+            .map(|(table, p)| (table, p.readings.clone()));
+        let axes = readings
+            .as_ref()
+            .and_then(|(table, of)| table.axes.get(of.start));
         let whole = Arc::new(WholeDwell {
             attitude: position.map(|p| p.attitude),
             axes: axes.map(|angles| Arc::new(axis_response(angles))),
             accel: dwell.mean(Sensor::Accel, run).output,
         });
-        let mut first = true;
-        for samples in of_dwell(dwell) {
+        // The first reading of all is the initial attitude.
+        let first = usize::from(number == 0);
+        let mut unread = readings.map(|(table, of)| (table, of.start + first..of.end));
+        let of_steps = of_dwell(dwell).enumerate().map(|(number, samples)| {
             let until = imu.time(samples.end) + 1e-3 * imu.period;
-            let reading = table.zip(unread.as_mut()).and_then(|(table, unread)| {
-                let readings = take_until(unread, table, until);
-                let mean = attitude::mean(&table.attitude[readings.clone()])?;
-                Some((mean, readings.len()))
+            let reading = unread.as_mut().and_then(|(table, unread)| {
+                let begin = unread.start;
+                unread.start += table.time[unread.clone()].partition_point(|&t| t <= until);
+                let mean = attitude::mean(&table.attitude[begin..unread.start])?;
+                Some((mean, unread.start - begin))
             });
-            steps.push(Step {
+            Step {
                 at_rest: Some(AtRest {
-                    first,
+                    first: number == 0,
                     sums: Sums::new(imu, samples.clone()),
                     reading,
                     dwell: whole.clone(),
                 }),
                 samples,
-            });
-            first = false;
-        }
-        at = dwell.samples.end;
+            }
+        });
+        steps.extend(of_steps);
     }
     steps
 }
@@ -163,12 +164,4 @@ fn growing(
         }
         (at > from).then_some(from..at)
     })
-}
-
-/// Takes the readings up to a time off the front of those not yet used.
-fn take_until(unread: &mut Range<usize>, table: &TableLog, until: f64) -> Range<usize> {
-    let taken = table.time[unread.clone()].partition_point(|&t| t <= until);
-    let readings = unread.start..unread.start + taken;
-    unread.start = readings.end;
-    readings
 }

@@ -55,10 +55,10 @@ fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
     let pulse = imu.pulse.get(sensor).powi(2) / 12.0;
     let excess = -covariance - pulse;
     // At a constant rate the fractions left over may alternate, which is four times as much as at random.
-    if excess > SIGNIFICANT * variance / (pairs as f64).sqrt() + 3.0 * pulse {
-        excess.sqrt().max(floor)
-    } else {
-        floor
+    let chance = SIGNIFICANT * variance / (pairs as f64).sqrt() + 3.0 * pulse;
+    match excess > chance {
+        true => excess.sqrt().max(floor),
+        false => floor,
     }
 }
 

@@ -9,12 +9,13 @@ mod smoothed;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::constants::{Constant, Known, Posterior, Prior, triangle};
-use super::linearisation::Linearisation;
-use super::parameters::{ParameterVector, from_vector, to_vector};
 use crate::attitude::from_tilt_and_heading;
-use crate::calibration::several::thermal::Coefficient;
-pub use script::{Moves, Replay, Script};
+use crate::calibration::constants::triangle;
+use crate::calibration::{
+    Coefficient, Constant, Known, Linearisation, ParameterVector, Posterior, Prior, from_vector,
+    to_vector,
+};
+pub use script::{Moves, Script};
 pub use smoothed::{Own, Smoothed};
 
 /// Whitened rows of all dwells, and the states that go with them.
@@ -89,11 +90,6 @@ impl Reduction {
     pub fn posterior(&self, prior: &Prior) -> Posterior {
         let mut known = Known::new(prior.clone());
         self.parts.iter().for_each(|part| known.learn(&part.rows));
-        self.posterior_of(&known)
-    }
-
-    /// With what is known where all rows are among it.
-    pub fn posterior_of(&self, known: &Known) -> Posterior {
         let of_rows = known.posterior();
         Posterior {
             cost: of_rows.cost + self.squares,
@@ -118,15 +114,20 @@ impl Reduction {
         parts.collect()
     }
 
+    /// Squares and products of all columns, summed over the rows.
+    pub fn squares(&self) -> DMatrix<f64> {
+        let n = self.constants.len();
+        let mut squares = DMatrix::zeros(n + 1, n + 1);
+        for part in &self.parts {
+            squares.gemm_tr(1.0, &part.rows, &part.rows, 1.0);
+        }
+        squares
+    }
+
     /// Information of the constants by the rows alone.
     pub fn information(&self) -> DMatrix<f64> {
         let n = self.constants.len();
-        let mut information = DMatrix::zeros(n, n);
-        for part in &self.parts {
-            let rows = part.rows.columns(0, n);
-            information += rows.tr_mul(&rows);
-        }
-        information
+        self.squares().view((0, 0), (n, n)).into_owned()
     }
 
     /// By how much each recording differs, linearised `at` a point.

@@ -1,19 +1,14 @@
 //! What happens in a record at one point of linearisation: navigation is done once, the filter as often as noise is tried
 //! or a variance is changed.
 
+use super::Part;
 use super::smoothed::Smoothed;
-use super::{Part, Reduction};
-use crate::calibration::constants::{Known, Prior};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::filter::measurement::ScalarInnovation;
-use crate::calibration::filter::{
-    DwellFilters, Filter, Innovations, ObservationJudge, Since, Taken, Verdict,
+use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken, dwell_filters};
+use crate::calibration::record::{Event, Rest, events};
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Known, Layout, Linearisation, Prior, Problem, Reduction,
+    Stretch,
 };
-use crate::calibration::layout::Layout;
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::model::Model;
-use crate::calibration::problem::{Problem, Stretch};
-use crate::calibration::record::events::{Event, Rest, events};
 use crate::imu::{PerSensor, Sensor};
 
 /// Rows of a dwell are kept apart for each second …
@@ -38,23 +33,6 @@ pub struct Moves {
     pub motion: PerSensor<f64>,
 }
 
-/// A replay's innovations.
-#[derive(Default)]
-pub struct Replay {
-    /// Of observations that were let in, in order.
-    pub scalars: Vec<ScalarInnovation>,
-    /// Squared whitened innovation of every observation of three components, let in or not.
-    pub distances: Vec<f64>,
-}
-
-impl Replay {
-    /// −2 ln of the likelihood of the noise, but for a constant.
-    pub fn deviance(&self) -> f64 {
-        let each = |s: &ScalarInnovation| s.innovation.powi(2) / s.variance + s.variance.ln();
-        self.scalars.iter().map(each).sum()
-    }
-}
-
 impl<'a> Script<'a> {
     /// Navigates once through all stretches of a problem, linearised at this point.
     pub fn new(
@@ -77,7 +55,7 @@ impl<'a> Script<'a> {
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
-            if let Event::Move(block, _) = event {
+            if let Event::Move(block) = event {
                 for part in &block.noise.parts {
                     moves.duration += part.moving;
                     for sensor in Sensor::ALL {
@@ -89,42 +67,30 @@ impl<'a> Script<'a> {
         moves
     }
 
-    /// What is known of the constants before the data.
-    pub fn known(&self, problem: &Problem) -> Known {
-        let layout = Layout::new(&problem.model, problem.one_gravity());
-        Known::new(Prior::new(layout.constants(), &problem.model, self.at))
-    }
-
-    /// Innovations with the noise of a problem's model. `accepted` tells of each observation of
+    /// What the record says of the constants, without innovations. `accepted` tells of each observation of
     /// three components whether it is let in; those beyond its end are.
-    pub fn replay(&self, problem: &Problem, accepted: &[bool]) -> Result<Replay, CalibrationError> {
-        let mut decided = Decided::new(accepted);
-        let mut known = self.known(problem);
-        self.follow(problem, &mut decided, Some(&mut known))?;
-        Ok(decided.replay)
-    }
-
-    /// What the record says of the constants, without innovations.
     pub fn reduce(
         &self,
         problem: &Problem,
         accepted: &[bool],
     ) -> Result<Reduction, CalibrationError> {
-        self.follow(problem, &mut Decided::new(accepted), None)
+        let mut judge = Judge::new(Gate::As(accepted), f64::INFINITY);
+        self.follow(problem, &mut judge, false)
     }
 
-    /// Takes a filter through the record. What is `known` of the constants, if it is told, learns as it goes.
+    /// Takes a filter through the record, with innovations or without.
     pub fn follow(
         &self,
         problem: &Problem,
-        judge: &mut impl ObservationJudge,
-        known: Option<&mut Known>,
+        judge: &mut Judge,
+        with_innovations: bool,
     ) -> Result<Reduction, CalibrationError> {
         let filter = Filter::new(&problem.model, problem.one_gravity());
+        let prior = Prior::new(&filter.layout.constants, &problem.model, self.at);
         let mut follower = Follower {
-            dwells: DwellFilters::of(&filter),
+            dwells: dwell_filters(&filter),
+            known: with_innovations.then(|| Known::new(prior)),
             filter,
-            known,
             parts: Vec::new(),
             dwell: 0,
         };
@@ -134,9 +100,9 @@ impl<'a> Script<'a> {
         for (number, (stretch, events)) in stretches.iter().zip(&self.events).enumerate() {
             self.begin(&mut follower.filter, problem, before, (stretch, number));
             before = Some(stretch);
-            follower.through(events, (&problem.model, stretch), judge)?;
+            follower.through(events, stretch, judge)?;
             let filter = &follower.filter;
-            attitudes.push(Smoothed::of(filter, filter.layout.initial_attitude(), 3));
+            attitudes.push(Smoothed::of(filter, filter.layout.initial_attitude, 3));
             let next = stretches.get(number + 1);
             if next.is_none_or(|next| next.recording != stretch.recording) {
                 own.extend(Smoothed::of_recording(filter));
@@ -144,7 +110,7 @@ impl<'a> Script<'a> {
         }
         let Follower { filter, parts, .. } = follower;
         Ok(Reduction {
-            constants: filter.layout.constants().to_vec(),
+            constants: filter.layout.constants.clone(),
             parts,
             squares: filter.columns.squares,
             log_determinant: filter.columns.log_determinant,
@@ -152,7 +118,7 @@ impl<'a> Script<'a> {
             own,
             gravity: filter
                 .layout
-                .gravity()
+                .gravity
                 .map(|state| Smoothed::of(&filter, state, 1)),
         })
     }
@@ -175,76 +141,69 @@ impl<'a> Script<'a> {
         };
         let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
         let gravity = moved.then_some(stretch.run.site.gravity_sigma);
-        filter.begin(&start, model.position_sigma, since, gravity);
+        filter.begin(&start, since, gravity);
     }
 }
 
 /// A filter on its way through a record.
-struct Follower<'k> {
+struct Follower {
     filter: Filter,
-    dwells: DwellFilters,
-    known: Option<&'k mut Known>,
+    dwells: Box<dyn DwellFilters>,
+    /// What is known of the constants so far, where innovations are worked out.
+    known: Option<Known>,
     parts: Vec<Part>,
     /// Number of dwells that have ended.
     dwell: usize,
 }
 
-/// Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an outlier that it lets in
-/// closes the gate to the good observations that follow.
-struct Begin {
-    event: usize,
-    filter: Filter,
-    known: Option<Known>,
-    parts: usize,
-}
-
-impl Follower<'_> {
+impl Follower {
     fn through(
         &mut self,
         events: &[Event],
-        of: (&Model, &Stretch),
-        judge: &mut impl ObservationJudge,
+        stretch: &Stretch,
+        judge: &mut Judge,
     ) -> Result<(), CalibrationError> {
-        let apart = APART.max(of.1.run.recording.imu.duration() / EPOCHS);
-        let mut begin: Option<Begin> = None;
+        let apart = APART.max(stretch.run.recording.imu.duration() / EPOCHS);
+        // Where a dwell begins, to go back to: after a turn the innovations' covariance is wide, and an outlier that
+        // it lets in closes the gate to the good observations that follow.
+        let mut begin: Option<(usize, usize, Filter, Known)> = None;
         let mut next = 0;
         while let Some(event) = events.get(next) {
             next += 1;
             let rest = match event {
-                Event::Move(block, _) => {
+                Event::Move(block) => {
                     self.filter.propagate(block);
                     continue;
                 }
                 Event::Rest(rest) => rest,
             };
-            if rest.first && begin.as_ref().is_none_or(|begin| begin.event + 1 != next) {
+            if rest.first && begin.as_ref().is_none_or(|&(event, ..)| event + 1 != next) {
                 judge.begin(rest.new_position);
-                begin = self.known.is_some().then(|| self.here(next - 1));
+                begin = self.known.clone().map(|known| {
+                    let filter = self.filter.clone();
+                    (next - 1, self.parts.len(), filter, known)
+                });
             }
-            match (self.rest(rest, of, judge), &begin) {
+            self.filter.begin_rest(rest, stretch);
+            self.learn();
+            let (filter, known) = (&mut self.filter, self.known.as_ref());
+            match (
+                self.dwells
+                    .take_in(filter, (&**rest, stretch), known, judge),
+                &begin,
+            ) {
                 (Taken::Whole, _) => self.keep(rest, apart)?,
-                (Taken::Abandoned, Some(begin)) => {
+                (Taken::Abandoned, Some((event, parts, filter, known))) => {
                     judge.begin_again();
-                    self.go_back(begin);
-                    next = begin.event;
+                    self.parts.truncate(*parts);
+                    self.filter = filter.clone();
+                    self.known = Some(known.clone());
+                    next = *event;
                 }
-                _ => return Err(CalibrationError::Diverged { time: event.end() }),
+                _ => return Err(CalibrationError::Diverged { time: rest.end() }),
             }
         }
         Ok(())
-    }
-
-    fn rest(
-        &mut self,
-        rest: &Rest,
-        of: (&Model, &Stretch),
-        judge: &mut impl ObservationJudge,
-    ) -> Taken {
-        rest.begin(&mut self.filter, of.0, of.1);
-        self.learn();
-        let known = self.known.as_deref();
-        self.dwells
-            .take_in(&mut self.filter, &rest.segment, of, known, judge)
     }
 
     fn learn(&mut self) {
@@ -256,7 +215,7 @@ impl Follower<'_> {
     /// Keeps the rows of a part, with those of the next one unless that is a second off.
     fn keep(&mut self, rest: &Rest, apart: f64) -> Result<(), CalibrationError> {
         self.learn();
-        let time = rest.segment.end();
+        let time = rest.end();
         let before = self.parts.last().filter(|part| part.dwell == self.dwell);
         if !rest.last && before.is_some_and(|before| time - before.time < apart) {
             return Ok(());
@@ -272,54 +231,5 @@ impl Follower<'_> {
         });
         self.dwell += usize::from(rest.last);
         Ok(())
-    }
-
-    fn here(&self, event: usize) -> Begin {
-        Begin {
-            event,
-            filter: self.filter.clone(),
-            known: self.known.as_deref().cloned(),
-            parts: self.parts.len(),
-        }
-    }
-
-    fn go_back(&mut self, begin: &Begin) {
-        self.filter = begin.filter.clone();
-        self.parts.truncate(begin.parts);
-        if let (Some(known), Some(before)) = (&mut self.known, &begin.known) {
-            **known = before.clone();
-        }
-    }
-}
-
-/// Lets in what was decided before, and keeps innovations.
-struct Decided<'a> {
-    accepted: std::slice::Iter<'a, bool>,
-    replay: Replay,
-}
-
-impl<'a> Decided<'a> {
-    fn new(accepted: &'a [bool]) -> Self {
-        Self {
-            accepted: accepted.iter(),
-            replay: Replay::default(),
-        }
-    }
-}
-
-impl ObservationJudge for Decided<'_> {
-    fn is_let_in(&mut self) -> bool {
-        self.accepted.next().is_none_or(|&accepted| accepted)
-    }
-
-    fn judge(&mut self, innovations: Innovations) -> Verdict {
-        let three = innovations.scalars;
-        let squares = three.map(|s| s.innovation.powi(2) / s.variance);
-        self.replay.distances.push(squares.iter().sum());
-        if !self.is_let_in() {
-            return Verdict::Rejected;
-        }
-        self.replay.scalars.extend(three);
-        Verdict::Accepted
     }
 }

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibration::constants::Posterior;
 use crate::calibration::filter::Filter;
-use crate::calibration::several::day_to_day::{Difference, OwnState};
+use crate::calibration::several::day_to_day::OwnState;
+use crate::calibration::{Difference, Posterior};
 
 /// States with what constants do to them: with these at c their mean is `x + U c`.
 ///
@@ -33,10 +33,8 @@ impl Smoothed {
     /// So many states of a filter from a first one on, as they are now.
     pub fn of(filter: &Filter, first: usize, count: usize) -> Self {
         Self {
-            mean: DVector::from_fn(count, |k, _| filter.mean(first + k)),
-            covariance: DMatrix::from_fn(count, count, |i, j| {
-                filter.covariance(first + i, first + j)
-            }),
+            mean: filter.x.rows(first, count).into_owned(),
+            covariance: filter.p.view((first, first), (count, count)).into_owned(),
             by_constants: filter.columns.of_states.columns(first, count).transpose(),
             own: Vec::new(),
         }
@@ -44,7 +42,7 @@ impl Smoothed {
 
     /// What the recording has of its own; none where it has nothing.
     pub fn of_recording(filter: &Filter) -> Option<Self> {
-        let (states, own): (Vec<usize>, Vec<OwnState>) = filter.layout.own().unzip();
+        let (states, own): (Vec<usize>, Vec<OwnState>) = filter.layout.own.iter().copied().unzip();
         let first = *states.first()?;
         Some(Self {
             own,

@@ -1,3 +1,4 @@
+use crate::calibration::pass::{Gate, pass};
 use crate::calibration::{ErrorTerm, Options, Outcome, Problem, UNWATCHED, estimate};
 use crate::imu::Term;
 use crate::run::Aiding;
@@ -56,8 +57,8 @@ fn the_likelihood_of_all_innovations_is_that_of_the_rows() {
         let mut model = problem.model.clone();
         model.noise.gyro.random_walk *= factor;
         let problem = problem.with_model(model);
-        let replay = outcome.script(&problem).unwrap();
-        let replay = replay.replay(&problem, &outcome.accepted()).unwrap();
+        let script = outcome.script(&problem).unwrap();
+        let replay = pass(&problem, &script, Gate::As(&outcome.accepted())).unwrap();
         let rows = outcome.reduction(&problem).unwrap();
         (
             replay.deviance(),

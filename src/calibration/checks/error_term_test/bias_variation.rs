@@ -3,16 +3,13 @@
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::{ErrorTermTest, Role};
-use crate::calibration::checks::finding::{Finding, widened_by};
-use crate::calibration::constants::Posterior;
-use crate::calibration::error::CalibrationError;
+use crate::calibration::checks::finding::widened_by;
 use crate::calibration::model::usual_variation;
 use crate::calibration::noise::LOG_SIGMA;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::ParameterMatrix;
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::problem::Problem;
+use crate::calibration::{
+    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Outcome, ParameterMatrix, Posterior,
+    Problem, Role,
+};
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
@@ -85,18 +82,17 @@ fn of_one(
     let density = |z: &f64| (-0.5 * z * z).exp();
     let all: f64 = SIGMAS.iter().map(density).sum();
     let (mut weights, mut sum) = (1.0, ParameterMatrix::zeros());
-    let mut varying = problem.model.clone();
-    varying.noise.get_mut(sensor).gauss_markov = Some(usual);
-    let varying = problem.with_model(varying);
+    let varied = |variation: GaussMarkov| {
+        problem.with(|model| model.noise.get_mut(sensor).gauss_markov = Some(variation))
+    };
+    let varying = varied(usual);
     let (script, accepted) = (outcome.script(&varying)?, outcome.accepted());
     for sigma in &SIGMAS {
-        let mut model = varying.model.clone();
-        model.noise.get_mut(sensor).gauss_markov = Some(GaussMarkov {
-            sigma: usual.sigma * (sigma * LOG_SIGMA).exp(),
-            correlation_time: usual.correlation_time,
-        });
         // What the filter cannot run with is not likely.
-        let problem = problem.with_model(model);
+        let problem = varied(GaussMarkov {
+            sigma: usual.sigma * (sigma * LOG_SIGMA).exp(),
+            ..usual
+        });
         let Ok(reduction) = script.reduce(&problem, &accepted) else {
             continue;
         };

@@ -1,6 +1,6 @@
 //! What error terms that are not estimated leave in an estimate.
 
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector};
+use crate::calibration::{ParameterMatrix, ParameterVector};
 
 /// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]

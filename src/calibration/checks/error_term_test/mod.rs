@@ -4,25 +4,24 @@
 //! biases are not constant; they take a reduction of their own.
 
 mod bias_variation;
+mod evidence;
 mod explanation;
 mod terms_on;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::finding::{Finding, widened_by};
-use crate::calibration::constants::Posterior;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::error_term::ErrorTerm;
-use crate::calibration::parameters::group::Group;
-use crate::calibration::parameters::{PARAMETERS, ParameterMatrix};
-use crate::calibration::problem::Problem;
+use super::finding::widened_by;
+use crate::calibration::{
+    CalibrationError, ErrorTerm, Finding, Group, Outcome, PARAMETERS, ParameterMatrix, Posterior,
+    Problem,
+};
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
+pub use evidence::Evidence;
 pub use explanation::UnmodelledEffect;
 use explanation::{Explanation, seen_and_left_off};
-use terms_on::TermsOn;
+use terms_on::{TermsOn, With};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -194,13 +193,11 @@ struct Tested<'a> {
 impl<'a> Tested<'a> {
     fn new(problem: &'a Problem, outcome: &'a Outcome) -> Result<Self, CalibrationError> {
         let model = &problem.model;
-        let mut other = model.clone();
-        match model.has(VARYING) {
+        let other = &problem.with(|other| match model.has(VARYING) {
             true => other.switch_off(VARYING),
             false => other.switch_on(VARYING),
-        }
+        });
         // The longer of the two first: a thread that is done with something else can take the other.
-        let other = &problem.with_model(other);
         let (otherwise, terms) = rayon::join(
             || Ok::<_, CalibrationError>(outcome.posterior(other, &outcome.reduction(other)?)),
             || TermsOn::new(problem, outcome),
@@ -216,60 +213,55 @@ impl<'a> Tested<'a> {
         let chance = FALSE_ALARM / off.max(1) as f64;
         let scalars = 3.0 * outcome.innovations.len() as f64;
         let tests = tried.into_iter().filter_map(|term| {
-            let mut test = match term {
+            let test = match term {
                 VARYING => tested.varying(model.has(term), chance),
                 _ => tested.constant(term, model.has(term), chance)?,
             };
-            test.without /= scalars;
-            test.with /= scalars;
-            Some(test)
+            Some(ErrorTermTest {
+                without: test.without / scalars,
+                with: test.with / scalars,
+                ..test
+            })
         });
         tested.tests = tests.collect();
         tested.decide(chance);
         Ok(tested)
     }
 
-    /// The test of a constant term, with costs of the whole record. `None` if that is singular.
+    /// The test of a constant term, with costs of the whole record.
     fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
-        let (with, without, evidence, left_off) = if on {
-            let (without, evidence) = self.terms.without(term);
-            (None, Some(without), evidence, None)
-        } else {
-            let evidence = self.terms.evidence(term, &[])?;
-            let with = self.terms.with(&[term]);
-            (Some(with), None, evidence, self.terms.left_off(term))
+        let (terms, own) = (&self.terms, &self.terms.own);
+        let other = match on {
+            true => terms.without(term),
+            false => terms.with(&[term]),
         };
-        let own = &self.terms.own;
-        let (with, without) = (
-            with.as_ref().unwrap_or(own),
-            without.as_ref().unwrap_or(own),
-        );
+        let (with, without) = match on {
+            true => (own, &other),
+            false => (&other, own),
+        };
+        let evidence = terms.evidence(term, with, without)?;
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
-            left_off,
-            ..ErrorTermTest::new(term, on, with, without)
+            left_off: (!on).then(|| terms.left_off(term)).flatten(),
+            ..ErrorTermTest::new(term, on, &with.posterior, &without.posterior)
         })
     }
 
     /// The same of biases that vary.
     fn varying(&self, on: bool, chance: f64) -> ErrorTermTest {
-        let (own, otherwise) = (&self.terms.own, &self.otherwise);
-        let (with, without, gain) = match on {
-            true => (own, otherwise, -self.fall_otherwise()),
-            false => (otherwise, own, self.fall_otherwise()),
+        let (own, otherwise) = (&self.terms.own.posterior, &self.otherwise);
+        let (with, without) = match on {
+            true => (own, otherwise),
+            false => (otherwise, own),
         };
+        let gain = without.deviance - with.deviance;
         ErrorTermTest {
             gain,
             limit: -2.0 * chance.ln(),
             significance: gain,
             ..ErrorTermTest::new(VARYING, on, with, without)
         }
-    }
-
-    /// By how much −2 ln of the likelihood falls where biases vary otherwise than in the model.
-    fn fall_otherwise(&self) -> f64 {
-        self.terms.own.deviance - self.otherwise.deviance
     }
 
     /// Gives each test its role: the likeliest explanation first, then what is significant once it is on, until
@@ -287,8 +279,10 @@ impl<'a> Tested<'a> {
         while !on.contains(&VARYING) {
             let others = tests.iter_mut();
             let others = others.filter(|test| !test.on && !on.contains(&test.term));
+            let without: With = terms.with(&on);
             let others = others.filter_map(|test| {
-                let evidence = terms.evidence(test.term, &on)?;
+                let with = terms.with(&[&on[..], &[test.term]].concat());
+                let evidence = terms.evidence(test.term, &with, &without)?;
                 Some((evidence.significance(), test))
             });
             match others.max_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -333,12 +327,13 @@ impl<'a> Tested<'a> {
         if self.tests.iter().any(is_on) {
             return None;
         }
-        let ratio = 0.5 * self.fall_otherwise();
-        let added = self.otherwise.added_to(&self.terms.own);
+        let own = &self.terms.own.posterior;
+        let ratio = 0.5 * (own.deviance - self.otherwise.deviance);
+        let of_others = self.terms.with(others).posterior.added_to(own);
         Some(Explanation {
             ln_likelihood_ratio: ratio,
             of_term: ratio,
-            added: added + self.terms.added(others),
+            added: self.otherwise.added_to(own) + of_others,
         })
     }
 }

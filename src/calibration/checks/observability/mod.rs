@@ -10,8 +10,7 @@ mod not_observed;
 use faer::{Mat, Side};
 use nalgebra::SMatrix;
 
-use crate::calibration::estimate::Estimate;
-use crate::calibration::parameters::{OBSERVED_BELOW, PARAMETERS, ParameterVector, parameter_name};
+use crate::calibration::{Estimate, OBSERVED_BELOW, PARAMETERS, ParameterVector, parameter_name};
 use crate::imu::InstallationForm;
 pub use not_observed::{not_observed, not_observed_by_path, temperature_not_seen};
 

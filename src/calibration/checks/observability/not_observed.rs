@@ -2,10 +2,7 @@
 
 use serde_json::json;
 
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::auxiliary::auxiliary_name;
-use crate::calibration::parameters::parameter_name;
+use crate::calibration::{Finding, Outcome, auxiliary_name, parameter_name};
 use crate::units::DEGREE;
 
 /// What a filter's run along its path does not determine.

@@ -16,6 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{log, skew, to_tilt_and_heading};
 use crate::calibration::budget::curvature::curvature;
+use crate::calibration::checks::innovation::Observation;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
@@ -137,7 +138,7 @@ impl<'a> Batch<'a> {
         new_position: bool,
         mut accepted: impl FnMut() -> bool,
     ) -> Result<(), CalibrationError> {
-        let (model, variance) = (self.model, self.stretch.variance);
+        let model = self.model;
         let tied = at_rest.tied(&self.navigator.state, &self.accel);
         if at_rest.first {
             self.information.come_to_rest(&self.navigator.state);
@@ -151,7 +152,11 @@ impl<'a> Batch<'a> {
         }
 
         if new_position {
-            let row = (POSITION, tied.position, variance.position);
+            let row = (
+                POSITION,
+                tied.position,
+                self.stretch.position_variance(model),
+            );
             self.information.observe(&[row]);
         }
         let end = samples.end;
@@ -164,19 +169,25 @@ impl<'a> Batch<'a> {
         }
         let mut rows = Vec::new();
         if accepted() {
-            let variance = self.stretch.velocity_variance(model);
+            let variance = self
+                .stretch
+                .observation_variance(model, Observation::Velocity, 1);
             rows.push((VELOCITY, state.velocity, variance));
         }
         if let Some((reading, count)) = &at_rest.reading
             && accepted()
         {
             let difference = -log(&(state.attitude * reading.transpose()));
-            let variance = model.reading_sigma.powi(2) / *count as f64 + variance.attitude;
+            let variance = self
+                .stretch
+                .observation_variance(model, Observation::Table, *count);
             rows.push((ATTITUDE, difference, variance));
         }
         if held && accepted() {
             let difference = -log(&(state.attitude * self.held.transpose()));
-            let variance = self.stretch.attitude_variance(model);
+            let variance = self
+                .stretch
+                .observation_variance(model, Observation::Attitude, 1);
             rows.push((ATTITUDE, difference, variance));
         }
         self.information.observe(&rows);

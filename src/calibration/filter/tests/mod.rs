@@ -4,14 +4,14 @@ mod textbook;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{DVector, Matrix3, SVector, Vector3};
 
 use super::*;
 use crate::calibration::constants::{Known, Prior};
-use crate::calibration::filter::measurement::{Measurement, ScalarInnovation};
+use crate::calibration::filter::update::Linear;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::problem::Stretch;
-use crate::calibration::record::segment::{Segment, segments};
+use crate::calibration::record::{Rest, part_of};
 use crate::calibration::{AttitudePrior, ErrorTerm, Options, Problem};
 use crate::imu::{GaussMarkov, TermVector};
 use crate::navigation::{Block, ErrorMatrix, Navigator, NoiseInput, NoiseInputs, ParameterBlock};
@@ -31,6 +31,7 @@ fn run(number: u64) -> Run {
 fn model(run: &Run, sigma: f64, varying: Option<f64>) -> Model {
     let mut model = Model::new(run, &Options::default());
     model.prior_sigma.fill(sigma);
+    model.position_sigma = 5e-6;
     for noise in [&mut model.noise.gyro, &mut model.noise.accel] {
         noise.gauss_markov = varying.map(|sigma| GaussMarkov {
             sigma,
@@ -60,16 +61,54 @@ const ANEW: Since = Since::Anew(
 /// A filter at its begin, and what is known of the constants.
 fn begun(model: &Model) -> (Filter, Known) {
     let mut filter = Filter::new(model, true);
-    filter.begin(&START, 5e-6, ANEW, None);
+    filter.begin(&START, ANEW, None);
     let triads = crate::calibration::from_vector(model.form, &model.prior_mean.add_scalar(-1e-4));
     let at = Linearisation::new(triads, TermVector::zeros(), Vec::new());
-    let prior = Prior::new(filter.layout.constants(), model, &at);
+    let prior = Prior::new(&filter.layout.constants, model, &at);
     (filter, Known::new(prior))
+}
+
+/// Three components `z = H x + v`, v white of the same variance R each.
+struct Measurement {
+    residual: Vector3<f64>,
+    /// H, row by row: state and coefficient of what is not zero.
+    rows: [Vec<(usize, f64)>; 3],
+    variance: f64,
+}
+
+/// One component of a measurement minus what a filter expected of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ScalarInnovation {
+    innovation: f64,
+    variance: f64,
+}
+
+fn scalars(judge: &Judge) -> Vec<ScalarInnovation> {
+    let each = judge.innovations.iter();
+    each.flat_map(|of| {
+        [0, 1, 2].map(|k| ScalarInnovation {
+            innovation: of.whitened[k] * of.sigma[k],
+            variance: of.sigma[k].powi(2),
+        })
+    })
+    .collect()
+}
+
+fn take(filter: &mut Filter, measurement: &Measurement) {
+    let mut h: Linear = filter.none(3);
+    for (row, of_row) in measurement.rows.iter().enumerate() {
+        for &(state, weight) in of_row {
+            h.states[(row, state)] = weight;
+        }
+    }
+    let z = DVector::from_column_slice(measurement.residual.as_slice());
+    let across = &h.states * &filter.p;
+    filter.take((&h, across), &z, measurement.variance);
 }
 
 /// A filter that learns of a measurement.
 fn update(filter: &mut Filter, known: &mut Known, measurement: &Measurement) {
-    filter.update(measurement);
+    take(filter, measurement);
     known.learn(&filter.columns.take_rows());
 }
 
@@ -82,7 +121,7 @@ fn of_velocity(z: Vector3<f64>, variance: f64) -> Measurement {
 }
 
 fn of_table(filter: &Filter, z: Vector3<f64>, variance: f64) -> Measurement {
-    let table = filter.layout.table_position().unwrap();
+    let table = filter.layout.table_position.unwrap();
     Measurement {
         residual: z,
         rows: [0, 1, 2].map(|axis| vec![(ATTITUDE + axis, 1.0), (table + axis, -1.0)]),
@@ -159,14 +198,17 @@ fn a_varying_bias_goes_on_while_nothing_is_known() {
     let (mut filter, _) = begun(&model(&run(1), 1e-4, Some(sigma)));
     for k in 0..5 {
         filter.propagate(&block(f64::from(k)));
-        filter.update(&of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11));
+        take(
+            &mut filter,
+            &of_velocity(Vector3::new(1e-5, 0.0, 2e-5), 1e-11),
+        );
     }
-    let (state, ..) = filter.layout.varying_biases().next().unwrap();
+    let (state, ..) = filter.layout.varying_biases[0];
     let before = filter.p[(state, state)];
     let by_constant = filter.columns.of_states[(0, state)];
     // Without observations of it a stationary process stays as uncertain as it was.
     assert!(before <= sigma.powi(2));
-    filter.begin(&START, 5e-6, Since::Lost(2.0 * CORRELATION_TIME), None);
+    filter.begin(&START, Since::Lost(2.0 * CORRELATION_TIME), None);
     let keep = (-2.0f64).exp();
     let expected = before * keep.powi(2) + sigma.powi(2) * (1.0 - keep.powi(2));
     assert_relative_eq!(filter.p[(state, state)], expected, max_relative = 1e-12);
@@ -204,7 +246,7 @@ fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
             update(&mut filter, &mut known, &measurement);
         }
         if k % 50 == 0 {
-            filter.redraw_table(5e-6);
+            filter.redraw_table();
         }
     }
     let covariance = known.posterior().parameter_covariance;
@@ -223,42 +265,18 @@ fn covariance_stays_positive_from_seven_thousand_ppm_to_a_tenth() {
     }
 }
 
-/// Lets all but one in, and keeps the innovations.
-#[derive(Default)]
-struct Without {
-    scalars: Vec<ScalarInnovation>,
-    number: Option<usize>,
-}
-
-impl ObservationJudge for Without {
-    fn is_let_in(&mut self) -> bool {
-        true
-    }
-
-    fn judge(&mut self, innovations: Innovations) -> Verdict {
-        self.scalars.extend(innovations.scalars);
-        match self.scalars.len() / 3 == self.number.map_or(0, |number| number + 1) {
-            true => Verdict::Rejected,
-            false => Verdict::Accepted,
-        }
-    }
-}
-
 /// The first part of the first dwell in an attitude.
-fn first_part(
-    (problem, stretch): (&Problem, &Stretch),
-    attitude: &Matrix3<f64>,
-) -> (Segment, Block) {
+fn first_part((problem, stretch): (&Problem, &Stretch), attitude: &Matrix3<f64>) -> (Rest, Block) {
     let model = &problem.model;
     let triads = crate::calibration::from_vector(model.form, &model.prior_mean);
     let at = State::at_rest(*attitude);
     let run = problem.run();
     let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, at);
     let mut navigator = navigator.unwrap();
-    let part = segments(&stretch.steps).next().unwrap();
-    let before = navigator.standing(attitude, part[0].0.samples.clone());
-    let segment = Segment::navigate(&mut navigator, (problem, stretch), &part, attitude);
-    (segment, before)
+    let part = &stretch.steps[..part_of(&stretch.steps, usize::MAX / 2)];
+    let before = navigator.standing(attitude, part[0].samples.clone());
+    let rest = Rest::navigate(&mut navigator, (problem, stretch), part, attitude);
+    (rest, before)
 }
 
 #[test]
@@ -268,7 +286,7 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
     let (model, stretch) = (&problem.model, &problem.stretches()[0]);
     let of = (&problem, stretch);
     let (filter, known) = begun(model);
-    let mut shared = DwellFilters::of(&filter);
+    let mut shared = dwell_filters(&filter);
     let attitudes = [Vector3::zeros(), Vector3::new(0.3, -1.0, 2.0)].map(crate::attitude::exp);
     for (attitude, number) in attitudes
         .iter()
@@ -276,21 +294,16 @@ fn what_dwells_before_have_worked_out_changes_nothing() {
         .chain([(&attitudes[0], Some(40)), (&attitudes[1], None)])
     {
         let (segment, _) = first_part(of, attitude);
-        let through = |dwells: &mut DwellFilters| {
+        let through = |dwells: &mut dyn DwellFilters| {
             let mut filter = filter.clone();
-            let mut judge = Without {
-                number,
-                ..Without::default()
-            };
-            let of = (model, stretch);
-            let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
+            // All but one are let in.
+            let accepted: Vec<bool> = (0..300).map(|k| Some(k) != number).collect();
+            let mut judge = Judge::new(Gate::As(&accepted), f64::INFINITY);
+            let taken = dwells.take_in(&mut filter, (&segment, stretch), Some(&known), &mut judge);
             assert_eq!(taken, Taken::Whole);
-            (filter.x, filter.p, judge.scalars)
+            (filter.x, filter.p, scalars(&judge))
         };
-        assert_eq!(
-            through(&mut shared),
-            through(&mut DwellFilters::of(&filter))
-        );
+        assert_eq!(through(&mut *shared), through(&mut *dwell_filters(&filter)));
     }
 }
 
@@ -316,7 +329,7 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         };
         let (mut filter, mut known) = begun(model);
         let start = stretch.start(&prior, &Matrix3::identity());
-        filter.begin(&start, model.position_sigma, ANEW, None);
+        filter.begin(&start, ANEW, None);
         let (segment, before) = first_part((&problem, stretch), &Matrix3::identity());
         let mut textbook = Textbook::new(&filter, &known);
         // What has gone on before leaves nothing independent of anything.
@@ -326,15 +339,15 @@ fn a_part_of_a_dwell_at_once_is_its_steps_one_after_the_other() {
         }
         filter.begin_to_hold();
         textbook.begin_to_hold(&filter);
-        let mut judge = Without::default();
+        let mut judge = Judge::new(Gate::Open, f64::INFINITY);
         let of = (model, stretch);
-        let mut dwells = DwellFilters::of(&filter);
-        let taken = dwells.take_in(&mut filter, &segment, of, Some(&known), &mut judge);
+        let mut dwells = dwell_filters(&filter);
+        let taken = dwells.take_in(&mut filter, (&segment, stretch), Some(&known), &mut judge);
         assert_eq!(taken, Taken::Whole);
         known.learn(&filter.columns.take_rows());
-        let scalars = textbook.through(&filter, &segment, of);
-        assert_eq!(scalars.len(), judge.scalars.len());
-        for (one, other) in judge.scalars.iter().zip(&scalars) {
+        let (ours, theirs) = (scalars(&judge), textbook.through(&filter, &segment, of));
+        assert_eq!(ours.len(), theirs.len());
+        for (one, other) in ours.iter().zip(&theirs) {
             let sigma = other.variance.sqrt();
             assert_relative_eq!(one.variance, other.variance, max_relative = 1e-5);
             assert_relative_eq!(

@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Filter;
+use super::{Filter, Measurement, ScalarInnovation};
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::constants::{Constant, Known};
-use crate::calibration::filter::measurement::{Measurement, ScalarInnovation};
 use crate::calibration::layout::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::model::Model;
 use crate::calibration::parameters::sensor_and_parameter;
 use crate::calibration::problem::Stretch;
-use crate::calibration::record::segment::{Seen, Segment};
+use crate::calibration::record::Rest;
+use crate::calibration::record::dwell::Seen;
 use crate::navigation::Block;
 
 /// Mean and covariance of the states of a filter, then of its constants.
@@ -29,7 +29,7 @@ impl Textbook {
     }
 
     pub fn begin_to_hold(&mut self, filter: &Filter) {
-        let turn = filter.layout.turn_at_rest();
+        let turn = filter.layout.turn_at_rest;
         for state in turn.into_iter().flat_map(|turn| turn..turn + 3) {
             self.x[state] = 0.0;
             self.p.row_mut(state).fill(0.0);
@@ -46,14 +46,14 @@ impl Textbook {
             .copy_from(&block.navigation);
         q.view_mut((0, 0), (NAVIGATION, NAVIGATION))
             .copy_from(&block.noise.covariance(&filter.noise));
-        for (k, constant) in layout.constants().iter().enumerate() {
+        for (k, constant) in layout.constants.iter().enumerate() {
             if let Constant::Parameter(index) = constant {
                 let (sensor, of_triad) = sensor_and_parameter(*index);
                 phi.view_mut((0, self.states + k), (NAVIGATION, 1))
                     .copy_from(&block.parameters.get(sensor).column(of_triad));
             }
         }
-        for (state, sensor, of_triad) in layout.varying_biases() {
+        for (state, sensor, of_triad) in layout.varying_biases.iter().copied() {
             let variation = filter.varying.iter().find(|of| of.0 == state).unwrap();
             phi.view_mut((0, state), (NAVIGATION, 1))
                 .copy_from(&block.parameters.get(sensor).column(of_triad));
@@ -61,12 +61,12 @@ impl Textbook {
             phi[(state, state)] = keep;
             q[(state, state)] = variation.1.powi(2) * (1.0 - keep * keep);
         }
-        if let Some(turn) = layout.turn_at_rest() {
+        if let Some(turn) = layout.turn_at_rest {
             let change = phi.rows(ATTITUDE, 3).into_owned();
             let mut rows = phi.rows_mut(turn, 3);
             rows += change;
             (0..3).for_each(|axis| phi[(turn + axis, ATTITUDE + axis)] -= 1.0);
-            let own = filter.rotation_at_rest.powi(2) * block.duration;
+            let own = filter.model.turning_at_rest.powi(2) * block.duration;
             for axis in 0..3 {
                 for other in 0..3 {
                     let of_attitude = q[(ATTITUDE + axis, ATTITUDE + other)];
@@ -114,11 +114,11 @@ impl Textbook {
     pub fn through(
         &mut self,
         filter: &Filter,
-        segment: &Segment,
+        segment: &Rest,
         (model, stretch): (&Model, &Stretch),
     ) -> Vec<ScalarInnovation> {
         let mut scalars = Vec::new();
-        let turn = filter.layout.turn_at_rest();
+        let turn = filter.layout.turn_at_rest;
         for step in &segment.steps {
             let firsts = [ATTITUDE, VELOCITY, POSITION].into_iter();
             let referred = firsts.zip(step.referred);
@@ -144,14 +144,14 @@ impl Textbook {
         let first = match seen.kind {
             Observation::Velocity => VELOCITY,
             Observation::Table => ATTITUDE,
-            Observation::Attitude => layout.turn_at_rest().unwrap(),
+            Observation::Attitude => layout.turn_at_rest.unwrap(),
         };
         h[first + axis] = 1.0;
         if seen.kind == Observation::Table {
-            if let Some(position) = layout.table_position() {
+            if let Some(position) = layout.table_position {
                 h[position + axis] = -1.0;
             }
-            for (k, constant) in layout.constants().iter().enumerate() {
+            for (k, constant) in layout.constants.iter().enumerate() {
                 if *constant == Constant::Base(axis) {
                     h[self.states + k] = -1.0;
                 }

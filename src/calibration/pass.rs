@@ -1,16 +1,15 @@
-//! What a pass gives.
+//! A pass of the filter through a record: estimate, covariance, and which observations it let in.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::calibration::checks::innovation::Innovation;
 use crate::calibration::checks::observability::AttitudeCovariance;
-use crate::calibration::constants::{Constant, Posterior, parameters};
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::PARAMETERS;
-use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_vector};
-use crate::calibration::reduction::Reduction;
-use crate::calibration::several::thermal::Thermal;
+use crate::calibration::constants::parameters;
+pub use crate::calibration::filter::Gate;
+use crate::calibration::filter::Judge;
+use crate::calibration::{
+    Auxiliary, CalibrationError, Constant, Innovation, Linearisation, Model, PARAMETERS, Posterior,
+    Prior, Problem, Reduction, Script, Thermal, auxiliary_vector,
+};
 
 /// What a pass gives.
 #[derive(Debug, Clone)]
@@ -23,16 +22,44 @@ pub struct PassResult {
     /// Cost: whitened innovations squared, summed; the prior is in it, since the filter starts from it.
     /// A rejected observation counts as much as the gate lets pass.
     pub cost: f64,
-    /// Logarithm of the determinant of the covariance of all innovations let in: with the cost, −2 ln
-    /// of the likelihood.
-    pub log_determinant: f64,
     pub innovations: Vec<Innovation>,
+}
+
+/// A pass through what happens in a record.
+pub fn pass(
+    problem: &Problem,
+    script: &Script,
+    gate: Gate,
+) -> Result<PassResult, CalibrationError> {
+    let limit = problem.gate_limit();
+    let mut judge = Judge::new(gate, limit);
+    let reduction = script.follow(problem, &mut judge, true)?;
+    let prior = Prior::new(&reduction.constants, &problem.model, script.at);
+    let innovations = judge.innovations;
+    let cost = |of: &Innovation| if of.accepted { of.distance() } else { limit };
+    Ok(PassResult {
+        at: script.at.clone(),
+        posterior: reduction.posterior(&prior),
+        reduction,
+        cost: innovations.iter().map(cost).sum(),
+        innovations,
+    })
 }
 
 impl PassResult {
     /// Which observations were let in.
     pub fn accepted(&self) -> Vec<bool> {
         self.innovations.iter().map(|of| of.accepted).collect()
+    }
+
+    /// Those that were.
+    pub fn let_in(&self) -> impl Iterator<Item = &Innovation> {
+        self.innovations.iter().filter(|of| of.accepted)
+    }
+
+    /// −2 ln of the likelihood, except a constant.
+    pub fn deviance(&self) -> f64 {
+        self.let_in().map(Innovation::deviance).sum()
     }
 
     /// Where the next pass linearises.
@@ -42,18 +69,16 @@ impl PassResult {
 
     /// Mean and 1σ of the error of gravity, true − stated, m/s²; zero where it is not estimated.
     pub fn gravity(&self) -> (f64, f64) {
-        let of_site = self.reduction.gravity.as_ref();
-        let of_site = of_site.map(|gravity| gravity.given(&self.posterior));
+        let Posterior {
+            mean, covariance, ..
+        } = &self.posterior;
+        let of_site = self.reduction.gravity.as_ref().map(|gravity| {
+            let (mean, covariance) = gravity.given(&self.posterior);
+            (mean[0], covariance[(0, 0)])
+        });
         let mut constants = self.reduction.constants.iter();
         let place = constants.position(|&constant| constant == Constant::Gravity);
-        let of_all = place.map(|k| {
-            let Posterior {
-                mean, covariance, ..
-            } = &self.posterior;
-            (mean[k], covariance[(k, k)])
-        });
-        let of_site = of_site.map(|(mean, covariance)| (mean[0], covariance[(0, 0)]));
-        let found = of_site.or(of_all);
+        let found = of_site.or_else(|| place.map(|k| (mean[k], covariance[(k, k)])));
         found.map_or((0.0, 0.0), |(mean, variance)| {
             (mean, variance.max(0.0).sqrt())
         })

@@ -1,0 +1,310 @@
+//! Causes of what a record shows beyond its model: what happened once (a wrong position of the table, a turn that the gyros
+//! did not sense, a step of biases), and error terms.
+//!
+//! They are looked for before noise is estimated, which would become large to explain them. What each one would do to the
+//! estimate follows from its score and information beside the constants, without another pass (Rao 1948, "Large sample
+//! tests of statistical hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
+
+mod score;
+pub mod settling;
+
+use nalgebra::Vector3;
+use serde_json::json;
+
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
+    Innovation, Iterated, Observation, Prior, Problem, Script,
+};
+use crate::imu::Sensor;
+use crate::run::{Aiding, Dwell};
+use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
+pub use score::Cause;
+use score::Scores;
+
+/// Components of a disturbance.
+const COMPONENTS: usize = 3;
+
+/// A cause that is beyond chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FoundCause {
+    /// Which.
+    pub cause: Cause,
+    /// When it began, s; of an error term zero.
+    time: f64,
+    /// Its components; of an error term zero.
+    value: Vector3<f64>,
+    /// −2 ln of the probability that as much is chance …
+    significance: f64,
+    /// … and what that stays below.
+    limit: f64,
+}
+
+/// Something that may be a cause, with what shows it.
+#[derive(Clone, Copy)]
+struct Candidate {
+    cause: Cause,
+    time: f64,
+    value: Vector3<f64>,
+    /// χ² if it is none, and its degrees of freedom.
+    square: f64,
+    degrees: f64,
+}
+
+/// The cause in what was solved that explains most; none where none is beyond chance.
+///
+/// Chance is as wide as half of all positions and half of all slips show, or as the noise says if that is wider.
+///
+/// # Errors
+/// As of a pass.
+pub fn likeliest(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    iterated: &Iterated,
+) -> Result<Option<FoundCause>, CalibrationError> {
+    let read = of_readings(&iterated.held.innovations);
+    let scored = by_score(problem, priors, iterated)?;
+    let limit = -2.0 * (FALSE_ALARM / (read.len() + scored.len()).max(1) as f64).ln();
+    let of_kind = |kind| {
+        let is = |of: &&Candidate| matches!(of.cause, Cause::Disturbance(of) if of.kind == kind);
+        chance(scored.iter().filter(is))
+    };
+    let of_read = chance(read.iter());
+    let [of_positions, of_slips] = [DisturbanceKind::Position, DisturbanceKind::Slip].map(of_kind);
+    // By hand every move is another; that one is worst only tells how wide chance is.
+    let table = problem.model.aiding == Aiding::Table;
+    let scored = scored.iter().filter_map(|of| match of.cause {
+        Cause::Term(_) => Some((of, of_positions.max(of_slips))),
+        Cause::Disturbance(_) if !table => None,
+        Cause::Disturbance(disturbance) => Some(match disturbance.kind {
+            DisturbanceKind::Position => (of, of_positions),
+            DisturbanceKind::Slip => (of, of_slips),
+            _ => (of, of_positions.max(of_slips)),
+        }),
+    });
+    let each = read.iter().map(|of| (of, of_read)).chain(scored);
+    let each = each.map(|(of, chance)| {
+        let found = FoundCause {
+            cause: of.cause,
+            time: of.time,
+            value: of.value,
+            significance: -2.0 * ln_survival(of.degrees, of.square / chance),
+            limit,
+        };
+        (of.square - chance * of.degrees, found)
+    });
+    let beyond = each.filter(|(_, found)| found.significance > limit);
+    let most = beyond.max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(most.map(|(_, found)| found))
+}
+
+/// How wide chance is: as half of these show, if that is wider than the noise says.
+fn chance<'a>(all: impl Iterator<Item = &'a Candidate>) -> f64 {
+    let mut ratios: Vec<f64> = all.map(|of| of.square / of.degrees).collect();
+    median(&mut ratios).unwrap_or(1.0).max(1.0)
+}
+
+/// Positions of the table, by the innovations of those of its readings that are no outliers.
+fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
+    let dwells = innovations.chunk_by(|one, other| one.dwell == other.dwell);
+    let sound = chi_square_limit(COMPONENTS as f64, FALSE_ALARM);
+    let of_dwell = |dwell: &[Innovation]| {
+        let is_read = |of: &&Innovation| of.observation == Observation::Table && of.accepted;
+        // The first ones may show the move.
+        let read = dwell
+            .iter()
+            .filter(is_read)
+            .skip_while(|of| of.distance() > sound);
+        let read: Vec<&Innovation> = read.collect();
+        let largest = read
+            .iter()
+            .max_by(|a, b| a.distance().total_cmp(&b.distance()))?;
+        Some(Candidate {
+            cause: Cause::Disturbance(Disturbance {
+                kind: DisturbanceKind::Position,
+                dwell: largest.dwell,
+            }),
+            time: largest.time,
+            value: Vector3::zeros(),
+            square: read.iter().map(|of| of.distance()).sum(),
+            degrees: (COMPONENTS * read.len()) as f64,
+        })
+    };
+    dwells.filter_map(of_dwell).collect()
+}
+
+/// All that may have happened once, then all error terms that are off and that the record can hold, by their scores.
+fn by_score(
+    problem: &Problem,
+    priors: &[AttitudePrior],
+    iterated: &Iterated,
+) -> Result<Vec<Candidate>, CalibrationError> {
+    let (disturbances, mut model) = (disturbances(problem), problem.model.clone());
+    let terms = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
+    let terms: Vec<ErrorTerm> = terms.collect();
+    model.disturbances.extend(&disturbances);
+    terms.iter().for_each(|&term| model.switch_on(term));
+    let (with, at) = (problem.with_model(model), &iterated.estimate);
+    let reduction = Script::new(&with, priors, at)?.reduce(&with, &iterated.held.accepted())?;
+    let prior = Prior::new(&reduction.constants, &with.model, at);
+    let once = disturbances.into_iter().map(Cause::Disturbance);
+    let causes: Vec<Cause> = once.chain(terms.into_iter().map(Cause::Term)).collect();
+    let is_off = |constant: &Constant| Cause::of(constant).is_some_and(|of| causes.contains(&of));
+    let Some(scores) = Scores::new(&reduction, &prior, is_off) else {
+        return Ok(Vec::new());
+    };
+    let candidates = causes.iter().filter_map(|&cause| {
+        let (square, degrees, value) = scores.explained_by(cause)?;
+        let time = match cause {
+            Cause::Disturbance(of) => time_of(problem, of),
+            Cause::Term(_) => 0.0,
+        };
+        Some(Candidate {
+            cause,
+            time,
+            value,
+            square,
+            degrees,
+        })
+    });
+    Ok(candidates.collect())
+}
+
+/// All that may have happened once and is not estimated already.
+fn disturbances(problem: &Problem) -> Vec<Disturbance> {
+    let table = problem.model.aiding == Aiding::Table;
+    let all = problem.dwells().enumerate().flat_map(|(dwell, of)| {
+        let kinds = [
+            (DisturbanceKind::Position, table && of.position.is_some()),
+            (DisturbanceKind::Slip, dwell > 0),
+            (DisturbanceKind::BiasStep(Sensor::Gyro), table && dwell > 0),
+            (DisturbanceKind::BiasStep(Sensor::Accel), table && dwell > 0),
+            (DisturbanceKind::EarthRate, table && dwell == 0),
+        ];
+        let may_be = kinds.into_iter().filter(|(_, may_be)| *may_be);
+        may_be.map(move |(kind, _)| Disturbance { kind, dwell })
+    });
+    let estimated = &problem.model.disturbances;
+    all.filter(|of| !estimated.contains(of)).collect()
+}
+
+/// When a disturbance happened, s: in the middle of the move before its dwell or, of a position, as the dwell begins.
+fn time_of(problem: &Problem, disturbance: Disturbance) -> f64 {
+    let times = problem.stretches().iter().flat_map(|stretch| {
+        let imu = &stretch.run.recording.imu;
+        let ends = |dwell: &Dwell| [dwell.samples.start, dwell.samples.end];
+        let dwells = stretch.dwells.iter();
+        dwells.map(move |dwell| ends(dwell).map(|end| imu.time(end)))
+    });
+    let times: Vec<[f64; 2]> = times.collect();
+    let begin = times[disturbance.dwell][0];
+    match (disturbance.kind, disturbance.dwell.checked_sub(1)) {
+        (DisturbanceKind::Slip | DisturbanceKind::BiasStep(_), Some(before)) => {
+            0.5 * (times[before][1] + begin)
+        }
+        _ => begin,
+    }
+}
+
+impl FoundCause {
+    /// The problem with it: readings of a wrong position are left out, all else is estimated.
+    pub fn taken_into<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
+        let mut model = problem.model.clone();
+        match self.cause {
+            Cause::Term(term) => model.switch_on(term),
+            Cause::Disturbance(of) if of.kind == DisturbanceKind::Position => {
+                return problem.with_dwells(|number, _, dwell| {
+                    let position = dwell.position.clone().filter(|_| number != of.dwell);
+                    let samples = dwell.samples.clone();
+                    Some(Dwell { samples, position })
+                });
+            }
+            Cause::Disturbance(of) => model.disturbances.push(of),
+        }
+        problem.with_model(model)
+    }
+
+    /// What it is, when, and what became of it.
+    pub fn finding(&self) -> Finding {
+        let Self {
+            time,
+            significance,
+            limit,
+            ..
+        } = self;
+        let tested = format!("(significance {significance:.0}; limit {limit:.0})");
+        let mut figures = json!({ "significance": significance, "limit": limit });
+        let (kind, text) = match self.cause {
+            Cause::Term(term) => {
+                let name = term.name();
+                figures["term"] = json!(name);
+                let text = format!(
+                    "The data show an error that scale factors, misalignments and biases cannot explain: {name}. turncal \
+                     estimated it with them, as --with {name} does. Apply the values together with this term"
+                );
+                ("error-term-estimated", text)
+            }
+            Cause::Disturbance(disturbance) => {
+                figures["dwell"] = json!(disturbance.dwell + 1);
+                figures["time_s"] = json!(time);
+                self.of_disturbance(disturbance)
+            }
+        };
+        Finding::new(kind, format!("{text} {tested}."), figures)
+    }
+
+    /// Kind and words of the finding of a disturbance.
+    fn of_disturbance(&self, disturbance: Disturbance) -> (&'static str, String) {
+        let time = self.time;
+        let number = disturbance.dwell + 1;
+        let seconds = self.value.norm() / ARCSEC;
+        let angle = match seconds {
+            ..1000.0 => format!("{seconds:.0}″"),
+            _ => format!("{:.3}°", seconds / 3600.0),
+        };
+        match disturbance.kind {
+            DisturbanceKind::Position => {
+                let by = if seconds > 0.0 {
+                    format!(" by {angle}")
+                } else {
+                    String::new()
+                };
+                let text = format!(
+                    "The table's readings in dwell {number} are wrong{by} (at {time:.1} s). turncal left them out. Look \
+                     there for a bump or a wrong reading"
+                );
+                ("position-wrong", text)
+            }
+            DisturbanceKind::Slip => {
+                let text = format!(
+                    "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
+                     estimated it. Look there for lost samples, an exceeded range or a loose mount"
+                );
+                ("move-wrong", text)
+            }
+            DisturbanceKind::EarthRate => {
+                let value = self.value / DEG_PER_H;
+                let text = format!(
+                    "The gyros sense an Earth rate that differs from the one at latitude_deg by {:+.4}, {:+.4}, {:+.4} °/h \
+                     (East, North, Up). turncal estimated it. Check latitude_deg, and the table's north and level",
+                    value.x, value.y, value.z
+                );
+                ("earth-rate-wrong", text)
+            }
+            DisturbanceKind::BiasStep(sensor) => {
+                let (unit, name) = match sensor {
+                    Sensor::Gyro => (DEG_PER_H, "°/h"),
+                    Sensor::Accel => (MICRO_G, "µg"),
+                };
+                let text = format!(
+                    "The {} bias stepped by {:.3} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
+                     step; the calibration has the mean of both biases. Look there for a shock, or a change of supply \
+                     or temperature",
+                    sensor.name(),
+                    self.value.norm() / unit,
+                );
+                ("bias-step", text)
+            }
+        }
+    }
+}

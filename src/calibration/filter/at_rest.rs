@@ -1,0 +1,191 @@
+//! How errors go on at rest, and what a filter of a part of a dwell is given.
+
+use nalgebra::DMatrix;
+
+use super::Filter;
+use super::gain_cache::StepModel;
+use super::input_prior::InputPrior;
+use super::propagation::{effect_of, of_moving, own};
+use super::update::Linear;
+use crate::calibration::record::Rest;
+use crate::calibration::{
+    ATTITUDE, Constant, DisturbanceKind, Known, NAVIGATION, POSITION, VELOCITY,
+};
+use crate::navigation::Block;
+
+/// Rates and specific forces that are constant in a dwell.
+const CONSTANTS: usize = 6;
+
+/// How the errors make what a filter of a part of a dwell is about.
+pub struct Map {
+    pub given: Linear,
+    /// By how much the attitude of the table is off, East, North and Up.
+    pub table: Linear,
+}
+
+/// The moving states, of this many, that are in `g`: nothing in a dwell depends on the position.
+pub fn begins(moving: usize) -> impl Iterator<Item = usize> {
+    (0..moving).filter(|place| !(POSITION..POSITION + 3).contains(place))
+}
+
+impl Filter {
+    /// The states that move in a dwell: navigation errors, the turn at rest, varying biases.
+    pub fn moving(&self) -> Vec<usize> {
+        let varying = self.layout.varying_biases.iter().map(|of| of.0);
+        self.moving_in_moves().into_iter().chain(varying).collect()
+    }
+
+    /// `g`, of this size: what moves when it begins except the position; rates
+    /// and specific forces by which constants drive the errors of attitude and velocity.
+    ///
+    /// Attitude errors are those from the attitude of the table, `φ − τ`, which its readings show: what the
+    /// Earth's rate and gravity make of τ is constant, too.
+    pub fn map(&self, rest: &Rest, block: &Block, size: usize) -> Map {
+        let mut given = self.none(size);
+        let table = self.table_map(rest);
+        let moving = self.moving();
+        for (component, place) in begins(moving.len()).enumerate() {
+            given.states[(component, moving[place])] = 1.0;
+        }
+        let first = size - CONSTANTS;
+        let drive = |to: &mut DMatrix<f64>, by: usize, column: &[f64; NAVIGATION]| {
+            for (k, rate) in rates(block, column).into_iter().enumerate() {
+                to[(first + k, by)] = rate;
+            }
+        };
+        for (state, column) in self.driving_columns(block).iter().enumerate() {
+            if !moving.contains(&state) {
+                drive(&mut given.states, state, column);
+            }
+        }
+        for (k, column) in self.constant_effects(block).enumerate() {
+            drive(&mut given.columns, k, &column);
+        }
+        // What the table's attitude does to `g`.
+        let mut shift = DMatrix::zeros(size, 3);
+        for axis in 0..3 {
+            let itself = |row| f64::from(row == ATTITUDE + axis);
+            let change = |row| block.navigation[(row, ATTITUDE + axis)] - itself(row);
+            drive(&mut shift, axis, &std::array::from_fn(change));
+            shift[(ATTITUDE + axis, axis)] = -1.0;
+        }
+        given.add(0, &table.combined(&shift));
+        Map { given, table }
+    }
+
+    /// By how much the attitude of the table is off.
+    fn table_map(&self, rest: &Rest) -> Linear {
+        let mut table = self.none(3);
+        let response = rest.axes.as_deref();
+        for axis in 0..3 {
+            if let Some(position) = self.layout.table_position {
+                table.states[(axis, position + axis)] = 1.0;
+            }
+            for (k, constant) in self.layout.constants.iter().enumerate() {
+                table.columns[(axis, k)] = match constant {
+                    Constant::Base(of) => f64::from(*of == axis),
+                    Constant::Axis(of) => response.map_or(0.0, |response| response[(axis, *of)]),
+                    Constant::Disturbance(of, component) => {
+                        let is_position = of.kind == DisturbanceKind::Position;
+                        f64::from(is_position && self.is_in(of.dwell) && *component == axis)
+                    }
+                    _ => 0.0,
+                };
+            }
+        }
+        table
+    }
+
+    /// What is known of `g` before, given its covariance with all states and what is known of the constants.
+    pub fn given<const G: usize>(
+        &self,
+        rows: &Linear,
+        across: &DMatrix<f64>,
+        known: &Known,
+    ) -> InputPrior<G> {
+        let by_constants = &rows.states * self.columns.of_states.transpose() + &rows.columns;
+        let (of_constants, root) = known.through(&by_constants);
+        let mean = &rows.states * &self.x + of_constants;
+        let covariance = across * rows.states.transpose() + &root * root.transpose();
+        InputPrior::new(
+            std::array::from_fn(|i| mean[i]),
+            std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        )
+    }
+
+    /// How the states that move go on in a step of a dwell, and what noise and constants add to them.
+    pub fn step_model<const M: usize>(&self, block: &Block) -> StepModel<M> {
+        // The last states are varying biases, which drive navigation errors as those that are constant do.
+        let first = M - self.varying.len();
+        let navigation = block.navigation.column_iter();
+        let navigation = navigation.map(|column| std::array::from_fn(|row| column[row]));
+        let turn = std::iter::repeat_n([0.0; NAVIGATION], first - NAVIGATION);
+        let varying = self.layout.varying_biases.iter();
+        let varying = varying.map(|&(_, sensor, constant)| effect_of(block, sensor, constant));
+        let columns: Vec<_> = navigation.chain(turn).chain(varying).collect();
+        let constants = driven_at_rest(block);
+        let of_navigation = self.noise_of(block);
+        let (mut transition, mut driven) = (Vec::new(), Vec::new());
+        let mut noise = [[0.0; M]; M];
+        for row in 0..first {
+            for (k, column) in columns.iter().enumerate() {
+                let itself = f64::from(row >= NAVIGATION && k == row);
+                transition.push((row, k, of_moving(column, row, k) + itself));
+            }
+            for (k, column) in constants.iter().enumerate() {
+                driven.push((row, M - 3 + k, column[own(row)]));
+            }
+            for column in 0..first {
+                let of_block = (&of_navigation, block.duration);
+                noise[row][column] = self.noise_of_moving(of_block, row, column);
+            }
+        }
+        for (k, &(state, sigma, correlation_time)) in self.varying.iter().enumerate() {
+            let (place, keep) = (first + k, (-block.duration / correlation_time).exp());
+            transition.push((place, place, keep));
+            noise[place][place] = sigma.powi(2) * self.weight_of(state) * (1.0 - keep * keep);
+        }
+        transition.retain(|&(.., phi)| phi != 0.0);
+        driven.retain(|&(.., by)| by != 0.0);
+        StepModel {
+            noise,
+            transition,
+            driven,
+        }
+    }
+}
+
+/// What three constant rates and three specific forces make of the navigation errors at rest.
+fn driven_at_rest(block: &Block) -> [[f64; NAVIGATION]; CONSTANTS] {
+    let t = block.duration;
+    std::array::from_fn(|constant| {
+        let (axis, is_rate) = (constant % 3, constant < 3);
+        std::array::from_fn(|row| {
+            // A rate tilts evenly while force acts on the tilt.
+            let tilting = block.navigation[(VELOCITY + row % 3, axis)];
+            let here = f64::from(row % 3 == axis);
+            match (row / 3, is_rate) {
+                (0, true) => t * here,
+                (0, false) => 0.0,
+                (1, true) => 0.5 * t * tilting,
+                (1, false) => t * here,
+                (_, true) => t * t / 6.0 * tilting,
+                (_, false) => 0.5 * t * t * here,
+            }
+        })
+    })
+}
+
+/// Rate in rad/s and specific force in m/s² that make this of a block at rest.
+fn rates(block: &Block, column: &[f64; NAVIGATION]) -> [f64; CONSTANTS] {
+    let t = block.duration;
+    std::array::from_fn(|k| match k {
+        0..3 => column[ATTITUDE + k] / t,
+        _ => {
+            let tilted: f64 = (0..3)
+                .map(|axis| block.navigation[(VELOCITY + k - 3, axis)] * column[ATTITUDE + axis])
+                .sum();
+            (column[VELOCITY + k - 3] - 0.5 * tilted) / t
+        }
+    })
+}
