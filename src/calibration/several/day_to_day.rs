@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, Vector3};
 use crate::attitude::exp;
 use crate::calibration::parameters::group::Group;
 use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
+    PARAMETERS, ParameterMatrix, ParameterVector, derivatives, from_vector, to_vector,
 };
 use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
@@ -50,8 +50,6 @@ pub enum OwnState {
 
 /// Rounds in which a mounting of a degree is found to a thousandth of a second of arc.
 const ROUNDS: usize = 3;
-/// Step of derivatives: small to their third order, large to rounding.
-const STEP: f64 = 1e-4;
 
 impl DayToDay {
     /// Whether anything differs.
@@ -118,31 +116,17 @@ impl Difference {
 
     /// How the parameters of the recording change with those of all and with its mounting.
     pub(in crate::calibration) fn response(&self, common: &PerSensor<Triad>) -> Turned {
-        let form = common.gyro.form;
         let before = to_vector(common) + self.parameters;
         let after = |mounting: &Vector3<f64>, parameters: &ParameterVector| {
             let turned = Self {
                 mounting: *mounting,
                 ..*self
             };
-            to_vector(&turned.turned(&from_vector(form, parameters)))
+            to_vector(&turned.turned(&from_vector(common.gyro.form, parameters)))
         };
-        let difference = |up: ParameterVector, down: ParameterVector| (up - down) / (2.0 * STEP);
-        let columns = |k: usize| {
-            let step = ParameterVector::from_fn(|i, _| if i == k { STEP } else { 0.0 });
-            let at = |step| after(&self.mounting, &(before + step));
-            difference(at(step), at(-step))
-        };
-        let turns = [0, 1, 2].map(|axis| {
-            let step = Vector3::from_fn(|i, _| if i == axis { STEP } else { 0.0 });
-            let at = |step| after(&(self.mounting + step), &before);
-            difference(at(step), at(-step))
-        });
         Turned {
-            by_parameters: ParameterMatrix::from_columns(&std::array::from_fn::<_, PARAMETERS, _>(
-                columns,
-            )),
-            by_mounting: SMatrix::from_columns(&turns),
+            by_parameters: derivatives(&before, |parameters| after(&self.mounting, parameters)),
+            by_mounting: derivatives(&self.mounting, |mounting| after(mounting, &before)),
         }
     }
 

@@ -190,7 +190,10 @@ fn whole_nees(
 ) -> Option<Nees> {
     const ALL: usize = PARAMETERS + AUXILIARY;
     let auxiliary = &outcome.auxiliary;
-    let cross = outcome.estimate.to_general_form() * &auxiliary.cross;
+    let cross = outcome
+        .estimate
+        .to_general_form(crate::imu::BodyFrame::Table)
+        * &auxiliary.cross;
     let mut covariance = SMatrix::<f64, ALL, ALL>::zeros();
     covariance
         .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
