@@ -1,11 +1,7 @@
 //! The report of a study of campaigns.
 
-use serde_json::{Map, Value, json};
-
-use super::document::{Document, Table};
-use super::group::Group;
-use super::number::{three_digits, value};
 use crate::imu::RATE;
+use crate::report::prelude::*;
 use crate::study::CampaignAccuracy;
 
 /// Everything that is said of a study.
@@ -77,15 +73,7 @@ fn figures(accuracy: &CampaignAccuracy) -> Table {
     });
     Table::new(
         "RMS errors against σ and bound",
-        [
-            "",
-            "unit",
-            "campaigns",
-            "RMS error",
-            "RMS σ",
-            "RMS bound",
-            "error/bound (99 %)",
-        ],
+        columns("| unit | campaigns | RMS error | RMS σ | RMS bound | error/bound (99 %)"),
     )
     .sections(sections)
     .note("Bound: Cramér–Rao, linearised at the truth with the orders that were chosen.")

@@ -1,8 +1,7 @@
 //! What both methods are worth at the same table time, and the closed form with all the time it takes.
 
-use super::document::{Block, Document, Table};
-use super::number::three_digits;
 use super::quantity::Quantity;
+use crate::report::prelude::*;
 use crate::study::navigation::Outlook;
 
 /// One way of navigating by several calibrations.

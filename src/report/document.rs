@@ -240,6 +240,11 @@ into_block!(Facts, Table, Plot, List);
 /// In the place of a number that there is not.
 pub(super) const NONE: &str = "–";
 
+/// The headings of a table's columns, of a line with bars between them.
+pub(super) fn columns(line: &str) -> impl Iterator<Item = &str> {
+    line.split('|').map(str::trim)
+}
+
 /// A row of a table.
 macro_rules! cells {
     ($($cell:expr),* $(,)?) => { vec![$(String::from($cell)),*] };

@@ -1,11 +1,9 @@
 //! What each error term costs and explains: tables, and a sentence where NIS betrays an error that is not
 //! modelled.
 
-use super::document::{NONE, Table, cells};
-use super::group::Group;
-use super::number::{three_digits, value};
 use super::terms::title;
 use crate::calibration::ErrorTermTest;
+use crate::report::prelude::*;
 
 /// Costs of the error terms that were on.
 pub(super) fn costs(effects: &[ErrorTermTest]) -> Table {
@@ -42,15 +40,7 @@ pub(super) fn explained(effects: &[ErrorTermTest]) -> Table {
             .iter()
             .filter(move |e| e.on == on && (e.on || e.significant()))
     };
-    let columns = [
-        "term",
-        "",
-        "NIS",
-        "cost falls by",
-        "by chance",
-        "significant",
-    ];
-    Table::new("What each error term explains", columns)
+    Table::new("What each error term explains", columns("term | | NIS | cost falls by | by chance | significant"))
         .sections([shown(true).map(row), shown(false).map(row)])
         .note(
             "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: \

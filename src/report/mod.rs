@@ -49,11 +49,12 @@ mod group;
 pub mod lot;
 pub mod navigation;
 mod outlook;
+mod prelude;
 mod quantity;
-#[cfg(test)]
-mod synthetic;
 pub mod table1;
 mod terms;
+#[cfg(test)]
+mod tests;
 
 pub use document::Document;
 pub use files::{ReportError, files, write};

@@ -4,19 +4,14 @@
 #[cfg(test)]
 mod tests;
 
-use std::fmt::Write;
-
-use serde_json::{Map, Value, json};
-
-use super::document::{Document, Facts, NONE, Table, cells};
-use super::number::{or_dash, three_digits, value};
-use super::plot::{Axis, Panel, Plot, Series};
 use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::BodyFrame;
 use crate::imu::Sensor;
+use crate::report::prelude::*;
 use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion, Warming};
 use crate::units::{DEGREE, NAUTICAL_MILE};
+use std::fmt::Write;
 
 const HOUR: f64 = 3600.0;
 /// Hours over which the paper gives the drift of position.
@@ -140,17 +135,8 @@ impl Navigation<'_> {
     }
 
     fn table(&self) -> Table {
-        let columns = [
-            "",
-            "unit",
-            "largest",
-            "after h",
-            "at the end",
-            "σ",
-            "error/σ",
-        ];
         let rows = Quantity::ALL.map(|quantity| self.row(quantity));
-        let table = Table::new("Errors", columns)
+        let table = Table::new("Errors", columns("| unit | largest | after h | at the end | σ | error/σ"))
             .sections(rows.chunks(3).map(<[_]>::to_vec))
             .note(
                 "Computed minus true. σ: of the error at the end, predicted from the calibration's covariance; \

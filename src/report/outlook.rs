@@ -1,10 +1,8 @@
 //! What the calibrations of one run are worth: their navigation errors side by side, or where the truth is not
 //! known their predicted σ alone.
 
-use super::document::{Block, Document, Table};
-use super::number::{self, three_digits};
-use super::plot::{Axis, Panel, Plot, Point, Series};
 use super::quantity::Quantity;
+use crate::report::prelude::*;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 const HEADING: &str = "Navigation with this calibration";
@@ -66,7 +64,7 @@ fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
 /// Duration in words.
 fn long(navigated: &[Navigated]) -> String {
     let (unit, size) = clock(navigated);
-    format!("{} {unit}", number::value(duration(navigated) / size, 10.0))
+    format!("{} {unit}", value(duration(navigated) / size, 10.0))
 }
 
 /// Error and its σ in the usual unit.
@@ -175,7 +173,7 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
         }
         Of::Drift => ("drift".to_owned(), format!("{unit}/{unit_of_time}"), scale),
     };
-    let shown = |x: Option<f64>| number::or_dash(x, |x| three_digits(x * scale));
+    let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
     let mut row = vec![name, unit];
     for (error, sigma) in numbers {
         row.extend(is_known(navigated).then(|| shown(error)));

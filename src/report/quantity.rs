@@ -1,8 +1,7 @@
 //! What is reported of a navigation error, and in which unit.
 
+use crate::report::prelude::*;
 use nalgebra::SVector;
-
-use super::plot::{Axis, Panel, Point, Series, Shape};
 
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;

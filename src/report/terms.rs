@@ -1,15 +1,13 @@
 //! How auxiliary parameters, those beside the parameters of the triads, are spoken of.
 
-use std::collections::BTreeMap;
-
-use super::document::NONE;
-use super::number::{plus_minus, three_digits, value};
 use crate::calibration::ErrorTerm;
 use crate::calibration::OBSERVED_BELOW;
 use crate::calibration::result::TermRecord;
 use crate::calibration::{Auxiliary, AuxiliaryKind, auxiliary_name};
+use crate::report::prelude::*;
 use crate::turntable::AxisError;
 use crate::units::ARCSEC;
+use std::collections::BTreeMap;
 
 /// An error term in words.
 pub(super) fn title(block: ErrorTerm) -> &'static str {

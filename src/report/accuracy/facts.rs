@@ -1,9 +1,8 @@
 //! What was studied, as pairs of a name and a value.
 
-use super::super::document::Facts;
-use super::super::number::{count, minutes, three_digits, value};
 use super::super::terms::title;
 use crate::calibration::ErrorTerm;
+use crate::report::prelude::*;
 use crate::study::Accuracy;
 use crate::units::DEGREE;
 

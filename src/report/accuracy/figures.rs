@@ -1,9 +1,8 @@
 //! The figures.
 
-use super::super::number::{minutes, with_interval};
-use super::super::plot::{Anchor, Axis, Color, Mark, Panel, Plot, Point, Series, Shape};
 use super::compared::compared;
 use super::normalised;
+use crate::report::prelude::*;
 use crate::study::{Accuracy, Figures, GroupAccuracy, Ratio};
 
 /// The narrowest axis about a ratio of one.

@@ -10,9 +10,8 @@ mod tables;
 mod tests;
 mod verdict;
 
-use super::document::Document;
 use super::effects;
-use super::number::count;
+use crate::report::prelude::*;
 use crate::study::Accuracy;
 
 /// Everything that is said of the study.

@@ -1,22 +1,13 @@
 //! The tables, alike for terminal and page.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{count, interval, minutes, or_dash, three_digits, value, with_interval};
 use super::super::terms::{title, unit};
 use super::compared::{Compared, compared, journey_name, region_name, white_within};
 use crate::calibration::Nis;
+use crate::report::prelude::*;
 use crate::study::accuracy::{Containment, ErrorTermAccuracy};
 use crate::study::{Accuracy, Ratio};
 
-const AGAINST_BOUND: [&str; 7] = [
-    "",
-    "unit",
-    "RMS error",
-    "RMS σ",
-    "RMS bound",
-    "error/bound",
-    "99 % interval",
-];
+const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
 /// What ought to be one, with the digits that the width of its interval leaves meaning to.
 pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
@@ -66,7 +57,7 @@ pub(super) fn bound(accuracy: &Accuracy) -> Table {
         let rms = [figures.filter, figures.claimed, figures.bound];
         against_bound(rms, of.unit_value, figures.ratio.as_ref())
     };
-    Table::new("EKF against the Cramér–Rao bound", AGAINST_BOUND)
+    Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
         .note("RMS over all runs and the parameters of a group; σ: what the filter claims.")
         .note("Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.")
@@ -81,7 +72,7 @@ pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
         let cells = against_bound(rms, in_si, of.ratio.as_ref());
         [cells![title(of.term), unit], cells].concat()
     };
-    Table::new("Error terms beside K, E and D", AGAINST_BOUND)
+    Table::new("Error terms beside K, E and D", columns(AGAINST_BOUND))
         .section(accuracy.error_terms.iter().map(row))
         .note("RMS over all runs and the parameters of a term.")
 }
@@ -117,15 +108,6 @@ pub(super) fn gain(accuracy: &Accuracy) -> Table {
 }
 
 pub(super) fn consistency(accuracy: &Accuracy) -> Table {
-    let columns = [
-        "",
-        "mean",
-        "95 % interval",
-        "99.8 % interval",
-        "numbers",
-        "lag-one correlation",
-        "99 % if white",
-    ];
     let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
     let directions = filtered.filter_map(|f| Some(f.nees?.count)).sum();
     let nees = accuracy.anees.map(|of| {
@@ -144,7 +126,9 @@ pub(super) fn consistency(accuracy: &Accuracy) -> Table {
         ("NIS table attitude", &accuracy.table),
     ];
     let nis = nis.into_iter().filter(|(_, nis)| nis.count > 0);
-    Table::new("Consistency", columns)
+    Table::new("Consistency", columns(
+"| mean | 95 % interval | 99.8 % interval | numbers | lag-one correlation | 99 % if white",
+))
         .section(nees.into_iter().chain(nis.map(|(name, nis)| nis_row(name, nis))))
         .note("NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.")
         .note("Both are one if σ are true; the intervals are χ².")
@@ -165,14 +149,6 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
 
 /// Whether position errors lie within their predicted σ.
 pub(super) fn containment(accuracy: &Accuracy) -> Table {
-    let columns = [
-        "",
-        "runs",
-        "within",
-        "claimed",
-        "99 % interval",
-        "as claimed",
-    ];
     let sections = accuracy.navigation.iter().map(|of| {
         of.containment.iter().map(|held: &Containment| {
             let share = |hits: usize| percent(hits as f64 / held.runs as f64);
@@ -187,7 +163,7 @@ pub(super) fn containment(accuracy: &Accuracy) -> Table {
             ]
         })
     });
-    Table::new("Position error after 40 h within its predicted σ", columns)
+    Table::new("Position error after 40 h within its predicted σ", columns("| runs | within | claimed | 99 % interval | as claimed"))
         .sections(sections)
         .note("σ and ellipses: predicted from the covariance that the filter claims, by the linear error model.")
         .note("Interval: binomial, of the share of the runs if the covariance is true.")

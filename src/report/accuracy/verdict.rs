@@ -1,11 +1,9 @@
 //! What the figures say, in sentences.
 
-use std::cmp::Ordering;
-
-use super::super::document::Document;
-use super::super::number::{count, interval, minutes, value, with_interval};
 use super::compared::{compared, journey_name, region_name, white_within};
 use super::tables::{self, percent};
+use crate::report::prelude::*;
+use std::cmp::Ordering;
 
 use crate::calibration::ErrorTermTest;
 use crate::calibration::Nis;

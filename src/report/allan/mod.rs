@@ -7,10 +7,9 @@ mod run_toml;
 mod tables;
 mod words;
 
-use super::document::{Block, Document, List};
-use super::number::{count, three_digits};
 use crate::imu::Sensor;
 use crate::noise::NoiseAnalysis;
+use crate::report::prelude::*;
 
 /// Of the deviations a terminal shows every so-manieth.
 const EVERY: usize = 2;

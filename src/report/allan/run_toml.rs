@@ -1,12 +1,10 @@
 //! The table for `run.toml`.
 
-use serde_json::{Map, Value};
-
-use super::super::number::three_digits;
 use super::quantity::quantity;
 use crate::formats::NoiseKeys;
 use crate::imu::Sensor;
 use crate::noise::{NoiseAnalysis, Process, of_kind};
+use crate::report::prelude::*;
 
 /// A field of `[imu.noise]` with what has to be said of it.
 struct Field {

@@ -1,9 +1,8 @@
 //! The run, the model and the method as pairs of a name and a value.
 
-use super::super::document::Facts;
-use super::super::number::{count, sigma, three_digits, value};
 use super::report::Report;
 use crate::imu::{Noise, Sensor};
+use crate::report::prelude::*;
 use crate::units::{
     ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
 };

@@ -1,11 +1,9 @@
 //! The figures.
 
-use super::super::group::{Group, axis_name, short_name};
-use super::super::number::{count, value};
-use super::super::plot::{Axis, Color, Mark, Matrix, Panel, Plot, Series};
 use super::report::Report;
 use super::{methods, path};
 use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome};
+use crate::report::prelude::*;
 
 /// Where the axis of estimates ends, in final σ: with the prior on it the end could not be read.
 const EXTENT: f64 = 300.0;

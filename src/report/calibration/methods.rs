@@ -1,9 +1,8 @@
 //! Both methods side by side, parameter by parameter.
 
-use super::super::group::{Group, axis_name, short_name};
-use super::super::plot::{Axis, Color, Mark, Panel, Plot, Series, Shape};
 use crate::calibration::Estimate;
 use crate::calibration::{ParameterVector, sensor_and_parameter};
+use crate::report::prelude::*;
 
 /// Magnitude of each parameter's error by each method, with the σ that it claims.
 pub(super) fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {

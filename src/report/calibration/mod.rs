@@ -12,9 +12,8 @@ mod temperature;
 mod tests;
 mod verdict;
 
-use super::document::{Document, Table};
-use super::number::{count, three_digits, value};
 use super::{effects, outlook};
+use crate::report::prelude::*;
 
 pub use super::outlook::Navigated;
 pub use report::{ClosedForm, Report};

@@ -1,14 +1,11 @@
 //! What changes with temperature, and what differs between recordings.
 
-use super::super::document::{Document, NONE, Table};
-use super::super::group::{Group, axis_name};
-use super::super::number::{plus_minus, three_digits, value};
-use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
 use crate::calibration::{
     Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
     sensor_and_parameter,
 };
 use crate::imu::{PerSensor, RATE, Sensor, ThermalState};
+use crate::report::prelude::*;
 
 /// Points of a curve.
 const POINTS: usize = 81;
@@ -133,7 +130,7 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
         });
     Table::new(
         "Hysteresis: heating less cooling at the same temperature",
-        ["parameter", "value ± 1σ", "unit", "at ± K/min"],
+        columns("parameter | value ± 1σ | unit | at ± K/min"),
     )
     .section(rows)
 }
@@ -318,7 +315,7 @@ fn recordings(outcome: &Outcome) -> Table {
     };
     Table::new(
         "Recordings",
-        ["recording", "°C", "calibrates alone", "χ²/n from all", "999 of 1000 below"],
+        columns("recording | °C | calibrates alone | χ²/n from all | 999 of 1000 below"),
     )
     .section(outcome.alone.iter().enumerate().map(row))
     .note(
@@ -345,7 +342,7 @@ fn differences(outcome: &Outcome) -> Table {
     });
     Table::new(
         "Repeatability between recordings",
-        ["parameter", "spread ± 1σ", "by σ alone", "unit", "χ²/n", "999 of 1000 below"],
+        columns("parameter | spread ± 1σ | by σ alone | unit | χ²/n | 999 of 1000 below"),
     )
     .section(rows)
     .note(

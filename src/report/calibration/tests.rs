@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::super::group::Group;
-use super::super::synthetic::synthetic;
+use super::super::tests::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
 use crate::calibration::{

@@ -1,9 +1,8 @@
 //! The one sentence that a reader wants first.
 
-use super::super::group::{Group, axis_name};
-use super::super::number::{count, sigma};
 use super::report::Report;
 use crate::calibration::{Estimate, Finding, ParameterVector};
+use crate::report::prelude::*;
 
 impl Report<'_> {
     /// Whether the calibration may be used, and what is weakest of it.

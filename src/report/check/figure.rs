@@ -1,8 +1,8 @@
 //! The record: what the gyros and accelerometers say against time, with dwells, turns and faults.
 
-use super::super::plot::{Axis, Color, Mark, Panel, Plot, Series};
 use super::words;
 use crate::imu::{AXES, Sensor};
+use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{Rest, Turn};
 use crate::survey::Survey;

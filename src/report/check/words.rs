@@ -1,8 +1,8 @@
 //! What has to be said of a run before it is calibrated.
 
-use super::super::number::{count, three_digits, value};
 use crate::calibration::Mounting;
 use crate::imu::{AXES, Sensor};
+use crate::report::prelude::*;
 use crate::run::motion::{LabelCheck, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};

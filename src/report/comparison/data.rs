@@ -1,13 +1,11 @@
 //! The figures of a comparison by name. Differences are calibration minus reference; units are those of the group
 //! that a key names.
 
-use serde_json::{Map, Value, json};
-
-use super::super::group::Group;
 use crate::calibration::ParameterVector;
 use crate::calibration::parameter_name;
 use crate::calibration::{ChiSquare, Comparison, Side};
 use crate::imu::InstallationForm;
+use crate::report::prelude::*;
 
 pub(super) fn data(comparison: &Comparison) -> Value {
     let (sides, reference) = (&comparison.sides, &comparison.reference);

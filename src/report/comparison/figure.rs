@@ -1,9 +1,8 @@
 //! Differences with their σ, a panel for each group.
 
-use super::super::group::{Group, axis_name};
-use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
 use crate::calibration::Comparison;
 use crate::imu::InstallationForm;
+use crate::report::prelude::*;
 
 /// Calibrations that reach this many times further than others make an axis logarithmic.
 const APART: f64 = 20.0;

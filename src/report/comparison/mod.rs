@@ -3,15 +3,13 @@
 mod data;
 mod figure;
 
-use super::document::{Document, NONE, Table, cells};
-use super::group::{Group, short_name};
-use super::number::{count, or_dash, plus_minus, sigma, three_digits, value};
 use super::terms::unit;
 use crate::calibration::ParameterVector;
 use crate::calibration::result::TermRecord;
 use crate::calibration::{AUXILIARY, AuxiliaryKind, auxiliary_name};
 use crate::calibration::{Canonical, ChiSquare, Comparison, Nees, Side};
 use crate::imu::{InstallationForm, Sensor};
+use crate::report::prelude::*;
 
 /// Beyond this many σ a difference is flagged.
 const FLAGGED: f64 = 3.0;
@@ -224,16 +222,10 @@ fn auxiliary(comparison: &Comparison) -> Table {
 
 /// From three calibrations on.
 fn scatter(comparison: &Comparison) -> Table {
-    let columns = [
-        "",
-        "unit",
-        "mean minus reference",
-        "scatter",
-        "χ²/n",
-        "n",
-        "p",
-    ];
-    let table = Table::new("Scatter", columns);
+    let table = Table::new(
+        "Scatter",
+        columns("| unit | mean minus reference | scatter | χ²/n | n | p"),
+    );
     let Some(scatter) = &comparison.scatter else {
         return table;
     };

@@ -6,8 +6,7 @@ mod names;
 mod tables;
 mod verdict;
 
-use super::document::{Document, Facts};
-use super::number::{count, minutes, three_digits};
+use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{ALIGNMENT_TIME, Estimator};
 use crate::units::DEGREE;

@@ -1,12 +1,11 @@
 //! The tables, alike for terminal and page.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{or_dash, three_digits, value, with_interval};
 use super::names::{
     PAPER_HOURS, estimator_name, hours, in_general, method_name, miles, navigated, situation_name,
 };
 use crate::calibration::Group;
 use crate::imu::{InstallationForm, Sensor};
+use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
 
@@ -41,18 +40,11 @@ pub(super) fn nmile(metres: f64) -> String {
 }
 
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
-    let columns = [
-        "nmile",
-        "median",
-        "99 % interval",
-        "mean",
-        "68 % below",
-        "95 % below",
-        "largest, median",
-        "largest, 95 % below",
-        "closed form : EKF",
-        "99 % interval",
-    ];
+    let headings: Vec<&str> = columns(
+        "nmile | median | 99 % interval | mean | 68 % below | 95 % below | largest, median | \
+         largest, 95 % below | closed form : EKF | 99 % interval",
+    )
+    .collect();
     let row = |worth: &Worth| {
         let (at_end, largest) = (&worth.at_end, &worth.largest);
         let (low, high) = worth.median_interval;
@@ -73,10 +65,10 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
     let noise = &navigated.noise;
     let mut last = cells!["noise alone", nmile(noise.median), NONE];
     last.extend([noise.mean, noise.below_68, noise.below_95].map(nmile));
-    last.resize(columns.len(), NONE.to_owned());
+    last.resize(headings.len(), NONE.to_owned());
     let by_estimator = navigated.methods.chunks(InstallationForm::ALL.len());
     let situation = situation_name(navigated.situation);
-    Table::new(format!("Position error at the end, {situation}"), columns)
+    Table::new(format!("Position error at the end, {situation}"), headings)
         .sections(by_estimator.map(|of_estimator| of_estimator.iter().map(row)))
         .section([last])
         .note(

@@ -1,9 +1,8 @@
 //! What the experiment says, in sentences.
 
-use super::super::document::Document;
-use super::super::number::{count, three_digits, value, with_interval};
 use super::names::{estimator_name, hours, in_general, method_name, navigated, situation_name};
 use super::tables::nmile;
+use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Budget, Estimator, Method, Situation};
 

@@ -1,10 +1,9 @@
 //! Figures of a lot: every unit's values with their σ, the mean, the limits.
 
-use super::super::group::{Group, axis_name};
-use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
 use super::shown::{shown, symbol};
 use crate::imu::{AXES, InstallationForm, Sensor};
 use crate::lot::{Lot, Quantity, Sample};
+use crate::report::prelude::*;
 
 pub(super) fn parameters(lot: &Lot) -> Plot {
     let panels = Group::all().map(|group| {

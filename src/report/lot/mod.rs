@@ -8,14 +8,12 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
-
-use super::document::{Document, Facts};
-use super::number::{count, three_digits};
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
+use crate::report::prelude::*;
 use crate::units::PPM;
 use shown::{change, title};
+use std::collections::BTreeMap;
 
 /// Everything that is said of a lot.
 pub fn document(lot: &Lot) -> Document {

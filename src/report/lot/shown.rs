@@ -1,9 +1,8 @@
 //! How quantities of a lot are spoken of.
 
-use super::super::group::{Group, short_name};
-use super::super::number::{plus_minus, sigma, three_digits, value};
 use crate::imu::{AXES, InstallationForm, Sensor};
 use crate::lot::{Against, Quantity, Sample, Spread, Trend};
+use crate::report::prelude::*;
 use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
 
 /// Such as `gyro K x` or `gyro noise x`.

@@ -1,11 +1,9 @@
 //! Tables of a lot.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::group::{Group, axis_name};
-use super::super::number::{count, or_dash, sigma, three_digits, value};
 use super::shown::{chance, shown, shown_spread, spread, spread_symbol, symbol, title, with_sigma};
 use crate::imu::{InstallationForm, Sensor};
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
+use crate::report::prelude::*;
 
 /// One row a unit.
 pub(super) fn units(lot: &Lot) -> Table {
@@ -235,7 +233,7 @@ pub(super) fn undecided(lot: &Lot) -> Table {
     });
     Table::new(
         "Limits that are not kept, or not certainly",
-        ["unit", "", "unit", "from nominal", "limit", "P(within)", "verdict"],
+        columns("unit | | unit | from nominal | limit | P(within) | verdict"),
     )
     .section(rows)
     .note("A unit passes a limit if its probability of being within is at least the stated confidence, and fails if that of being outside is.")

@@ -1,9 +1,8 @@
 //! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
 
-use super::super::number::count;
-use super::super::plot::{Axis, Color, Panel, Plot, Point, Series};
 use super::verdict::title;
 use crate::imu::{InstallationForm, Sensor};
+use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{Column, Quantity};
 

@@ -3,10 +3,7 @@
 mod figures;
 mod verdict;
 
-use serde_json::{Map, Value, json};
-
-use super::document::{Block, Document, Facts, List, Table, cells};
-use super::number::{count, three_digits, value};
+use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::paper;
 use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row};
