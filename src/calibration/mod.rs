@@ -65,6 +65,7 @@ pub use parameters::{
 pub use problem::Problem;
 pub use reduction::{Epoch, Own};
 pub use result::at_rest::{AtRest, AxisAtRest, Second};
+pub use result::at_temperature::TemperatureError;
 pub use result::comparison::{Comparison, Named, Side, compare};
 pub use result::correction::{Calibrated, Correction, CorrectionError};
 pub use result::frame::{Canonical, in_body_frame};
@@ -76,7 +77,6 @@ pub use result::thermal_record::{
     ValueRecord,
 };
 pub use result::{Calibration, Method, triads_of};
-pub use several::at_temperature::TemperatureError;
 pub use several::day_to_day::{DayToDay, Difference};
 pub use several::separate_estimate::SeparateEstimate;
 pub use several::thermal::{Coefficient, Thermal};

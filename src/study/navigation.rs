@@ -286,32 +286,46 @@ impl Mission {
         mut sensitivity: Sensitivity,
         truth: &PerSensor<Triad>,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
-        let mut course = Course::new(&self.motion);
         let sensed = sensed_errors(truth)?;
-        let linear = |at: &Instant| Linearisation::about(at, &sensed);
-        let mut start = linear(course.here());
-        // At rest one exact step does for all intervals.
-        let at_rest = match &self.motion {
-            Motion::Standing(truth) => Some(truth.steady()),
-            Motion::Moving(_) => None,
+        let Motion::Standing(truth) = &self.motion else {
+            let linear = |at: &Instant| Linearisation::about(at, &sensed);
+            return self.exposure_by(sensitivity, |_| Ok(linear));
         };
-        let at_rest = at_rest.map(|at| (at, at.linear_model().over(self.interval)));
+        // At rest one exact step does for all intervals.
+        let at = truth.steady();
+        let transition = at.linear_model().over(self.interval);
+        let added = transition.input * sensed.at(&at);
+        let mut exposures = vec![exposure(0.0, &sensitivity, truth)?];
+        for interval in 1..=self.intervals {
+            sensitivity = transition.errors * sensitivity + added;
+            exposures.push(exposure(
+                f64::from(interval) * self.interval,
+                &sensitivity,
+                truth,
+            )?);
+        }
+        Ok(exposures)
+    }
 
+    /// The same with a linear model that is new in each interval, told by number.
+    fn exposure_by<L: Fn(&Instant) -> Linearisation>(
+        &self,
+        mut sensitivity: Sensitivity,
+        linear: impl Fn(u32) -> Result<L, NavigationStudyError>,
+    ) -> Result<Vec<Exposure>, NavigationStudyError> {
+        let mut course = Course::new(&self.motion);
         let mut exposures = vec![exposure(0.0, &sensitivity, &course.here().truth)?];
         for interval in 1..=self.intervals {
+            let linear = linear(interval)?;
             let time = f64::from(interval) * self.interval;
-            if let Some((at, transition)) = &at_rest {
-                let sensed = sensed.at(at);
-                sensitivity = transition.errors * sensitivity + transition.input * sensed;
-            } else {
-                course.go(time, 0.0, |stride| {
-                    let [middle, end] = [&stride.middle, &stride.end].map(linear);
-                    let linearised = [&start, &middle, &end];
-                    sensitivity = Linearisation::follow(&sensitivity, stride.duration, linearised);
-                    start = end;
-                    Ok::<_, NavigationStudyError>(())
-                })?;
-            }
+            let mut start = linear(course.here());
+            course.go(time, 0.0, |stride| {
+                let [middle, end] = [&stride.middle, &stride.end].map(&linear);
+                let linearised = [&start, &middle, &end];
+                sensitivity = Linearisation::follow(&sensitivity, stride.duration, linearised);
+                start = end;
+                Ok::<_, NavigationStudyError>(())
+            })?;
             exposures.push(exposure(time, &sensitivity, &course.here().truth)?);
         }
         Ok(exposures)

@@ -4,6 +4,7 @@
 //! + bias`, with `u` in rad/s or m/s² along right-front-up.
 
 pub(super) mod at_rest;
+pub(super) mod at_temperature;
 pub(super) mod comparison;
 pub(super) mod correction;
 pub(crate) mod frame;

@@ -5,7 +5,6 @@
 //! from which the Gauss–Newton iterations of all data begin; with all orders that the temperatures support,
 //! then with those that a likelihood ratio calls for.
 
-pub mod at_temperature;
 pub mod day_to_day;
 pub mod separate;
 pub mod thermal;

@@ -15,8 +15,8 @@ use super::{Calibration, TermRecord, triads_of};
 use crate::calibration::error::ComparisonError;
 use crate::calibration::estimate::Estimate;
 use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, derivatives, factor, from_vector,
-    in_general_form, parameter, parameter_index, parameter_name, to_vector,
+    PARAMETERS, ParameterMatrix, ParameterVector, derivatives, from_vector, in_general_form,
+    parameter, to_vector,
 };
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 
@@ -63,7 +63,11 @@ impl Canonical {
                 });
             }
         }
-        let own = own_covariance(name, record, nominal)?;
+        let own = record.covariance_by(nominal);
+        let own = own.ok_or_else(|| ComparisonError::Covariance {
+            name: name.to_owned(),
+        })?;
+        let own = (own.diagonal().max() > 0.0).then_some(own);
         let covariance = own.map(|covariance| {
             let form = record.installation_form.unwrap_or_default();
             let triads = triads_of(record, nominal, form);
@@ -161,43 +165,6 @@ pub(crate) fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
     let x = rows[0].normalize();
     let z = x.cross(&rows[1]).normalize();
     Matrix3::from_columns(&[x, z.cross(&x), z]).transpose()
-}
-
-/// Covariance of the record's own parameters, normalised; none if it claims no σ.
-fn own_covariance(
-    name: &str,
-    record: &Calibration,
-    nominal: &PerSensor<Nominal>,
-) -> Result<Option<ParameterMatrix>, ComparisonError> {
-    let form = record.installation_form.unwrap_or_default();
-    let factor = |index| factor(nominal, index);
-    let mut covariance = ParameterMatrix::zeros();
-    if record.covariance.is_empty() {
-        for index in 0..PARAMETERS {
-            let name = parameter_name(form, index);
-            let sigma = name.and_then(|name| record.sigma_of(&name).copied());
-            covariance[(index, index)] = (sigma.unwrap_or(0.0) / factor(index)).powi(2);
-        }
-    }
-    let malformed = || ComparisonError::Covariance {
-        name: name.to_owned(),
-    };
-    let names = record.parameters.iter();
-    let indices: Option<Vec<usize>> = names.map(|name| parameter_index(form, name)).collect();
-    let indices = indices.ok_or_else(malformed)?;
-    let square = record
-        .covariance
-        .iter()
-        .all(|row| row.len() == indices.len());
-    if !square || record.covariance.len() != indices.len() {
-        return Err(malformed());
-    }
-    for (&i, row) in indices.iter().zip(&record.covariance) {
-        for (&j, value) in indices.iter().zip(row) {
-            covariance[(i, j)] = value / (factor(i) * factor(j));
-        }
-    }
-    Ok((covariance.diagonal().max() > 0.0).then_some(covariance))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::attitude;
-use crate::calibration::parameters::sensor_and_parameter;
+use crate::calibration::parameters::{parameter_name, sensor_and_parameter};
 use crate::calibration::result::TriadRecord;
 use crate::calibration::result::comparison::{Named, compare};
 use crate::imu::{Instrument, Prior};
@@ -136,7 +136,7 @@ fn forms_of_one_matrix_are_one_calibration() {
 fn the_general_form_in_its_own_frame_keeps_its_covariance() {
     let record = with_covariance(record(), InstallationForm::General);
     let nominal = own_nominal(&record);
-    let own = own_covariance("a", &record, &nominal).unwrap().unwrap();
+    let own = record.covariance_by(&nominal).unwrap();
     let there = canonical(&record, BodyFrame::Table).covariance.unwrap();
     assert!((there - own).amax() < 1e-10 * own.amax());
 }
@@ -189,7 +189,7 @@ fn covariance_follows_the_finite_differences_of_every_form_into_every_frame() {
         let record = with_covariance(record, form);
         for frame in [BodyFrame::Table, BodyFrame::Accelerometer] {
             let nominal = own_nominal(&record);
-            let own = own_covariance("a", &record, &nominal).unwrap().unwrap();
+            let own = record.covariance_by(&nominal).unwrap();
             let j = numeric_jacobian(&record, frame);
             let expected = j * own * j.transpose();
             let found = canonical(&record, frame).covariance.unwrap();
