@@ -78,7 +78,7 @@ pub use result::thermal_record::{
 };
 pub use result::{Calibration, Method, triads_of};
 pub use several::day_to_day::{DayToDay, Difference};
-pub use several::separate_estimate::SeparateEstimate;
+pub use several::separate::SeparateEstimate;
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};

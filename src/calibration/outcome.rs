@@ -22,7 +22,7 @@ use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
 use crate::calibration::checks::innovation::{Consistency, Innovation};
 use crate::calibration::checks::observability::Observability;
-use crate::calibration::several::separate_estimate::SeparateEstimate;
+use crate::calibration::several::separate::SeparateEstimate;
 use crate::calibration::several::thermal::Thermal;
 use crate::run::Aiding;
 

@@ -2,13 +2,13 @@
 
 use super::error::CalibrationError;
 use super::gauss_newton::{Iterated, Pass, Progress, iterate};
-use super::linearisation::AttitudePrior;
+use super::linearisation::{AttitudePrior, Linearisation};
 use super::pass::Gate;
 use super::problem::Problem;
 use crate::calibration::checks::cause::FoundCause;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
-use crate::calibration::several::separate_estimate::SeparateEstimate;
+use crate::calibration::several::separate::SeparateEstimate;
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]
@@ -47,6 +47,19 @@ impl<'a> Solved<'a> {
             causes: Vec::new(),
             findings: Vec::new(),
         }
+    }
+
+    /// By iterations from a point of linearisation.
+    pub fn of(
+        problem: &Problem<'a>,
+        priors: Vec<AttitudePrior>,
+        from: Linearisation,
+        gate: Gate,
+        progress: Progress,
+    ) -> Result<Self, CalibrationError> {
+        let mut passes = Vec::new();
+        let iterated = iterate(problem, &priors, from, gate, &mut passes, progress)?;
+        Ok(Self::new(problem, priors, iterated, passes))
     }
 
     /// Iterates another problem from here.

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::day_to_day::DayToDay;
-use super::separate_estimate::SeparateEstimate;
+use super::separate::SeparateEstimate;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::recordings::{RecordingDifference, recordings_differ};
 use crate::calibration::estimate::Estimate;

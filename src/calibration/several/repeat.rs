@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::Difference;
-use super::separate_estimate::SeparateEstimate;
+use super::separate::SeparateEstimate;
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::outcome::Outcome;
 use crate::calibration::parameters::{PARAMETERS, ParameterVector, to_vector};
