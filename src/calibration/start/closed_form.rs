@@ -3,7 +3,8 @@
 //! place without a table.
 
 use super::both_triads::both_triads;
-use super::coarse;
+use super::coarse::{Turned, calibrated, calibrated_as_held, dwells, judged};
+use super::gravity::AtRest;
 use super::labels::{self, Section, Used};
 use super::positions::{Observed, Position};
 use super::table;
@@ -16,9 +17,10 @@ use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
+use crate::calibration::linearisation::singular;
 use crate::calibration::model::Model;
 use crate::calibration::noise::NoiseReport;
-use crate::calibration::parameters::{OBSERVED_BELOW, parameter, parameter_name};
+use crate::calibration::parameters::{OBSERVED_BELOW, from_vector, parameter, parameter_name};
 use crate::calibration::problem::Problem;
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PerSensor, Sensor};
@@ -230,32 +232,49 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
 
 /// From every dwell and every move by gravity alone, with the prior where they are too few.
 fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
-    let found = coarse::by_gravity(problem)?;
-    let (model, estimate) = (&problem.model, found.estimate);
-    let noise = found
-        .by_hand
-        .as_ref()
-        .map(|by_hand| by_hand.report(problem));
-    let learnt = found.by_hand.zip(noise.as_ref());
+    let rests = dwells(problem)?;
+    let (turned, by_hand) = calibrated_as_held(problem, &rests)?;
+    let form = problem.model.form;
+    let singular = || singular(&from_vector(form, &problem.model.prior_mean));
+    let judged = judged(&turned).ok_or_else(singular)?;
+    let growth = judged.residuals.growth();
+    // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
+    let turned = match growth {
+        None => turned,
+        Some(growth) => {
+            let by_hand = by_hand.as_ref().map(|by_hand| by_hand.model(problem));
+            let mut model = by_hand.unwrap_or_else(|| problem.model.clone());
+            model.prior_sigma /= growth;
+            calibrated(&problem.with_model(model), &rests)?
+        }
+    };
+    let variance = growth.unwrap_or(1.0).powi(2);
+    let Turned { at, equations, .. } = turned;
+    let gain = equations.gain().ok_or_else(singular)?;
+    let estimate = Estimate {
+        triads: at.triads,
+        covariance: equations.whole(&equations.covariance(&gain)) * variance,
+    };
+    // Of how far the data bring the estimate from a prior that is right.
+    let distance = equations.whole(&equations.covariance_of_distance(&gain)) * variance;
+    let noise = by_hand.as_ref().map(|by_hand| by_hand.report(problem));
+    let learnt = by_hand.zip(noise.as_ref());
     let learnt = learnt.and_then(|(by_hand, report)| by_hand.finding(problem, report));
-    let far = far_by_data(model, &estimate, &found.distance);
-    let hidden = hidden(model, &estimate, Reference::Gravity);
-    let findings = far.into_iter().chain(hidden).chain(learnt);
-    let stretches = problem.stretches();
-    let at_rest = stretches.iter().flat_map(|stretch| {
-        stretch
-            .dwells
-            .iter()
-            .map(|dwell| dwell.duration(&stretch.run.recording.imu))
-    });
-    let dwells = problem.dwells().count();
+    let far = far_by_data(&problem.model, &estimate, &distance).into_iter();
+    let findings = far.chain(hidden(&problem.model, &estimate, Reference::Gravity));
+    let large = growth.map(|growth| judged.large("both triads", growth, None));
+    let count = rests.iter().map(Vec::len).sum();
     Ok(ClosedForm {
-        findings: findings.chain(found.ringing).collect(),
+        findings: findings
+            .chain(learnt)
+            .chain(large)
+            .chain(judged.drift())
+            .collect(),
         estimate,
         reference: Reference::Gravity,
-        positions: PerSensor::from_fn(|_| dwells),
-        turns: dwells - stretches.len(),
-        standing_time: at_rest.sum(),
+        positions: PerSensor::from_fn(|_| count),
+        turns: count - rests.len(),
+        standing_time: rests.iter().flatten().map(AtRest::duration).sum(),
         noise,
     })
 }
