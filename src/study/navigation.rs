@@ -163,10 +163,7 @@ impl Pair {
                 constant: correction * (truth.bias - calibration.bias),
             })
         };
-        Ok(PerSensor {
-            gyro: of(Sensor::Gyro)?,
-            accel: of(Sensor::Accel)?,
-        })
+        PerSensor::try_from_fn(of)
     }
 }
 

@@ -145,17 +145,14 @@ pub fn six_position_of(
 ) -> Result<ClosedForm, CalibrationError> {
     let run = problem.run();
     let mut used = vec![false; dwells.len()];
-    let mut of_six = |sensor| -> Result<Observed, CalibrationError> {
+    let of_six = |sensor| -> Result<Observed, CalibrationError> {
         let all = table::positions(problem, dwells, sensor).ok_or(CalibrationError::NoTable)?;
         let six = six_of(&all);
         six.iter().for_each(|&k| used[k] = true);
         let known = six.iter().map(|&k| all.known[k].clone()).collect();
         Ok(Observed { known, ..all })
     };
-    let observed = PerSensor {
-        gyro: of_six(Sensor::Gyro)?,
-        accel: of_six(Sensor::Accel)?,
-    };
+    let observed = PerSensor::try_from_fn(of_six)?;
     if observed.gyro.known.is_empty() {
         return Err(CalibrationError::NoDwells);
     }

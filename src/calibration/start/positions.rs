@@ -56,6 +56,7 @@ pub struct Observed {
 }
 
 /// One triad as its positions show it.
+#[derive(Clone)]
 pub struct Fit {
     pub triad: Triad,
     pub covariance: SMatrix<f64, PER_TRIAD, PER_TRIAD>,
