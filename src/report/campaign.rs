@@ -48,20 +48,20 @@ fn name(function: Option<usize>) -> String {
 
 fn figures(accuracy: &CampaignAccuracy) -> Table {
     let row = |group: Group, function: Option<usize>| {
-        let of = accuracy.figures(group, function)?;
-        let unit = group.unit_value();
+        let (of, campaigns) = accuracy.figures(group, function)?;
+        let (ratio, unit) = (of.ratio?, group.unit_value());
         Some(vec![
             format!("{}, {}", group.short(), name(function)),
             group.unit().to_owned(),
-            of.campaigns.to_string(),
-            three_digits(of.error / unit),
+            campaigns.to_string(),
+            three_digits(of.filter / unit),
             three_digits(of.claimed / unit),
             three_digits(of.bound / unit),
             format!(
                 "{} ({} to {})",
-                value(of.ratio.value, 0.01),
-                value(of.ratio.interval.0, 0.01),
-                value(of.ratio.interval.1, 0.01)
+                value(ratio.value, 0.01),
+                value(ratio.interval.0, 0.01),
+                value(ratio.interval.1, 0.01)
             ),
         ])
     };
@@ -92,15 +92,17 @@ fn data(accuracy: &CampaignAccuracy) -> Value {
     for group in Group::all() {
         let mut of_group = Map::new();
         for function in accuracy.functions() {
-            if let Some(of) = accuracy.figures(group, function) {
+            if let Some((of, campaigns)) = accuracy.figures(group, function)
+                && let Some(ratio) = of.ratio
+            {
                 let unit = group.unit_value();
                 let figures = json!({
-                    "campaigns": of.campaigns,
-                    "rms_error": of.error / unit,
+                    "campaigns": campaigns,
+                    "rms_error": of.filter / unit,
                     "rms_sigma": of.claimed / unit,
                     "rms_bound": of.bound / unit,
-                    "ratio": of.ratio.value,
-                    "ratio_interval": [of.ratio.interval.0, of.ratio.interval.1],
+                    "ratio": ratio.value,
+                    "ratio_interval": [ratio.interval.0, ratio.interval.1],
                 });
                 of_group.insert(name(function), figures);
             }

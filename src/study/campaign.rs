@@ -4,8 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::accuracy::StudyError;
-use super::ratio::Ratio;
+use super::accuracy::{Figures, Squares, StudyError};
 use crate::calibration::{
     CalibrationError, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem, UNWATCHED,
     estimate, mean_square_interval, thermal_bound, to_vector,
@@ -282,27 +281,24 @@ impl CampaignAccuracy {
         (count > 0).then(|| (sum / count as f64, mean_square_interval(count, 0.01)))
     }
 
-    /// RMS error, RMS σ claimed, RMS bound and the ratio of error to bound, of the parameters of a group at the
-    /// reference or of their coefficients of one function.
-    pub fn figures(&self, group: Group, function: Option<usize>) -> Option<CampaignFigures> {
+    /// Figures of the parameters of a group at the reference, or of their coefficients of one function, normalised; and how
+    /// many campaigns have them.
+    pub fn figures(&self, group: Group, function: Option<usize>) -> Option<(Figures, usize)> {
         let of = |trial: &CampaignTrial| {
             let of_group = |e: &&ErrorOf| e.group == group && e.function == function;
             let errors: Vec<&ErrorOf> = trial.errors.iter().filter(of_group).collect();
             let mean =
                 |k: usize| errors.iter().map(|e| e.squares[k]).sum::<f64>() / errors.len() as f64;
-            (!errors.is_empty()).then(|| [mean(0), mean(1), mean(2)])
+            (!errors.is_empty()).then(|| Squares {
+                filter: Some(mean(0)),
+                claimed: Some(mean(1)),
+                bound: mean(2),
+                ..Squares::default()
+            })
         };
-        let all: Vec<[f64; 3]> = self.trials.iter().filter_map(of).collect();
-        let column = |k: usize| all.iter().map(|s| s[k]).collect::<Vec<f64>>();
-        let rms = |k: usize| (column(k).iter().sum::<f64>() / all.len() as f64).sqrt();
-        let ratio = Ratio::of(&column(0), &column(2))?;
-        Some(CampaignFigures {
-            campaigns: all.len(),
-            error: rms(0),
-            claimed: rms(1),
-            bound: rms(2),
-            ratio,
-        })
+        let all: Vec<Squares> = self.trials.iter().filter_map(of).collect();
+        let count = all.len();
+        (count > 0).then(|| (Figures::new(all.into_iter()), count))
     }
 
     /// In how many campaigns the order of a group was chosen as it is, and of how many.
@@ -314,21 +310,6 @@ impl CampaignAccuracy {
         };
         (self.trials.iter().filter(right).count(), self.trials.len())
     }
-}
-
-/// Figures of one kind of error over all campaigns, normalised.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CampaignFigures {
-    /// Campaigns that have it.
-    pub campaigns: usize,
-    /// RMS error.
-    pub error: f64,
-    /// RMS of the σ that is claimed.
-    pub claimed: f64,
-    /// RMS of the Cramér–Rao bound.
-    pub bound: f64,
-    /// Error over bound.
-    pub ratio: Ratio,
 }
 
 impl CampaignAccuracy {

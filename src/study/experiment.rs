@@ -178,11 +178,8 @@ impl ExperimentStudy {
     /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
     /// it is counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Experiment, ExperimentError> {
-        let scenarios = method::Scenarios::new(&self.scenario)?;
         let all: Vec<u64> = (0..self.samples).collect();
-        let (ways, trials) =
-            rayon::join(|| self.ways(), || self.trials_with(&scenarios, &all, done));
-        self.assemble(&scenarios, &ways?, trials?)
+        self.result(self.trials(&all, done)?)
     }
 
     /// Makes some of the instruments, given by their numbers; `done` is told of each.
@@ -194,24 +191,7 @@ impl ExperimentStudy {
         runs: &[u64],
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<Trial>, ExperimentError> {
-        self.trials_with(&method::Scenarios::new(&self.scenario)?, runs, done)
-    }
-
-    /// What all instruments say, in the order of their numbers.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn result(&self, trials: Vec<Trial>) -> Result<Experiment, ExperimentError> {
         let scenarios = method::Scenarios::new(&self.scenario)?;
-        self.assemble(&scenarios, &self.ways()?, trials)
-    }
-
-    fn trials_with(
-        &self,
-        scenarios: &method::Scenarios,
-        runs: &[u64],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Trial>, ExperimentError> {
         let all = runs.par_iter().with_max_len(1).map(|&run| {
             let trial = scenarios.trial(self.seed, run)?;
             done();
@@ -220,21 +200,17 @@ impl ExperimentStudy {
         all.collect()
     }
 
-    fn ways(&self) -> Result<Vec<Way>, ExperimentError> {
-        let all = Situation::ALL.into_par_iter();
-        all.map(|situation| self.way(situation)).collect()
-    }
-
-    fn assemble(
-        &self,
-        scenarios: &method::Scenarios,
-        ways: &[Way],
-        trials: Vec<Trial>,
-    ) -> Result<Experiment, ExperimentError> {
+    /// What all instruments say, in the order of their numbers.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn result(&self, trials: Vec<Trial>) -> Result<Experiment, ExperimentError> {
+        let navigated = Situation::ALL.into_par_iter();
+        let navigated = navigated.map(|situation| Ok(self.way(situation)?.navigated(&trials)));
         Ok(Experiment {
-            navigations: ways.iter().map(|way| way.navigated(&trials)).collect(),
+            navigations: navigated.collect::<Result<_, ExperimentError>>()?,
             study: self.clone(),
-            table_times: scenarios.table_times()?,
+            table_times: method::Scenarios::new(&self.scenario)?.table_times()?,
             trials,
         })
     }

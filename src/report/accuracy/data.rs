@@ -41,7 +41,7 @@ pub(super) fn data(accuracy: &Accuracy) -> Value {
     for of in &accuracy.groups {
         data[of.group.key()] = figures(accuracy, &of.figures, of.group.unit_value());
     }
-    let terms = accuracy.error_terms.iter().map(|of| {
+    let terms = accuracy.error_terms.iter().map(|(term, of)| {
         let data = json!({
             "ekf_rms": of.filter,
             "claimed_rms": of.claimed,
@@ -49,7 +49,7 @@ pub(super) fn data(accuracy: &Accuracy) -> Value {
             "ratio": of.ratio.map(|r| r.value),
             "ratio_interval": of.ratio.map(|r| r.interval),
         });
-        (of.term.name().to_owned(), data)
+        (term.name().to_owned(), data)
     });
     data["blocks"] = Value::Object(terms.collect::<Map<_, _>>());
     let effects: Vec<BlockRecord> = accuracy.effects.iter().map(BlockRecord::from).collect();

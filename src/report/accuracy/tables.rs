@@ -2,10 +2,10 @@
 
 use super::super::terms::{title, unit};
 use super::compared::{Compared, compared, journey_name, region_name, white_within};
-use crate::calibration::Nis;
+use crate::calibration::{ErrorTerm, Nis};
 use crate::report::prelude::*;
-use crate::study::accuracy::{Containment, ErrorTermAccuracy};
-use crate::study::{Accuracy, Ratio};
+use crate::study::accuracy::Containment;
+use crate::study::{Accuracy, Figures, Ratio};
 
 const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
@@ -46,17 +46,15 @@ fn sections(
 }
 
 /// RMS error, σ and bound in a unit, and the ratio of the first to the last.
-fn against_bound(rms: [f64; 3], unit: f64, ratio: Option<&Ratio>) -> Vec<String> {
-    let rms = rms.map(|rms| three_digits(rms / unit));
-    rms.into_iter().chain(ratio_cells(ratio)).collect()
+fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
+    let rms = [of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / unit));
+    rms.into_iter()
+        .chain(ratio_cells(of.ratio.as_ref()))
+        .collect()
 }
 
 pub(super) fn bound(accuracy: &Accuracy) -> Table {
-    let cells = |of: &Compared| {
-        let figures = of.figures;
-        let rms = [figures.filter, figures.claimed, figures.bound];
-        against_bound(rms, of.unit_value, figures.ratio.as_ref())
-    };
+    let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
         .note("RMS over all runs and the parameters of a group; σ: what the filter claims.")
@@ -66,11 +64,9 @@ pub(super) fn bound(accuracy: &Accuracy) -> Table {
 
 /// Auxiliary parameters, term by term.
 pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
-    let row = |of: &ErrorTermAccuracy| {
-        let (unit, in_si) = unit(of.term);
-        let rms = [of.filter, of.claimed, of.bound];
-        let cells = against_bound(rms, in_si, of.ratio.as_ref());
-        [cells![title(of.term), unit], cells].concat()
+    let row = |(term, of): &(ErrorTerm, Figures)| {
+        let (unit, in_si) = unit(*term);
+        [cells![title(*term), unit], against_bound(of, in_si)].concat()
     };
     Table::new("Error terms beside K, E and D", columns(AGAINST_BOUND))
         .section(accuracy.error_terms.iter().map(row))
