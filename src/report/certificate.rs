@@ -2,8 +2,11 @@
 
 mod results;
 
+use results::{name, results};
+
+use super::document::Block;
+use super::pdf;
 use super::pdf::{Attached, Frame, PdfError};
-use super::{document::Block, pdf};
 use crate::calibration::Group;
 use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
@@ -13,7 +16,6 @@ use crate::certificate::{
 use crate::imu::ParameterKind;
 use crate::report::prelude::*;
 use crate::run::Aiding;
-use results::{name, results};
 
 /// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
 ///

@@ -1,7 +1,6 @@
 //! How the six groups are spoken of: names, and the unit of each.
 
-use crate::calibration::ParameterVector;
-use crate::calibration::parameter_name;
+use crate::calibration::{ParameterVector, parameter_name};
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
 use crate::units;
 

@@ -4,14 +4,14 @@
 #[cfg(test)]
 mod tests;
 
+use std::fmt::Write;
+
 use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
-use crate::imu::BodyFrame;
-use crate::imu::Sensor;
+use crate::imu::{BodyFrame, Sensor};
 use crate::report::prelude::*;
 use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion, Warming};
 use crate::units::{DEGREE, NAUTICAL_MILE};
-use std::fmt::Write;
 
 const HOUR: f64 = 3600.0;
 /// Hours over which the paper gives the drift of position.

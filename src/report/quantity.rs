@@ -1,10 +1,10 @@
 //! What is reported of a navigation error, and in which unit.
 
-use crate::report::prelude::*;
 use nalgebra::SVector;
 
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
+use crate::report::prelude::*;
 use crate::study::navigation::Epoch;
 use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 

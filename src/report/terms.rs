@@ -1,13 +1,12 @@
 //! How auxiliary parameters, those beside the parameters of the triads, are spoken of.
 
-use crate::calibration::ErrorTerm;
-use crate::calibration::OBSERVED_BELOW;
+use std::collections::BTreeMap;
+
 use crate::calibration::result::TermRecord;
-use crate::calibration::{Auxiliary, AuxiliaryKind, auxiliary_name};
+use crate::calibration::{Auxiliary, AuxiliaryKind, ErrorTerm, OBSERVED_BELOW, auxiliary_name};
 use crate::report::prelude::*;
 use crate::turntable::AxisError;
 use crate::units::ARCSEC;
-use std::collections::BTreeMap;
 
 /// An error term in words.
 pub(super) fn title(block: ErrorTerm) -> &'static str {

@@ -2,7 +2,6 @@
 //! parameters at the reference temperature, their coefficients, and the orders that are chosen.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::accuracy::{Figures, Squares, StudyError};
 use crate::calibration::{
@@ -12,6 +11,7 @@ use crate::calibration::{
 use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients, Triad};
 use crate::run::Run;
 use crate::simulation::{Simulated, SimulatedCampaign, ThermalTruth};
+use rayon::prelude::*;
 
 /// What is studied.
 #[derive(Debug, Clone)]

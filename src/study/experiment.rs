@@ -13,7 +13,6 @@ mod noise;
 mod tests;
 
 use nalgebra::SMatrix;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Ratio;
@@ -25,6 +24,7 @@ use crate::models::ModelError;
 use crate::navigation::{SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
+use rayon::prelude::*;
 
 pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};

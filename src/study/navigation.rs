@@ -5,21 +5,21 @@ mod course;
 mod outlook;
 mod warming;
 
+use course::Course;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{Comparison, ComparisonError, Named, compare};
-use crate::calibration::{PARAMETERS, ParameterMatrix, parameter};
+use crate::calibration::{
+    Comparison, ComparisonError, Named, PARAMETERS, ParameterMatrix, compare, parameter,
+};
 use crate::earth::Site;
-use crate::imu::BodyFrame;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{BodyFrame, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{POSITION, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorVector, Forcing, InputError, Instant, Linearisation, NavigationError,
     NearPole, NonlinearError, SensedErrors, Sensitivity, Solution, Trajectory, within_reach,
 };
-use course::Course;
 
 pub use outlook::Outlook;
 pub use warming::{Warming, WarmingError, WarmingPair};

@@ -1,8 +1,7 @@
 //! The six groups in which an engineer reads a calibration.
 
-use super::parameter_name;
-use super::{PARAMETERS, sensor_and_parameter};
-use crate::calibration::estimate::Estimate;
+use super::{PARAMETERS, parameter_name, sensor_and_parameter};
+use crate::calibration::Estimate;
 use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
 
 /// Parameters of one triad and kind.

@@ -6,11 +6,11 @@ use thiserror::Error;
 use super::record::correction_of;
 use super::thermal_record::{CoefficientRecord, TOLERANCE};
 use super::{Calibration, FORMAT, TriadRecord, triads_of};
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, factor, from_vector, parameter_index,
-    parameter_name, to_vector,
+use crate::calibration::parameters::factor;
+use crate::calibration::{
+    Coefficient, PARAMETERS, ParameterMatrix, ParameterVector, Thermal, from_vector,
+    parameter_index, parameter_name, to_vector,
 };
-use crate::calibration::several::thermal::{Coefficient, Thermal};
 use crate::imu::{Nominal, PerSensor, Sensor, ThermalModel, ThermalState};
 
 /// Of triads that stay in the file's quantity.

@@ -22,10 +22,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
-use crate::calibration::checks::dwell_scatter::DwellScatter;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::quality::Quality;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
+use crate::calibration::{DwellScatter, Finding, Quality};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 

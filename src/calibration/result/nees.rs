@@ -4,7 +4,7 @@ use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::checks::innovation::mean_square_interval;
+use crate::calibration::mean_square_interval;
 
 /// A correlation matrix has no information in directions whose eigenvalue is below this: they are
 /// zero except for rounding, as where three angles stand for six.

@@ -11,19 +11,12 @@ use super::{
     FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
     TestVector, TriadRecord, rows,
 };
-use crate::calibration::budget::Budget;
-use crate::calibration::checks::error_term_test::ErrorTermTest;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::innovation::Nis;
-use crate::calibration::checks::quality::Quality;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_name};
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, factor, from_vector, parameter_name,
+use crate::calibration::parameters::factor;
+use crate::calibration::{
+    Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome, PARAMETERS,
+    ParameterMatrix, ParameterVector, Problem, Quality, auxiliary_name, from_vector,
+    parameter_name,
 };
-use crate::calibration::problem::Problem;
-use crate::calibration::start::closed_form::ClosedForm;
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
 };

@@ -4,13 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::estimate::Estimate;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterVector, factor, parameter_index, parameter_name, sensor_and_parameter,
+use crate::calibration::parameters::factor;
+use crate::calibration::{
+    Coefficient, Estimate, Outcome, Own, PARAMETERS, ParameterVector, Thermal, parameter_index,
+    parameter_name, sensor_and_parameter,
 };
-use crate::calibration::reduction::Own;
-use crate::calibration::several::thermal::{Coefficient, Thermal};
 use crate::imu::{
     AXES, HIGHEST_ORDER, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients,
     ThermalRange, ThermalValues, Triad, powers,

@@ -3,9 +3,9 @@
 use nalgebra::{SMatrix, Vector3};
 
 use crate::attitude::exp;
-use crate::calibration::parameters::group::Group;
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, derivatives, from_vector, to_vector,
+use crate::calibration::parameters::derivatives;
+use crate::calibration::{
+    Group, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };
 use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};

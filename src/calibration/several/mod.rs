@@ -25,8 +25,7 @@ use super::parameters::{PARAMETERS, from_vector, sensor_and_parameter, to_vector
 use super::pass::Gate;
 use super::problem::{Problem, Stretch};
 use super::solved::Solved;
-use crate::calibration::several::day_to_day::{DayToDay, Difference};
-use crate::calibration::several::separate::SeparateEstimate;
+use crate::calibration::{DayToDay, Difference, SeparateEstimate};
 use crate::imu::{PerSensor, ThermalCoefficients, Triad};
 use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;

@@ -1,14 +1,10 @@
 //! Which orders of the polynomials the data call for.
 
 use super::thermal::{Coefficient, Thermal};
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::observability::temperature_not_seen;
 use crate::calibration::constants::Prior;
 use crate::calibration::gauss_newton::Iterated;
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::parameters::group::Group;
-use crate::calibration::parameters::{OBSERVED_BELOW, parameter_name};
-use crate::calibration::problem::Problem;
+use crate::calibration::{Finding, Group, Linearisation, OBSERVED_BELOW, Problem, parameter_name};
 use crate::imu::{InstallationForm, RATE, ThermalModel};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::Difference;
 use super::separate::SeparateEstimate;
-use crate::calibration::checks::innovation::{Innovation, Observation};
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{PARAMETERS, ParameterVector, to_vector};
+use crate::calibration::{
+    Innovation, Observation, Outcome, PARAMETERS, ParameterVector, to_vector,
+};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// How a parameter repeats from one recording to the next.

@@ -1,23 +1,20 @@
 //! Each recording of a problem calibrated alone.
 
 use nalgebra::{DMatrix, DVector, SVector};
-use rayon::prelude::*;
 
 use super::day_to_day::{DayToDay, Difference};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::gauss_newton::{Iterated, UNWATCHED};
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::model::Model;
+use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::noise::learn;
-use crate::calibration::parameters::{from_vector, parameter, to_vector};
 use crate::calibration::pass::Gate;
-use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
 use crate::calibration::start::attempt::from_coarse_start;
-use crate::calibration::start::coarse::coarse_start;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, UNWATCHED,
+    coarse_start, from_vector, parameter, to_vector,
+};
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange, ThermalState};
 use crate::run::Dwell;
+use rayon::prelude::*;
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
 /// more.

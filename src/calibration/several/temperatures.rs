@@ -1,8 +1,7 @@
 //! The temperatures of recordings: range, and how many of them are distinct.
 
-use crate::calibration::error::CalibrationError;
-use crate::calibration::parameters::parameter;
-use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::problem::Stretch;
+use crate::calibration::{CalibrationError, Problem, parameter};
 use crate::imu::{
     HIGHEST_ORDER, ParameterKind, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalModel, Triad,
 };

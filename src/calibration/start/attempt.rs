@@ -1,13 +1,11 @@
 //! A calibration from the coarse start.
 
 use super::coarse::{CoarseStart, coarse_start};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::gauss_newton::{Iterated, Progress};
-use crate::calibration::noise::NoisePolicy;
+use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::pass::{Gate, pass};
-use crate::calibration::problem::Problem;
 use crate::calibration::reduction::Script;
 use crate::calibration::solved::Solved;
+use crate::calibration::{CalibrationError, NoisePolicy, Problem, Progress};
 
 /// From the coarse start, with the noise that is stated or, where it may be learnt, with what a hand adds to it as the
 /// start shows.

@@ -4,14 +4,12 @@ use nalgebra::SMatrix;
 
 use super::judged::Judged;
 use super::positions::{BASE, Fit, Observed};
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::prior_distance::{far_from_prior, widened};
 use crate::calibration::checks::residuals::Residuals;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::{Estimate, largest_growth};
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterMatrix, from_vector, parameter};
-use crate::calibration::problem::Problem;
+use crate::calibration::estimate::largest_growth;
+use crate::calibration::{
+    CalibrationError, Estimate, Finding, Model, ParameterMatrix, Problem, from_vector, parameter,
+};
 use crate::imu::{PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 

@@ -5,23 +5,19 @@
 use super::both_triads::both_triads;
 use super::coarse::{Turned, calibrated, calibrated_as_held, dwells, judged};
 use super::gravity::AtRest;
-use super::labels::{self, Section, Used};
+use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
-use super::table;
-use crate::calibration::checks;
-use crate::calibration::checks::finding::Finding;
+use super::{labels, table};
 use crate::calibration::checks::observability::not_observed;
 use crate::calibration::checks::prior_distance::far_by_data;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
 use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::Estimate;
 use crate::calibration::linearisation::singular;
-use crate::calibration::model::Model;
-use crate::calibration::noise::NoiseReport;
-use crate::calibration::parameters::{OBSERVED_BELOW, from_vector, parameter, parameter_name};
-use crate::calibration::problem::Problem;
+use crate::calibration::{
+    CalibrationError, Estimate, Finding, Model, NoiseReport, OBSERVED_BELOW, Problem, checks,
+    from_vector, parameter, parameter_name,
+};
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PerSensor, Sensor};
 use crate::run::motion::rests;

@@ -8,11 +8,11 @@ use super::gravity::{AtRest, Chain, add_magnitude, events, up};
 use super::judged::Judged;
 use super::table;
 use crate::attitude::level;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::noise::{ByHand, NoisePolicy};
-use crate::calibration::parameters::{ParameterVector, from_vector, to_vector};
-use crate::calibration::problem::Problem;
+use crate::calibration::noise::ByHand;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Linearisation, NoisePolicy, ParameterVector, Problem,
+    from_vector, to_vector,
+};
 use crate::earth::Site;
 use crate::imu::{ParameterKind, Sensor, TermVector};
 

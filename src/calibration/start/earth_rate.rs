@@ -5,11 +5,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::equations::{Equations, Rows, of};
 use super::gravity::{AtRest, Chain, Heading, ROUNDING, input_errors, of_noise};
 use crate::attitude::exp;
-use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
-use crate::calibration::model::Model;
-use crate::calibration::noise::{BY_HAND, Source};
+use crate::calibration::noise::BY_HAND;
 use crate::calibration::problem::Stretch;
+use crate::calibration::{CalibrationError, Model, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
 

@@ -6,11 +6,10 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
 
 use super::equations::{Common, Equations, Event, OfTriad, Rows, of, of_parameters};
 use crate::attitude::{exp, skew, tilt};
-use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
-use crate::calibration::model::Model;
-use crate::calibration::noise::{BY_HAND, Source};
-use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::noise::BY_HAND;
+use crate::calibration::problem::Stretch;
+use crate::calibration::{CalibrationError, Model, Problem, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::{Navigator, ProcessNoise, State};

@@ -6,9 +6,8 @@ use super::equations::{
     Common, Equations, Event, Gain, OfTriad, Rows, gauss_newton, of, of_parameters, of_sensitivity,
 };
 use crate::calibration::checks::residuals::Residuals;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterVector, derivatives, from_vector, parameter};
+use crate::calibration::parameters::derivatives;
+use crate::calibration::{CalibrationError, Model, ParameterVector, from_vector, parameter};
 use crate::imu::{
     InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };

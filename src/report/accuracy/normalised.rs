@@ -1,13 +1,14 @@
 //! Figures of errors over what is claimed of them.
 
+use std::f64::consts::TAU;
+
 use super::compared::journey_name;
-use super::tables::{self, percent};
-use crate::calibration::Group;
-use crate::calibration::PARAMETERS;
+use super::tables;
+use super::tables::percent;
+use crate::calibration::{Group, PARAMETERS};
 use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, NavigationAccuracy};
-use std::f64::consts::TAU;
 
 /// Half the width of the axis of errors in σ, unless more than one in twenty lies beyond.
 const REACH: f64 = 5.0;

@@ -1,13 +1,13 @@
 //! What the figures say, in sentences.
 
-use super::compared::{compared, journey_name, region_name, white_within};
-use super::tables::{self, percent};
-use crate::report::prelude::*;
 use std::cmp::Ordering;
 
-use crate::calibration::ErrorTermTest;
-use crate::calibration::Nis;
+use super::compared::{compared, journey_name, region_name, white_within};
+use super::tables;
+use super::tables::percent;
+use crate::calibration::{ErrorTermTest, Nis};
 use crate::imu::Output;
+use crate::report::prelude::*;
 use crate::study::accuracy::Containment;
 use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
 

@@ -1,7 +1,6 @@
 //! Both methods side by side, parameter by parameter.
 
-use crate::calibration::Estimate;
-use crate::calibration::{ParameterVector, sensor_and_parameter};
+use crate::calibration::{Estimate, ParameterVector, sensor_and_parameter};
 use crate::report::prelude::*;
 
 /// Magnitude of each parameter's error by each method, with the σ that it claims.

@@ -1,12 +1,13 @@
 //! The path: where the body axes point and how fast the body turns.
 
+use nalgebra::Matrix3;
+
 use super::report::Report;
 use crate::attitude::matrix;
 use crate::imu::AXES;
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::prelude::*;
 use crate::units::DEGREE;
-use nalgebra::Matrix3;
 
 /// Nearer to the plumb line than this an axis has no azimuth worth drawing.
 const STEEP: f64 = 80.0 * DEGREE;

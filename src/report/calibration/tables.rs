@@ -1,9 +1,9 @@
 //! The tables, alike for terminal and page.
 
-use super::super::terms::{self, improvement};
+use super::super::terms;
+use super::super::terms::improvement;
 use super::report::Report;
-use crate::calibration::{Estimate, Nis, Outcome, parameter_name};
-use crate::calibration::{Measures, Quality, Spread};
+use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, parameter_name};
 use crate::imu::ParameterKind;
 use crate::recording::TableLog;
 use crate::report::prelude::*;

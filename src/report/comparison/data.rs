@@ -1,9 +1,7 @@
 //! The figures of a comparison by name. Differences are calibration minus reference; units are those of the group
 //! that a key names.
 
-use crate::calibration::ParameterVector;
-use crate::calibration::parameter_name;
-use crate::calibration::{ChiSquare, Comparison, Side};
+use crate::calibration::{ChiSquare, Comparison, ParameterVector, Side, parameter_name};
 use crate::imu::InstallationForm;
 use crate::report::prelude::*;
 

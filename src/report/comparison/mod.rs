@@ -4,10 +4,11 @@ mod data;
 mod figure;
 
 use super::terms::unit;
-use crate::calibration::ParameterVector;
 use crate::calibration::result::TermRecord;
-use crate::calibration::{AUXILIARY, AuxiliaryKind, auxiliary_name};
-use crate::calibration::{Canonical, ChiSquare, Comparison, Nees, Side};
+use crate::calibration::{
+    AUXILIARY, AuxiliaryKind, Canonical, ChiSquare, Comparison, Nees, ParameterVector, Side,
+    auxiliary_name,
+};
 use crate::imu::{InstallationForm, Sensor};
 use crate::report::prelude::*;
 

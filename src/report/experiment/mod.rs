@@ -6,11 +6,12 @@ mod names;
 mod tables;
 mod verdict;
 
+use names::{hours, method_kind, timed};
+
 use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{ALIGNMENT_TIME, Estimator};
 use crate::units::DEGREE;
-use names::{hours, method_kind, timed};
 
 /// Everything that is said of the experiment.
 pub fn document(experiment: &Experiment) -> Document {

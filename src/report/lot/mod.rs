@@ -8,12 +8,14 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
+use shown::{change, title};
+
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
 use crate::units::PPM;
-use shown::{change, title};
-use std::collections::BTreeMap;
 
 /// Everything that is said of a lot.
 pub fn document(lot: &Lot) -> Document {

@@ -4,16 +4,12 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::{AccuracyStudy, Baseline, StudyError};
-use crate::calibration::{AUXILIARY, AuxiliaryVector, UNWATCHED, auxiliary_vector};
-use crate::calibration::{Epoch, Nis, from_vector, to_vector};
 use crate::calibration::{
-    ErrorTermTest, Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
-    test_error_terms,
+    AUXILIARY, AuxiliaryVector, Epoch, ErrorTermTest, Estimate, FormTest, Nees, Nis, Options,
+    Outcome, PARAMETERS, ParameterMatrix, ParameterVector, Problem, UNWATCHED, auxiliary_vector,
+    bound, estimate, from_vector, in_general_form, nees, test_error_terms, to_vector,
 };
-use crate::calibration::{Options, Problem};
-use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
-use crate::imu::BodyFrame;
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 use crate::simulation::Runs;
 

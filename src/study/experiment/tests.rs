@@ -3,8 +3,7 @@ use nalgebra::Vector2;
 
 use super::budget::Budget;
 use super::*;
-use crate::calibration::ParameterMatrix;
-use crate::calibration::{Group, Options, Problem, in_general_form, six_position};
+use crate::calibration::{Group, Options, ParameterMatrix, Problem, in_general_form, six_position};
 use crate::imu::{GaussMarkov, Noise};
 use crate::models::{Place, trajectory};
 use crate::study::navigation::Pair;

@@ -2,17 +2,16 @@ use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::*;
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{ParameterVector, sensor_and_parameter};
-use crate::calibration::{from_vector, to_vector};
+use crate::calibration::{ParameterVector, from_vector, sensor_and_parameter, to_vector};
 use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
 use crate::navigation::{Height, Increments, Strapdown, Stride};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
+use rayon::prelude::*;
 
 const FORM: InstallationForm = InstallationForm::General;
 

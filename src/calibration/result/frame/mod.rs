@@ -12,11 +12,10 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Calibration, TermRecord, triads_of};
-use crate::calibration::error::ComparisonError;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, derivatives, from_vector, in_general_form,
-    parameter, to_vector,
+use crate::calibration::parameters::derivatives;
+use crate::calibration::{
+    ComparisonError, Estimate, PARAMETERS, ParameterMatrix, ParameterVector, from_vector,
+    in_general_form, parameter, to_vector,
 };
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 

@@ -5,9 +5,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::attitude;
-use crate::calibration::parameters::{parameter_name, sensor_and_parameter};
 use crate::calibration::result::TriadRecord;
 use crate::calibration::result::comparison::{Named, compare};
+use crate::calibration::{parameter_name, sensor_and_parameter};
 use crate::imu::{Instrument, Prior};
 
 /// Scale factors in counts, installation of hundredths, biases; no σ.
