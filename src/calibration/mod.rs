@@ -78,10 +78,10 @@ pub use result::thermal_record::{
 };
 pub use result::{Calibration, Method, triads_of};
 pub use several::day_to_day::{DayToDay, Difference};
-pub use several::separate::SeparateEstimate;
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
+pub use solved::SeparateEstimate;
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
 pub use start::mounting::Mounting;

@@ -22,8 +22,8 @@ use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::form::FormTest;
 use crate::calibration::checks::innovation::{Consistency, Innovation};
 use crate::calibration::checks::observability::Observability;
-use crate::calibration::several::separate::SeparateEstimate;
 use crate::calibration::several::thermal::Thermal;
+use crate::calibration::solved::SeparateEstimate;
 use crate::run::Aiding;
 
 /// χ² by which opposite headings differ where a run observes the heading.

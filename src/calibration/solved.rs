@@ -1,6 +1,7 @@
 //! What iterations found, and with what they were made.
 
 use super::error::CalibrationError;
+use super::estimate::Estimate;
 use super::gauss_newton::{Iterated, Pass, Progress, iterate};
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::pass::Gate;
@@ -8,7 +9,34 @@ use super::problem::Problem;
 use crate::calibration::checks::cause::FoundCause;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::noise::NoiseReport;
-use crate::calibration::several::separate::SeparateEstimate;
+use crate::imu::{PerSensor, ThermalState};
+
+/// What a recording alone says.
+#[derive(Debug, Clone)]
+pub struct SeparateEstimate {
+    /// Its name.
+    pub name: String,
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
+    pub temperature: Option<PerSensor<[f64; 3]>>,
+    /// The span of its temperatures, K.
+    pub span: f64,
+    /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
+    /// that of its own; none where it gave none.
+    pub estimate: Option<Estimate>,
+    /// Where its temperature stands for all of it: the functions of temperature then.
+    pub(in crate::calibration) state: Option<ThermalState>,
+    /// The estimate with the initial attitudes, or the coarse start.
+    pub(in crate::calibration) at: Linearisation,
+    pub(in crate::calibration) priors: Vec<AttitudePrior>,
+}
+
+impl SeparateEstimate {
+    /// Mean temperature of all axes over its dwells, °C.
+    pub fn mean_temperature(&self) -> Option<f64> {
+        let PerSensor { gyro, accel } = self.temperature?;
+        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
+    }
+}
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]

@@ -2,6 +2,7 @@
 //! parameters at the reference temperature, their coefficients, and the orders that are chosen.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::accuracy::{Figures, Squares, StudyError};
 use crate::calibration::{
@@ -11,7 +12,6 @@ use crate::calibration::{
 use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients, Triad};
 use crate::run::Run;
 use crate::simulation::{Simulated, SimulatedCampaign, ThermalTruth};
-use rayon::prelude::*;
 
 /// What is studied.
 #[derive(Debug, Clone)]

@@ -13,6 +13,7 @@ mod noise;
 mod tests;
 
 use nalgebra::SMatrix;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Ratio;
@@ -24,7 +25,6 @@ use crate::models::ModelError;
 use crate::navigation::{SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
 use crate::turntable::TableError;
-use rayon::prelude::*;
 
 pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};

@@ -22,6 +22,7 @@ use nalgebra::Vector3;
 use paper::Published;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use response::{Response, standing};
 
 use crate::earth::ROTATION_RATE;
@@ -29,7 +30,6 @@ use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::models::{InstallationModel, Instrument, ModelError, Place};
 use crate::navigation::{Instant, LARGEST_LATITUDE};
 use crate::units::DEGREE;
-use rayon::prelude::*;
 
 pub use quantity::{ByQuantity, Quantity};
 pub use reading::{Installation, Kind, Reading};

@@ -3,10 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::day_to_day::DayToDay;
-use super::separate::SeparateEstimate;
 use crate::calibration::checks::recordings::recordings_differ;
 use crate::calibration::{
-    Estimate, Finding, Group, Model, RecordingDifference, from_vector, sensor_and_parameter,
+    Estimate, Finding, Group, Model, RecordingDifference, SeparateEstimate, from_vector,
+    sensor_and_parameter,
 };
 use crate::imu::{RATE, ThermalState, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};

@@ -3,9 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::Difference;
-use super::separate::SeparateEstimate;
 use crate::calibration::{
-    Innovation, Observation, Outcome, PARAMETERS, ParameterVector, to_vector,
+    Innovation, Observation, Outcome, PARAMETERS, ParameterVector, SeparateEstimate, to_vector,
 };
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 

@@ -1,6 +1,7 @@
 //! Each recording of a problem calibrated alone.
 
 use nalgebra::{DMatrix, DVector, SVector};
+use rayon::prelude::*;
 
 use super::day_to_day::{DayToDay, Difference};
 use crate::calibration::gauss_newton::Iterated;
@@ -9,12 +10,11 @@ use crate::calibration::pass::Gate;
 use crate::calibration::solved::Solved;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, UNWATCHED,
-    coarse_start, from_vector, parameter, to_vector,
+    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, SeparateEstimate,
+    UNWATCHED, coarse_start, from_vector, parameter, to_vector,
 };
-use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange, ThermalState};
+use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
 use crate::run::Dwell;
-use rayon::prelude::*;
 
 /// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
 /// more.
@@ -22,33 +22,6 @@ const BEYOND_NOISE: f64 = 10.0;
 
 /// A recording within this part of the range is at one temperature.
 const PART_OF_RANGE: f64 = 0.1;
-
-/// What a recording alone says.
-#[derive(Debug, Clone)]
-pub struct SeparateEstimate {
-    /// Its name.
-    pub name: String,
-    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
-    pub temperature: Option<PerSensor<[f64; 3]>>,
-    /// The span of its temperatures, K.
-    pub span: f64,
-    /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
-    /// that of its own; none where it gave none.
-    pub estimate: Option<Estimate>,
-    /// Where its temperature stands for all of it: the functions of temperature then.
-    pub(in crate::calibration) state: Option<ThermalState>,
-    /// The estimate with the initial attitudes, or the coarse start.
-    pub(in crate::calibration) at: Linearisation,
-    pub(in crate::calibration) priors: Vec<AttitudePrior>,
-}
-
-impl SeparateEstimate {
-    /// Mean temperature of all axes over its dwells, °C.
-    pub fn mean_temperature(&self) -> Option<f64> {
-        let PerSensor { gyro, accel } = self.temperature?;
-        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
-    }
-}
 
 /// Each recording alone, on as many threads as there are, with the noise that is stated or, where it may be learnt
 /// and has to be, with that of what each shows.

@@ -5,11 +5,11 @@
 
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
+use plotters::prelude::*;
 use plotters::style::Color as _;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::super::plot::{Color, Dash, Pen, Point};
-use plotters::prelude::*;
 
 /// Width of every figure.
 pub(super) const WIDTH: u32 = 1200;

@@ -2,6 +2,7 @@ use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::*;
@@ -11,7 +12,6 @@ use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
 use crate::navigation::{Height, Increments, Strapdown, Stride};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
-use rayon::prelude::*;
 
 const FORM: InstallationForm = InstallationForm::General;
 
