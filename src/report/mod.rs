@@ -43,7 +43,6 @@ pub mod check;
 pub mod comparison;
 pub mod conversion;
 pub mod demo;
-mod effects;
 pub mod experiment;
 mod group;
 pub mod lot;

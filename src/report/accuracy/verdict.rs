@@ -2,9 +2,8 @@
 
 use std::cmp::Ordering;
 
-use super::compared::{compared, journey_name, region_name, white_within};
 use super::tables;
-use super::tables::percent;
+use super::tables::{compared, journey_name, percent, region_name, white_within};
 use crate::calibration::{ErrorTermTest, Nis};
 use crate::imu::Output;
 use crate::report::prelude::*;

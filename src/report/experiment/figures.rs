@@ -1,7 +1,8 @@
 //! Position errors at the end, against time, and by group of parameters.
 
-use super::names::{HOUR, estimator_name, hours, in_general, method_name, miles, situation_name};
-use super::tables::nmile;
+use super::tables::{
+    HOUR, estimator_name, hours, in_general, method_name, miles, nmile, situation_name,
+};
 use crate::calibration::Group;
 use crate::imu::InstallationForm;
 use crate::report::prelude::*;

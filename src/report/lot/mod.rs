@@ -2,7 +2,6 @@
 
 mod data;
 mod figures;
-mod rows;
 mod shown;
 mod tables;
 #[cfg(test)]
@@ -42,7 +41,7 @@ pub fn document(lot: &Lot) -> Document {
     }
     document.page(tables::undecided(lot));
     document.data = data::data(lot);
-    document.files = vec![("lot.csv".to_owned(), rows::csv(lot))];
+    document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
 }
 

@@ -1,8 +1,7 @@
 //! Where the parts of a document stand on pages.
 
-use super::super::document::{Block, Document, Facts, List, Medium, Table};
-use super::font::Fonts;
-use super::{Frame, PdfError};
+use crate::report::document::{Block, Document, Facts, List, Medium, Table};
+use crate::report::pdf::font::Fonts;
 
 /// A4, pt.
 pub(super) const WIDTH: f32 = 595.28;
@@ -400,4 +399,43 @@ impl<'a> Layout<'a> {
         }
         lines
     }
+}
+
+/// A document that could not be made a PDF.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PdfError {
+    /// A character has no glyph.
+    #[error(
+        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic: the fonts of the \
+         certificate have no other. Write it in those."
+    )]
+    NoGlyph {
+        /// The character.
+        character: char,
+        /// Where it stands.
+        text: String,
+    },
+    /// The file would not be what the standard asks for.
+    #[error("the certificate cannot be written as PDF/A-3: {reason}")]
+    Standard {
+        /// What is in the way.
+        reason: String,
+    },
+}
+
+/// What stands on every page, and what the file says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// Upper left.
+    pub left: String,
+    /// Upper right.
+    pub right: String,
+    /// At the foot, before the page's number.
+    pub foot: String,
+    /// Below the last line.
+    pub end: String,
+    /// Author in the metadata.
+    pub author: String,
+    /// Year, month and day of the metadata.
+    pub day: (u16, u8, u8),
 }

@@ -1,7 +1,6 @@
 //! A document as a PDF/A-3 file: facts, tables and texts on A4 pages, with files attached.
 
 mod font;
-mod frame;
 mod layout;
 
 use krilla::Document as Pdf;
@@ -17,8 +16,8 @@ use krilla::surface::Surface;
 
 use super::document::Document;
 use font::Fonts;
-pub use frame::{Frame, PdfError};
 use layout::{Drawn, HEIGHT, Layout, WIDTH};
+pub use layout::{Frame, PdfError};
 
 /// A file in a PDF.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,9 +4,8 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::plot::{Grid, Panel, Scale};
 use super::canvas::{
-    Canvas, DrawError, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
+    Canvas, DrawError, Frame, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
 };
-use super::frame::Frame;
 use super::series;
 
 /// Above the axes, for the title.

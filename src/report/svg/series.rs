@@ -3,8 +3,7 @@
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::plot::{Anchor, Mark, Pen, Point, Series, Shape};
-use super::canvas::{BAND, Canvas, DrawError, SMALL, rgb};
-use super::frame::Frame;
+use super::canvas::{BAND, Canvas, DrawError, Frame, SMALL, rgb};
 
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;
