@@ -103,19 +103,17 @@ fn draw(surface: &mut Surface, fonts: &Fonts, drawn: &Drawn) {
         Drawn::Text {
             at: (x, y),
             text,
-            size,
-            bold,
-            grey,
+            style,
         } => {
-            let typeface = fonts.get(*bold);
-            let color = rgb::Color::new(*grey, *grey, *grey);
+            let typeface = fonts.get(style.bold);
+            let color = rgb::Color::new(style.grey, style.grey, style.grey);
             surface.set_stroke(None);
             surface.set_fill(Some(Fill {
                 paint: color.into(),
                 ..Fill::default()
             }));
             let (at, glyphs) = (Point::from_xy(*x, *y), typeface.glyphs(text));
-            surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, *size, false);
+            surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, style.size, false);
         }
         Drawn::Rule {
             from: (x, y),
