@@ -27,7 +27,7 @@ pub fn add(document: &mut Document, methods: &[String], missions: &[Flown]) {
         for end in &flown.ends {
             let error = end.error.as_ref().map(|error| horizontal.error(error));
             row.push(error.map_or("–".to_owned(), three_digits));
-            row.push(three_digits(horizontal.of_sigma(&end.sigma)));
+            row.push(three_digits(horizontal.of(&end.sigma)));
         }
         row
     };

@@ -159,9 +159,9 @@ impl Navigation<'_> {
         let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
         let last = self.moments.last();
         let sigma = last.and_then(|m| quantity.sigma(m)).filter(|s| *s > 0.0);
-        let ratio = last.zip(sigma).filter(|_| quantity.is_component());
+        let ratio = last.zip(sigma).filter(|_| quantity.is_component);
         cells![
-            quantity.name(),
+            quantity.name,
             quantity.unit(),
             or_dash(largest.map(error), three_digits),
             or_dash(largest.map(|m| m.time / HOUR), |t| value(t, 1.0)),
@@ -204,7 +204,7 @@ impl Navigation<'_> {
     /// A row a minute: time, errors, predicted σ where there is one.
     fn csv(&self) -> String {
         let with_sigma = self.moments.iter().all(|m| m.covariance.is_some());
-        let keys = Quantity::ALL.map(Quantity::key);
+        let keys = Quantity::ALL.map(|quantity| quantity.key);
         let mut text = format!("t_h,{}", keys.join(","));
         if with_sigma {
             text.extend(keys.iter().map(|key| format!(",sigma_{key}")));
@@ -265,7 +265,7 @@ impl Navigation<'_> {
 /// One number for each quantity under its key.
 fn by_key(of: impl Fn(Quantity) -> f64) -> Map<String, Value> {
     let all = Quantity::ALL.into_iter();
-    all.map(|quantity| (quantity.key().to_owned(), of(quantity).into()))
+    all.map(|quantity| (quantity.key.to_owned(), of(quantity).into()))
         .collect()
 }
 

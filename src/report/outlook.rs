@@ -70,7 +70,7 @@ fn long(navigated: &[Navigated]) -> String {
 /// Error and its σ in the usual unit.
 fn both(quantity: Quantity, moment: &Outlook) -> (Option<f64>, f64) {
     let error = moment.error.as_ref().map(|error| quantity.error(error));
-    (error, quantity.of_sigma(&moment.sigma))
+    (error, quantity.of(&moment.sigma))
 }
 
 /// The position at the end in one line.
@@ -158,12 +158,12 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
     let (unit, scale) = quantity.readable_unit(largest);
     let (name, unit, scale) = match of {
         Of::End => (
-            format!("{} at the end", quantity.name()),
+            format!("{} at the end", quantity.name),
             unit.to_owned(),
             scale,
         ),
         Of::Largest => (
-            format!("{}, largest", quantity.name()),
+            format!("{}, largest", quantity.name),
             unit.to_owned(),
             scale,
         ),
@@ -204,7 +204,7 @@ pub(super) fn figure(navigated: &[Navigated]) -> Option<Plot> {
     if navigated.len() > 1 {
         caption += " Solid: EKF; dashed: closed form.";
     }
-    let panels = [Quantity::EAST, Quantity::NORTH].map(|quantity| panel(quantity, navigated));
+    let panels = [6, 7].map(|place| panel(Quantity::ALL[place], navigated));
     Some(Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption))
 }
 

@@ -7,8 +7,7 @@ use crate::calibration::parameters::derivatives;
 use crate::calibration::{
     Group, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };
-use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
-use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+use crate::imu::{PerSensor, Triad};
 
 /// What an instrument that is turned on its mounting face makes of parameters: derivatives of those of the recording.
 #[derive(Debug, Clone)]
@@ -59,13 +58,11 @@ impl DayToDay {
 
     /// The key of a group in a campaign's `[day_to_day]`, and its unit in SI.
     pub fn key(group: Group) -> (String, f64) {
-        let (kind, unit) = match (group.kind(), group.sensor()) {
-            (ParameterKind::Scale, _) => ("scale_ppm", PPM),
-            (ParameterKind::Installation, _) => ("installation_arcsec", ARCSEC),
-            (ParameterKind::Bias, Sensor::Gyro) => ("bias_deg_per_h", DEG_PER_H),
-            (ParameterKind::Bias, Sensor::Accel) => ("bias_ug", MICRO_G),
-        };
-        (format!("{}_{kind}", group.sensor().name()), unit)
+        let entry = group.entry();
+        (
+            format!("{}_{}", group.sensor().name(), entry.key),
+            entry.value,
+        )
     }
 
     /// All that a recording has of its own, with its 1σ.

@@ -13,41 +13,35 @@ pub(super) fn title(quantity: Quantity) -> String {
     }
 }
 
+/// Its unit: symbol, name in files, size in SI.
+fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
+    match quantity {
+        Quantity::Parameter(index) => {
+            let of = Group::of(index).entry();
+            let (_, name) = of.key.split_once('_').unwrap_or_default();
+            (of.unit, name, of.value)
+        }
+        Quantity::Noise(Sensor::Gyro, _) => ("°/√h", "deg_per_sqrt_h", DEG_PER_SQRT_H),
+        Quantity::Noise(Sensor::Accel, _) => ("µg/√Hz", "ug_per_sqrt_hz", MICRO_G_PER_SQRT_HZ),
+    }
+}
+
 /// Symbol of its unit.
 pub(super) fn symbol(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Parameter(index) => Group::of(index).unit(),
-        Quantity::Noise(Sensor::Gyro, _) => "°/√h",
-        Quantity::Noise(Sensor::Accel, _) => "µg/√Hz",
-    }
+    unit(quantity).0
 }
 
 /// Its unit as a name in files.
 pub(super) fn unit_key(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Parameter(index) => match Group::of(index).unit() {
-            "ppm" => "ppm",
-            "″" => "arcsec",
-            "°/h" => "deg_per_h",
-            _ => "ug",
-        },
-        Quantity::Noise(Sensor::Gyro, _) => "deg_per_sqrt_h",
-        Quantity::Noise(Sensor::Accel, _) => "ug_per_sqrt_hz",
-    }
+    unit(quantity).1
 }
 
 /// Value and σ in that unit.
 pub(super) fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
+    let (.., unit) = unit(quantity);
     match quantity {
-        Quantity::Parameter(index) => {
-            let group = Group::of(index);
-            (group.shown(of.value), of.sigma / group.unit_value())
-        }
-        Quantity::Noise(sensor, _) => {
-            let unit = match sensor {
-                Sensor::Gyro => DEG_PER_SQRT_H,
-                Sensor::Accel => MICRO_G_PER_SQRT_HZ,
-            };
+        Quantity::Parameter(index) => (Group::of(index).shown(of.value), of.sigma / unit),
+        Quantity::Noise(..) => {
             let density = of.value.exp() / unit;
             (density, density * of.sigma)
         }

@@ -30,43 +30,34 @@ impl Quantity {
         Self::Position,
     ];
 
+    /// Name, unit that the paper gives it in, one of that unit in rad, m/s or m, key in JSON.
+    fn entry(self) -> (&'static str, &'static str, f64, &'static str) {
+        match self {
+            Self::Pitch => ("pitch", "°", DEGREE, "pitch_deg"),
+            Self::Roll => ("roll", "°", DEGREE, "roll_deg"),
+            Self::Heading => ("heading", "°", DEGREE, "heading_deg"),
+            Self::Velocity => ("velocity", "m/s", 1.0, "velocity_m_s"),
+            Self::Position => ("position", "nmile", NAUTICAL_MILE, "position_nmile"),
+        }
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Pitch => "pitch",
-            Self::Roll => "roll",
-            Self::Heading => "heading",
-            Self::Velocity => "velocity",
-            Self::Position => "position",
-        }
+        self.entry().0
     }
 
     /// The unit that the paper gives it in.
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::Pitch | Self::Roll | Self::Heading => "°",
-            Self::Velocity => "m/s",
-            Self::Position => "nmile",
-        }
+        self.entry().1
     }
 
     /// One of that unit in rad, m/s or m.
     pub fn unit_value(self) -> f64 {
-        match self {
-            Self::Pitch | Self::Roll | Self::Heading => DEGREE,
-            Self::Velocity => 1.0,
-            Self::Position => NAUTICAL_MILE,
-        }
+        self.entry().2
     }
 
     /// Its key in JSON, with the unit.
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Pitch => "pitch_deg",
-            Self::Roll => "roll_deg",
-            Self::Heading => "heading_deg",
-            Self::Velocity => "velocity_m_s",
-            Self::Position => "position_nmile",
-        }
+        self.entry().3
     }
 }
