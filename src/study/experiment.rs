@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Ratio;
-use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
+use super::navigation::{Mission, Motion, NavigationStudyError};
 use super::ratio::{bootstrap, median, quantile};
 use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
@@ -246,7 +246,10 @@ impl ExperimentStudy {
         Ok(Way {
             situation,
             noise: noise::spread(&noise),
-            minutes: exposures.iter().map(Minute::of).collect(),
+            minutes: exposures
+                .iter()
+                .map(|at| (at.time, at.position()))
+                .collect(),
         })
     }
 }
@@ -261,21 +264,8 @@ fn ideal() -> PerSensor<Triad> {
 struct Way {
     situation: Situation,
     noise: Spread,
-    minutes: Vec<Minute>,
-}
-
-struct Minute {
-    time: f64,
-    position: ByParameter,
-}
-
-impl Minute {
-    fn of(exposure: &Exposure) -> Self {
-        Self {
-            time: exposure.time,
-            position: exposure.position(),
-        }
-    }
+    /// Time and what each parameter's error does to the position.
+    minutes: Vec<(f64, ByParameter)>,
 }
 
 impl Way {
@@ -294,11 +284,15 @@ impl Way {
         let calibrated: Vec<&Calibrated> = trials.iter().filter_map(|t| t.of(place)).collect();
         let all = || calibrated.iter().map(|c| &c.error);
         let errors: Vec<f64> = all().map(|error| self.at_end(error)).collect();
-        let lengths_at =
-            |minute: &Minute| -> Vec<f64> { all().map(|e| (minute.position * e).norm()).collect() };
         let every: Vec<usize> = (0..errors.len()).collect();
+        let median_at = |by: &ByParameter| {
+            median(
+                &Vec::from_iter(all().map(|error| (by * error).norm())),
+                &every,
+            )
+        };
         let largest = |error: &ParameterVector| {
-            let lengths = self.minutes.iter().map(|m| (m.position * error).norm());
+            let lengths = self.minutes.iter().map(|(_, by)| (by * error).norm());
             lengths.fold(0.0, f64::max)
         };
         let interval = bootstrap(errors.len(), |chosen| median(&errors, chosen));
@@ -314,7 +308,7 @@ impl Way {
                 .minutes
                 .iter()
                 .step_by(EVERY)
-                .map(|minute| (minute.time, median(&lengths_at(minute), &every)))
+                .map(|(t, by)| (*t, median_at(by)))
                 .collect(),
             gain: self.gain(place, method, trials),
             budget: Budget::new(self.end(), &calibrated),
@@ -342,7 +336,7 @@ impl Way {
 
     fn end(&self) -> ByParameter {
         let last = self.minutes.last();
-        last.map_or_else(ByParameter::zeros, |last| last.position)
+        last.map_or_else(ByParameter::zeros, |last| last.1)
     }
 }
 
