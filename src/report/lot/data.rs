@@ -3,9 +3,9 @@
 use serde_json::{Map, Value, json};
 
 use crate::lot::{
-    Against, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
+    Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics, Verdict,
 };
-use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key};
+use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
 
 pub(super) fn data(lot: &Lot) -> Value {
     json!({
@@ -137,11 +137,4 @@ pub(super) fn csv(lot: &Lot) -> String {
         }
     }
     String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
-}
-
-/// The verdict of the limit of a quantity.
-pub(super) fn verdict(row: &Row, quantity: Quantity) -> Option<Verdict> {
-    let of = row.checks.iter();
-    let mut of = of.filter(|check| Quantity::Parameter(check.limit.parameter) == quantity);
-    of.next().map(|check| check.verdict)
 }

@@ -1,7 +1,7 @@
 //! How quantities of a lot are spoken of.
 
 use crate::imu::{AXES, InstallationForm, Sensor};
-use crate::lot::{Against, Quantity, Sample, Spread, Trend};
+use crate::lot::{Against, Check, Lot, Quantity, Row, Sample, Spread, Trend, Verdict};
 use crate::report::prelude::*;
 use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
 
@@ -106,4 +106,35 @@ pub(super) fn spread(quantity: Quantity, of: &Spread) -> String {
         // The scatter is less than the units' σ alone make.
         _ => "0".to_owned(),
     }
+}
+
+/// Quantities that are shown together: the heading, the name of each, and which they are. First the groups of
+/// parameters, then the noise of each triad.
+pub(super) fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
+    let those = |is: &dyn Fn(Quantity) -> bool| -> Vec<Quantity> {
+        let all = lot.statistics.iter().map(|of| of.quantity);
+        all.filter(|&quantity| is(quantity)).collect()
+    };
+    let groups = Group::all().map(|group| {
+        let quantities =
+            those(&|q| matches!(q, Quantity::Parameter(index) if Group::of(index) == group));
+        let names = quantities.iter().map(|quantity| {
+            let title = title(*quantity);
+            title.rsplit(' ').next().unwrap_or_default().to_owned()
+        });
+        (group.titled(), names.collect(), quantities)
+    });
+    let noises = Sensor::ALL.map(|sensor| {
+        let quantities = those(&|q| matches!(q, Quantity::Noise(of, _) if of == sensor));
+        let unit = quantities.first().map_or("", |q| symbol(*q));
+        let heading = format!("{} noise at rest, {unit}", sensor.name());
+        (heading, AXES.map(String::from).to_vec(), quantities)
+    });
+    groups.chain(noises).collect()
+}
+
+/// The verdict of the limit of a quantity.
+pub(super) fn verdict(row: &Row, quantity: Quantity) -> Option<Verdict> {
+    let is_of = |check: &&Check| Quantity::Parameter(check.limit.parameter) == quantity;
+    row.checks.iter().find(is_of).map(|check| check.verdict)
 }

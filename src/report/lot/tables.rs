@@ -1,7 +1,9 @@
 //! Tables of a lot.
 
-use super::shown::{chance, shown, shown_spread, spread, spread_symbol, symbol, title, with_sigma};
-use crate::imu::{InstallationForm, Sensor};
+use super::shown::{
+    self, chance, shown, shown_spread, spread, spread_symbol, symbol, title, together, with_sigma,
+};
+use crate::imu::Sensor;
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
 use crate::report::prelude::*;
 
@@ -156,35 +158,8 @@ fn ratio(of: f64) -> String {
 
 /// Every parameter of every unit, a table for each group, and one of noise for each triad.
 pub(super) fn values(lot: &Lot) -> Vec<Table> {
-    let groups = Group::all().map(|group| {
-        let quantities: Vec<Quantity> = lot
-            .statistics
-            .iter()
-            .map(|of| of.quantity)
-            .filter(|q| matches!(q, Quantity::Parameter(index) if Group::of(*index) == group))
-            .collect();
-        let axes = quantities.iter().map(|q| match q {
-            Quantity::Parameter(index) => axis_name(InstallationForm::General, *index),
-            Quantity::Noise(..) => String::new(),
-        });
-        (group.titled(), axes.collect::<Vec<_>>(), quantities)
-    });
-    let noises = Sensor::ALL.map(|sensor| {
-        let all = lot.statistics.iter().map(|of| of.quantity);
-        let quantities: Vec<Quantity> = all
-            .filter(|q| matches!(q, Quantity::Noise(of, _) if *of == sensor))
-            .collect();
-        let unit = quantities.first().map_or("", |q| symbol(*q));
-        let axes = ["x", "y", "z"].map(str::to_owned).to_vec();
-        (
-            format!("{} noise at rest, {unit}", sensor.name()),
-            axes,
-            quantities,
-        )
-    });
-    let tables = groups
-        .chain(noises)
-        .filter(|(_, _, quantities)| !quantities.is_empty());
+    let tables = together(lot).into_iter();
+    let tables = tables.filter(|(.., quantities)| !quantities.is_empty());
     let table = |(heading, axes, quantities): (String, Vec<String>, Vec<Quantity>)| {
         let row = |(place, row): (usize, &Row)| {
             let mut cells = vec![row.unit.name.clone()];
@@ -193,10 +168,7 @@ pub(super) fn values(lot: &Lot) -> Vec<Table> {
                     return NONE.to_owned();
                 };
                 let apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
-                let fails = row.checks.iter().any(|check| {
-                    Quantity::Parameter(check.limit.parameter) == quantity
-                        && check.verdict == Verdict::Fail
-                });
+                let fails = shown::verdict(row, quantity) == Some(Verdict::Fail);
                 let mark = if apart || fails { "! " } else { "" };
                 format!("{mark}{}", with_sigma(shown(quantity, sample)))
             }));
