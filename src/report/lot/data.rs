@@ -2,9 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::lot::{
-    Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics, Verdict,
-};
+use crate::lot::{Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics, Verdict};
 use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
 
 pub(super) fn data(lot: &Lot) -> Value {
