@@ -1,6 +1,5 @@
 //! The report of a study of campaigns.
 
-use crate::imu::RATE;
 use crate::report::prelude::*;
 use crate::study::CampaignAccuracy;
 
@@ -35,23 +34,12 @@ pub fn document(accuracy: &CampaignAccuracy) -> Document {
     document
 }
 
-fn name(function: Option<usize>) -> String {
-    match function {
-        None => "at the reference".to_owned(),
-        Some(RATE) => "by rate".to_owned(),
-        Some(0) => "linear".to_owned(),
-        Some(1) => "square".to_owned(),
-        Some(2) => "cubic".to_owned(),
-        Some(function) => format!("order {}", function + 1),
-    }
-}
-
 fn figures(accuracy: &CampaignAccuracy) -> Table {
     let row = |group: Group, function: Option<usize>| {
         let (of, campaigns) = accuracy.figures(group, function)?;
         let (ratio, unit) = (of.ratio?, group.unit_value());
         Some(vec![
-            format!("{}, {}", group.short(), name(function)),
+            format!("{}, {}", group.short(), function_name(function)),
             group.unit().to_owned(),
             campaigns.to_string(),
             three_digits(of.filter / unit),
@@ -104,7 +92,7 @@ fn data(accuracy: &CampaignAccuracy) -> Value {
                     "ratio": ratio.value,
                     "ratio_interval": [ratio.interval.0, ratio.interval.1],
                 });
-                of_group.insert(name(function), figures);
+                of_group.insert(function_name(function), figures);
             }
         }
         let (right, all) = accuracy.right_orders(group);

@@ -1,7 +1,7 @@
 //! How the six groups are spoken of: names, and the unit of each.
 
 use crate::calibration::{ParameterVector, parameter_name};
-use crate::imu::{InstallationForm, ParameterKind};
+use crate::imu::{InstallationForm, ParameterKind, RATE};
 
 pub(super) use crate::calibration::Group;
 
@@ -67,6 +67,18 @@ pub(super) fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
+}
+
+/// Which function of temperature a coefficient is of; none: a parameter at the reference.
+pub(super) fn function_name(function: Option<usize>) -> String {
+    match function {
+        None => "at the reference".to_owned(),
+        Some(RATE) => "by rate".to_owned(),
+        Some(0) => "linear".to_owned(),
+        Some(1) => "square".to_owned(),
+        Some(2) => "cubic".to_owned(),
+        Some(function) => format!("order {}", function + 1),
+    }
 }
 
 /// A short name for a figure's margin, such as `gyro E xy`.

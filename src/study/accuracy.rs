@@ -187,6 +187,11 @@ impl AccuracyStudy {
 }
 
 impl Accuracy {
+    /// What the filter gave in each run in which it gave anything.
+    pub fn filtered(&self) -> impl Iterator<Item = &Filtered> {
+        filtered(&self.trials)
+    }
+
     /// Runs that failed, with the reason.
     pub fn failures(&self) -> impl Iterator<Item = (u64, &str)> {
         self.trials
@@ -196,14 +201,9 @@ impl Accuracy {
 
     /// Number of runs whose data reject the filter's installation form, and of those tested.
     pub fn rejections(&self) -> (usize, usize) {
-        let tests = || {
-            let filtered = self.trials.iter().filter_map(|t| t.filtered.as_ref());
-            filtered.filter_map(|f| f.form_test)
-        };
-        (
-            tests().filter(|test| test.rejects()).count(),
-            tests().count(),
-        )
+        let tests = || self.filtered().filter_map(|filtered| filtered.form_test);
+        let rejected = tests().filter(|test| test.rejects());
+        (rejected.count(), tests().count())
     }
 }
 
@@ -261,11 +261,12 @@ impl GroupAccuracy {
     }
 }
 
+fn filtered(trials: &[Trial]) -> impl Iterator<Item = &Filtered> {
+    trials.iter().filter_map(|trial| trial.filtered.as_ref())
+}
+
 fn anees(trials: &[Trial]) -> Option<Anees> {
-    let all = || {
-        let filtered = trials.iter().filter_map(|trial| trial.filtered.as_ref());
-        filtered.filter_map(|filtered| filtered.nees)
-    };
+    let all = || filtered(trials).filter_map(|filtered| filtered.nees);
     let count: usize = all().map(|nees| nees.count).sum();
     let first = all().next()?;
     Some(Anees {
@@ -279,8 +280,10 @@ fn anees(trials: &[Trial]) -> Option<Anees> {
 
 /// One NIS of all runs.
 fn pooled(trials: &[Trial], of: impl Fn(&Filtered) -> &Nis) -> Nis {
-    let filtered = trials.iter().filter_map(|trial| trial.filtered.as_ref());
-    let all: Vec<&Nis> = filtered.map(of).filter(|nis| nis.count > 0).collect();
+    let all: Vec<&Nis> = filtered(trials)
+        .map(of)
+        .filter(|nis| nis.count > 0)
+        .collect();
     let count = all.iter().map(|nis| nis.count).sum::<usize>();
     let mean = |value: &dyn Fn(&Nis) -> f64| {
         let sum: f64 = all.iter().map(|nis| value(nis) * nis.count as f64).sum();

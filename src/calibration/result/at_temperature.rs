@@ -65,8 +65,7 @@ impl Calibration {
                 });
             }
         }
-        let everywhere = PerSensor::from_fn(|_| [temperature; 3]);
-        self.in_state(&thermal.range.state(&everywhere, &PerSensor::default()))
+        self.in_state(&thermal.range.everywhere(temperature, 0.0))
     }
 
     /// The same where the functions of temperature have these values.

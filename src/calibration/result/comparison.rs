@@ -37,6 +37,12 @@ pub struct Comparison {
 }
 
 impl Comparison {
+    /// The reference, then every other.
+    pub fn calibrations(&self) -> impl Iterator<Item = &Canonical> {
+        let sides = self.sides.iter().map(|side| &side.calibration);
+        std::iter::once(&self.reference).chain(sides)
+    }
+
     /// The reference's scale factor in the file's quantity; none for other parameters.
     pub fn scale_factor(&self, parameter: usize) -> Option<f64> {
         let (sensor, of_triad) = sensor_and_parameter(parameter);

@@ -227,8 +227,8 @@ pub(super) fn errors(accuracy: &Accuracy) -> Plot {
 
 /// Errors over σ of the parameters of a group that have a σ.
 fn normalised(accuracy: &Accuracy, group: Group) -> Vec<f64> {
-    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
-    filtered
+    accuracy
+        .filtered()
         .flat_map(|f| (0..PARAMETERS).map(move |i| (i, f.error[i], f.sigma[i])))
         .filter(|&(i, _, sigma)| Group::of(i) == group && sigma > 0.0)
         .map(|(_, error, sigma)| error / sigma)

@@ -119,8 +119,10 @@ fn terms(accuracy: &Accuracy) -> String {
 
 /// Median and largest number of passes; none if no run gave an estimate.
 pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
-    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
-    let mut passes: Vec<usize> = filtered.map(|filtered| filtered.passes).collect();
+    let mut passes: Vec<usize> = accuracy
+        .filtered()
+        .map(|filtered| filtered.passes)
+        .collect();
     passes.sort_unstable();
     let most = *passes.last()?;
     let [low, high] = [(passes.len() - 1) / 2, passes.len() / 2].map(|k| passes[k] as f64);
@@ -129,8 +131,7 @@ pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
 
 /// Number of observations that the gate rejected, and in how many runs.
 pub(super) fn rejected(accuracy: &Accuracy) -> (usize, usize) {
-    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
-    let rejected = filtered.map(|filtered| filtered.rejected);
+    let rejected = accuracy.filtered().map(|filtered| filtered.rejected);
     rejected.fold((0, 0), |(all, runs), of| {
         (all + of, runs + usize::from(of > 0))
     })

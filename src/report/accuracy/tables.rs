@@ -105,8 +105,10 @@ pub(super) fn gain(accuracy: &Accuracy) -> Table {
 }
 
 pub(super) fn consistency(accuracy: &Accuracy) -> Table {
-    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
-    let directions = filtered.filter_map(|f| Some(f.nees?.count)).sum();
+    let directions = accuracy
+        .filtered()
+        .filter_map(|f| Some(f.nees?.count))
+        .sum();
     let nees = accuracy.anees.map(|of| {
         cells![
             format!("NEES/{}", of.directions),

@@ -24,8 +24,8 @@ pub fn document(comparison: &Comparison) -> Document {
         comparison.body_frame.words(),
         comparison.reference.name
     )];
-    document.warnings.items = std::iter::once(&comparison.reference)
-        .chain(comparison.sides.iter().map(|side| &side.calibration))
+    document.warnings.items = comparison
+        .calibrations()
         .filter(|calibration| !calibration.converged)
         .map(|calibration| format!("{} did not converge: its σ mean nothing.", calibration.name))
         .collect();
@@ -109,8 +109,8 @@ fn parameters(comparison: &Comparison) -> Table {
 
 /// The smallest σ that any calibration claims for some parameters: what is finer means nothing.
 fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
-    std::iter::once(&comparison.reference)
-        .chain(comparison.sides.iter().map(|side| &side.calibration))
+    comparison
+        .calibrations()
         .filter_map(|calibration| calibration.sigma())
         .flat_map(|sigma| indices.iter().map(move |&index| sigma[index]))
         .filter(|sigma| *sigma > 0.0)

@@ -89,11 +89,9 @@ impl Changing {
     }
 
     fn state(&self, (temperature, rate): (f64, f64)) -> ThermalState {
-        let [temperature, rate] = [temperature, rate].map(|of| PerSensor::from_fn(|_| [of; 3]));
         let thermal = self.thermal.as_ref();
-        thermal.map_or_else(Default::default, |thermal| {
-            thermal.model.range.state(&temperature, &rate)
-        })
+        let state = thermal.map(|thermal| thermal.model.range.everywhere(temperature, rate));
+        state.unwrap_or_default()
     }
 
     fn at(&self, now: (f64, f64)) -> PerSensor<Triad> {

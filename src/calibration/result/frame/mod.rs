@@ -109,6 +109,9 @@ impl Estimate {
 
     /// Derivatives of the parameters in the general form, in a body frame, by these.
     pub fn to_general_form(&self, body_frame: BodyFrame) -> ParameterMatrix {
+        if (self.form(), body_frame) == (InstallationForm::General, BodyFrame::Table) {
+            return ParameterMatrix::identity();
+        }
         derivatives(&self.vector(), |v| {
             let general = in_general_form(&from_vector(self.form(), v));
             to_vector(&in_body_frame(&general, body_frame))
