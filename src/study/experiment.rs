@@ -5,7 +5,6 @@
 //! δθ do on the way, X₀ what they did to the alignment at the start. Both are linear, so each mission
 //! is followed once and serves every calibration.
 
-mod alignment;
 mod budget;
 mod method;
 mod noise;
@@ -235,7 +234,7 @@ impl ExperimentStudy {
         let mut start = Sensitivity::zeros();
         let mut aligned = None;
         if let (Situation::SelfAligned, Motion::Standing(at)) = (situation, &mission.motion) {
-            let by_sensed = alignment::by_itself(at);
+            let by_sensed = noise::by_itself(at);
             if let Ok(sensed) = SensedErrors::new(&instrument) {
                 start = by_sensed * sensed.at(&at.steady());
             }

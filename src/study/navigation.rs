@@ -1,11 +1,9 @@
 //! What a calibration is worth: the navigation error that what is wrong with it causes, by the
 //! nonlinear equations of navigation, and the σ of that error that its covariance predicts, by the linear model.
 
-mod course;
 mod outlook;
 mod warming;
 
-use course::Course;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
@@ -18,7 +16,8 @@ use crate::imu::{BodyFrame, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{POSITION, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorVector, Forcing, InputError, Instant, Linearisation, NavigationError,
-    NearPole, NonlinearError, SensedErrors, Sensitivity, Solution, Trajectory, within_reach,
+    NearPole, NonlinearError, SensedErrors, Sensitivity, Solution, Stride, Strides, Trajectory,
+    within_reach,
 };
 
 pub use outlook::Outlook;
@@ -365,6 +364,54 @@ fn exposure(
         time,
         by_parameter: by_state * sensitivity,
     })
+}
+
+/// A body's true motion step by step, whether it stands or moves.
+enum Course<'a> {
+    Standing { here: Instant, time: f64 },
+    Moving(Box<Strides<'a>>),
+}
+
+impl<'a> Course<'a> {
+    fn new(motion: &'a Motion) -> Self {
+        match motion {
+            Motion::Standing(truth) => Self::Standing {
+                here: truth.steady(),
+                time: 0.0,
+            },
+            Motion::Moving(trajectory) => Self::Moving(Box::new(trajectory.strides())),
+        }
+    }
+
+    /// The true state now and what is sensed in it.
+    fn here(&self) -> &Instant {
+        match self {
+            Self::Standing { here, .. } => here,
+            Self::Moving(strides) => strides.here(),
+        }
+    }
+
+    /// Goes on until a time in s since the start, as [`Strides::go`] does.
+    fn go<E>(
+        &mut self,
+        until: f64,
+        beside: f64,
+        mut each: impl FnMut(&Stride) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match self {
+            Self::Standing { here, time } => {
+                let steps = Stride::count(until - *time, here.rate.norm() + beside);
+                let stride = Stride {
+                    duration: (until - *time) / f64::from(steps),
+                    middle: *here,
+                    end: *here,
+                };
+                *time = until;
+                (0..steps).try_for_each(|_| each(&stride))
+            }
+            Self::Moving(strides) => strides.go(until, beside, each),
+        }
+    }
 }
 
 #[cfg(test)]

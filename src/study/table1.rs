@@ -13,8 +13,6 @@
 //! as scale factors of rows of unit norm, is not left out.
 
 pub mod paper;
-mod quantity;
-mod reading;
 mod response;
 mod verdict;
 
@@ -31,8 +29,7 @@ use crate::models::{InstallationModel, Instrument, ModelError, Place};
 use crate::navigation::{Instant, LARGEST_LATITUDE};
 use crate::units::DEGREE;
 
-pub use quantity::{ByQuantity, Quantity};
-pub use reading::{Installation, Kind, Reading};
+pub use paper::{ByQuantity, Installation, Kind, Quantity, Reading};
 pub use response::Moments;
 pub use verdict::{AGREEMENT, Verdict};
 

@@ -74,7 +74,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             let last = actual.len() - 1;
             let largest = (0..=last).map(|k| position(k).norm()).fold(0.0, f64::max);
             for k in (0..=last).step_by(60) {
-                let linear: Vector2<f64> = way.minutes[k].position * error;
+                let linear: Vector2<f64> = way.minutes[k].1 * error;
                 let apart = (linear - position(k)).norm() / largest;
                 assert!(apart < within, "{situation:?}, {form:?}, {k} min: {apart}");
             }
