@@ -64,7 +64,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             let start = match (&mission.motion, situation) {
                 (Motion::Standing(at), Situation::SelfAligned) => {
                     let sensed = SensedErrors::new(&pair.truth).unwrap().at(&at.steady());
-                    alignment::by_itself(at) * sensed * error
+                    noise::by_itself(at) * sensed * error
                 }
                 _ => Default::default(),
             };
