@@ -11,9 +11,7 @@ use crate::attitude::to_pitch_roll_heading;
 use crate::imu::{BodyFrame, Sensor};
 use crate::report::prelude::*;
 use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion, Warming};
-use crate::units::{DEGREE, NAUTICAL_MILE};
 
-const HOUR: f64 = 3600.0;
 /// Hours over which the paper gives the drift of position.
 const PAPER_HOURS: f64 = 40.0;
 

@@ -8,3 +8,4 @@ pub(super) use super::number::*;
 pub(super) use super::plot::{
     Anchor, Axis, Color, Dash, Mark, Matrix, Panel, Plot, Point, Series, Shape, thinned,
 };
+pub(super) use crate::units::*;

@@ -6,7 +6,6 @@ use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
 use crate::report::prelude::*;
 use crate::study::navigation::Epoch;
-use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
 /// Lines this many times apart share an axis that is logarithmic.
 const APART: f64 = 20.0;

@@ -8,7 +8,6 @@ use crate::calibration::{
 };
 use crate::report::prelude::*;
 use crate::turntable::AxisError;
-use crate::units::ARCSEC;
 
 /// An error term in words.
 pub(super) fn title(block: ErrorTerm) -> &'static str {

@@ -15,7 +15,6 @@ const NEAR: f64 = 0.04;
 const FAR: f64 = 2.0;
 /// Lines that end nearer than this factor have one name.
 const TOGETHER: f64 = 2.0;
-const MINUTE: f64 = 60.0;
 
 pub(super) fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     let mut plots = vec![

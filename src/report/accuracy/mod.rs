@@ -6,8 +6,6 @@ mod tables;
 mod tests;
 mod verdict;
 
-use serde_json::{Map, Value, json};
-
 use super::terms;
 use crate::calibration::result::BlockRecord;
 use crate::calibration::{ErrorTerm, Nis};
@@ -17,7 +15,6 @@ use crate::report::terms::title;
 use crate::study::accuracy::{Containment, Journey, Region};
 use crate::study::navigation::{FORTY_HOURS, INTERVAL};
 use crate::study::{Accuracy, Figures};
-use crate::units::{DEGREE, NAUTICAL_MILE};
 
 /// Everything that is said of the study.
 pub fn document(accuracy: &Accuracy) -> Document {

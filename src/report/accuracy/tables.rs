@@ -6,7 +6,6 @@ use crate::report::prelude::*;
 use crate::report::terms::{title, unit};
 use crate::study::accuracy::{Containment, Journey, Region};
 use crate::study::{Accuracy, Figures, Ratio};
-use crate::units::NAUTICAL_MILE;
 
 const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 

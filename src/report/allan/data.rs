@@ -1,7 +1,5 @@
 //! The analysis by name. Deviations are in deg/h and µg, intervals of 95 %.
 
-use serde_json::{Map, Value, json};
-
 use crate::formats::NoiseKeys;
 use crate::imu::Sensor;
 use crate::noise::{AxisNoise, NoiseAnalysis, Process, of_kind};

@@ -6,7 +6,6 @@ use crate::calibration::{Budget, BudgetPart, ErrorTermTest, Estimate, ParameterV
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 use crate::report::prelude::*;
-use crate::units::{DEG_PER_H, DEGREE};
 
 /// So many sources have a colour of their own; the others share one.
 const SHOWN: usize = 5;

@@ -10,7 +10,6 @@ use crate::imu::AXES;
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
 use crate::report::prelude::*;
-use crate::units::DEGREE;
 
 /// Where the axis of estimates ends, in final σ: with the prior on it the end could not be read.
 const EXTENT: f64 = 300.0;

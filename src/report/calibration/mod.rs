@@ -12,9 +12,6 @@ use crate::calibration::{Estimate, Finding, ParameterVector};
 use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
 use crate::report::{outlook, terms};
-use crate::units::{
-    ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
-};
 
 pub use super::outlook::Navigated;
 pub use report::{ClosedForm, Report};

@@ -7,7 +7,6 @@ use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, para
 use crate::imu::ParameterKind;
 use crate::recording::TableLog;
 use crate::report::prelude::*;
-use crate::units::{ARCSEC, DEGREE, MICRO_G, MILLI_G};
 
 /// How many of the directions that were observed are shown.
 const WEAKEST: usize = 3;

@@ -9,8 +9,6 @@ use crate::report::prelude::*;
 
 /// Points of a curve.
 const POINTS: usize = 81;
-/// Seconds in a minute: rates are shown per minute.
-const MINUTE: f64 = 60.0;
 
 /// Adds tables and figures, where anything changes or differs.
 pub(super) fn add(document: &mut Document, outcome: &Outcome) {

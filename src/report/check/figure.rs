@@ -6,7 +6,6 @@ use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{Rest, Turn};
 use crate::survey::Survey;
-use crate::units::DEGREE;
 
 pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {
     let mut caption = "Gyro rates and specific force along body axes by nominal scales, as they stand in the file. \

@@ -8,7 +8,6 @@ use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::Survey;
-use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 
 /// Faults beyond so many are not listed one by one.
 const LISTED: usize = 20;

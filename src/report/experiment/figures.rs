@@ -1,8 +1,6 @@
 //! Position errors at the end, against time, and by group of parameters.
 
-use super::tables::{
-    HOUR, estimator_name, hours, in_general, method_name, miles, nmile, situation_name,
-};
+use super::tables::{estimator_name, hours, in_general, method_name, miles, nmile, situation_name};
 use crate::calibration::Group;
 use crate::imu::InstallationForm;
 use crate::report::prelude::*;

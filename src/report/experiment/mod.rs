@@ -3,19 +3,16 @@
 mod figures;
 mod tables;
 
-use serde_json::{Map, Value, json};
-
 use crate::imu::Sensor;
 use crate::report::experiment::tables::{
-    HOUR, PAPER, estimator_name, hours, in_general, method_kind, method_name, miles, navigated,
-    nmile, situation_name, timed,
+    PAPER, estimator_name, hours, in_general, method_kind, method_name, miles, navigated, nmile,
+    situation_name, timed,
 };
 use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{
     ALIGNMENT_TIME, Budget, Estimator, Method, Situation, Spread, Worth,
 };
-use crate::units::DEGREE;
 
 /// Everything that is said of the experiment.
 pub fn document(experiment: &Experiment) -> Document {

@@ -6,7 +6,6 @@ use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
 use crate::study::navigation::INTERVAL;
-use crate::units::NAUTICAL_MILE;
 
 /// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
 pub(super) const PAPER: [(Sensor, InstallationForm, f64); 4] = [
@@ -158,7 +157,6 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
         )
 }
 
-pub(super) const HOUR: f64 = 3600.0;
 /// Hours of the paper's experiment.
 pub(super) const PAPER_HOURS: f64 = 40.0;
 

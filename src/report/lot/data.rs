@@ -1,9 +1,8 @@
 //! The figures of a lot by name; the unit of each is in its `unit`.
 
-use serde_json::{Map, Value, json};
-
 use crate::lot::{Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics, Verdict};
 use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
+use crate::report::prelude::*;
 
 pub(super) fn data(lot: &Lot) -> Value {
     json!({

@@ -14,7 +14,6 @@ use shown::{change, title};
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
-use crate::units::PPM;
 
 /// Everything that is said of a lot.
 pub fn document(lot: &Lot) -> Document {

@@ -3,7 +3,6 @@
 use crate::imu::{AXES, InstallationForm, Sensor};
 use crate::lot::{Against, Check, Lot, Quantity, Row, Sample, Spread, Trend, Verdict};
 use crate::report::prelude::*;
-use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
 
 /// Such as `gyro K x` or `gyro noise x`.
 pub(super) fn title(quantity: Quantity) -> String {

@@ -1,7 +1,8 @@
 //! Tables of a lot.
 
+use super::shown;
 use super::shown::{
-    self, chance, shown, shown_spread, spread, spread_symbol, symbol, title, together, with_sigma,
+    chance, shown, shown_spread, spread, spread_symbol, symbol, title, together, with_sigma,
 };
 use crate::imu::Sensor;
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};

@@ -3,8 +3,7 @@
 mod font;
 mod layout;
 
-use krilla::Document as Pdf;
-use krilla::SerializeSettings;
+use font::Fonts;
 use krilla::color::rgb;
 use krilla::configure::{Archival, ConfigurationBuilder};
 use krilla::embed::{AssociationKind, EmbeddedFile, MimeType};
@@ -13,10 +12,10 @@ use krilla::metadata::{DateTime, Metadata};
 use krilla::page::PageSettings;
 use krilla::paint::{Fill, Stroke};
 use krilla::surface::Surface;
+use krilla::{Document as Pdf, SerializeSettings};
+use layout::{Drawn, HEIGHT, Layout, WIDTH};
 
 use super::document::Document;
-use font::Fonts;
-use layout::{Drawn, HEIGHT, Layout, WIDTH};
 pub use layout::{Frame, PdfError};
 
 /// A file in a PDF.

@@ -6,7 +6,6 @@ use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{Column, Quantity};
 
-const HOUR: f64 = 3600.0;
 /// A course that stays within this part of its axis is a straight line.
 const FLAT: f64 = 1e-4;
 

@@ -6,7 +6,6 @@ mod verdict;
 use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row, paper};
-use crate::units::DEGREE;
 
 /// Smaller figures, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
