@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector1, Vector3};
 
 use super::motion::{Motion, Move, Sensed, Turned};
 use crate::attitude::{log, skew};
+use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
-use crate::calibration::{ParameterVector, parameter};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
 /// Prior and noise may each be stated too small by these factors, all equally likely: then neither a careless prior nor

@@ -5,8 +5,7 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{exp, matrix};
-use crate::calibration::Problem;
-use crate::calibration::problem::Stretch;
+use crate::calibration::problem::{Problem, Stretch};
 use crate::calibration::start::equations::OfTriad;
 use crate::calibration::start::labels::Section;
 use crate::calibration::start::table::sensed;
