@@ -118,6 +118,11 @@ impl Document {
         self.add(Medium::Page, block.into());
     }
 
+    /// The same for several.
+    pub fn pages(&mut self, blocks: impl IntoIterator<Item = impl Into<Block>>) {
+        blocks.into_iter().for_each(|block| self.page(block));
+    }
+
     /// Adds what stands in a terminal in the place of a plot or of a longer table.
     pub fn terminal(&mut self, block: impl Into<Block>) {
         self.add(Medium::Terminal, block.into());

@@ -49,9 +49,7 @@ impl Navigation<'_> {
         document.warnings.items = self.warnings();
         document.both(self.facts());
         document.both(self.table());
-        for plot in self.figures() {
-            document.page(plot);
-        }
+        document.pages(self.figures());
         document.files = vec![("navigation.csv".to_owned(), self.csv())];
         document.data = self.data();
         document

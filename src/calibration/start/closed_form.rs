@@ -175,16 +175,12 @@ fn six_of(observed: &Observed) -> Vec<usize> {
         let axis = input.iamax();
         (input[axis].abs() > ALONG_AXIS * input.norm()).then_some((axis, input[axis] > 0.0))
     };
-    let all: Vec<usize> = (0..observed.known.len()).collect();
-    let six: Vec<usize> = all
-        .iter()
-        .copied()
-        .filter(|&k| along(k).is_some())
-        .collect();
+    let all = 0..observed.known.len();
+    let six: Vec<usize> = all.clone().filter(|&k| along(k).is_some()).collect();
     let has = |axis, up| six.iter().any(|&k| along(k) == Some((axis, up)));
     match (0..3).all(|axis| has(axis, true) && has(axis, false)) {
         true => six,
-        false => all,
+        false => all.collect(),
     }
 }
 

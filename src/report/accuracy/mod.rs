@@ -34,9 +34,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document.both(terms::costs(&accuracy.effects));
     document.both(terms::explained(&accuracy.effects));
     document.both(tables::containment(accuracy));
-    for plot in figures::figures(accuracy) {
-        document.page(plot);
-    }
+    document.pages(figures::figures(accuracy));
     document.data = data(accuracy);
     document
 }

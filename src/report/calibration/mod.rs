@@ -57,9 +57,7 @@ impl Report<'_> {
             document.page(plot);
         }
         document.fold("Figures");
-        for plot in self.figures() {
-            document.page(plot);
-        }
+        document.pages(self.figures());
         document.fold("Observability, model, method and run");
         if let Some(outcome) = self.outcome {
             document.page(tables::weakest(outcome));

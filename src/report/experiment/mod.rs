@@ -23,12 +23,10 @@ pub fn document(experiment: &Experiment) -> Document {
     document.warnings.heading = "To be noted".to_owned();
     say(&mut document, experiment);
     document.both(facts(experiment));
-    for table in tables::tables(experiment) {
-        document.both(table);
-    }
-    for plot in figures::figures(experiment) {
-        document.page(plot);
-    }
+    tables::tables(experiment)
+        .into_iter()
+        .for_each(|table| document.both(table));
+    document.pages(figures::figures(experiment));
     document.data = data(experiment);
     document
 }

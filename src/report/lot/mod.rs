@@ -35,9 +35,7 @@ pub fn document(lot: &Lot) -> Document {
     document.both(tables::parameters(lot));
     document.page(figures::noise(lot));
     document.both(tables::noise(lot));
-    for table in tables::values(lot) {
-        document.page(table);
-    }
+    document.pages(tables::values(lot));
     document.page(tables::undecided(lot));
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(lot))];

@@ -22,9 +22,7 @@ pub fn document(table: &Table1) -> Document {
         document.both(of_column(table, column));
     }
     document.both(List::new("How to read the tables", notes(table)));
-    for plot in figures::figures(table) {
-        document.page(plot);
-    }
+    document.pages(figures::figures(table));
     document.data = data(table);
     document
 }
